@@ -92,6 +92,10 @@ def main() -> None:
     robot, arm = load_robot("irb120").with_payload(PAYLOAD), load_robot("ur5")
     unknown = replace(robot, joints=tuple(replace(joint, transmission_periods=None) for joint in robot.joints))
     cases = {
+        "IRB 120, 20": (robot, irb120(), 20, None),
+        "IRB 120, 30": (robot, irb120(), 30, None),
+        "UR5, 20 of the grid": (arm, ur5("grid"), 20, None),
+        "UR5, 30 of the grid": (arm, ur5("grid"), 30, None),
         "IRB 120, 40": (robot, irb120(), 40, None),
         "IRB 120, 300": (robot, irb120(), 300, None),
         "IRB 120, 300, periods not given": (unknown, irb120(), 300, None),

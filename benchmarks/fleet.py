@@ -52,6 +52,8 @@ def one_run(manifest: str, out: str, how: dict[str, Any]) -> None:
         "parts": parts[-1] - parts[0],
         "result": ended - parts[-1],
         "all": ended - began,
+        "first": parts[1] - parts[0],
+        "cpu": sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)),
         "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "told": [*found.run.told],
     }
@@ -77,6 +79,8 @@ def digest(out: Path) -> str:
     for path in sorted((out / "parts").rglob("*.jsonl")):
         for line in path.read_text().splitlines():
             content = json.loads(line)
+            if "sha256" in content:
+                continue
             content.pop("seconds", None)
             told.update(json.dumps(content, sort_keys=True).encode())
     for name in ("fleet.json", "robots.csv"):
@@ -165,9 +169,12 @@ def compared(folder: Path, count: int, repetitions: int) -> dict[str, Any]:
                 sys.stdout.write(f"{name}: {runs[name][-1]}\n")
                 sys.stdout.flush()
     best = {
-        name: {step: min(one[step] for one in found) for step in ("load", "parts", "result", "all")}
+        name: {step: min(one[step] for one in found) for step in ("load", "first", "parts", "result", "all", "cpu")}
         for name, found in runs.items()
     }
+    few = folder / "few.yaml"
+    few.write_text(MANIFEST.format(count=count // 5, chunk=250))
+    less = [run(few, folder / f"few-{repetition}", {"workers": 1}) for repetition in range(repetitions)]
     size = sum(path.stat().st_size for path in (folder / "2-0" / "parts").rglob("*.jsonl"))
     return {
         "robots": count,
@@ -180,6 +187,31 @@ def compared(folder: Path, count: int, repetitions: int) -> dict[str, Any]:
         "dask_against_two_workers": {step: best["dask"][step] / best["2"][step] for step in ("parts", "all")},
         "same_to_the_last_digit": len(digests) == 1,
         "bytes_a_robot": size / count,
+        "model": model(best, min(one["result"] for one in less), count),
+    }
+
+
+def model(best: dict[str, dict[str, float]], result_of_a_fifth: float, count: int) -> dict[str, float | None]:
+    """Return t = s + w N / n + e N of N robots and n workers, and for how many robots two are 1.8 times one.
+
+    One worker is the command itself; others are processes, whose start `start` is added to s: it is the time to the
+    first part of one process, less that of a part.
+    """
+    chunks = count / 250
+    part = best["1"]["parts"] / chunks
+    start = best["one process"]["first"] - part
+    e = (best["1"]["result"] - result_of_a_fifth) / (0.8 * count)
+    fixed = best["1"]["load"] + best["1"]["result"] - e * count
+    w = best["1"]["parts"] / count
+    gain = 0.1 * w - 0.8 * e
+    return {
+        "s_seconds": fixed,
+        "start_seconds": start,
+        "w_milliseconds": w * 1e3,
+        "e_milliseconds": e * 1e3,
+        "two_against_one_at_count": (fixed + (w + e) * count) / (fixed + start + (w / 2 + e) * count),
+        "most_that_two_can_reach": (w + e) / (w / 2 + e),
+        "robots_from_which_on_1.8": (0.8 * fixed + 1.8 * start) / gain if gain > 0.0 else None,
     }
 
 

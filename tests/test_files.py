@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
 from pydantic import BaseModel
 
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, read_yaml
+from truearm.files import exists, noted_reads, read_bytes, read_text, read_yaml
 from truearm.writing import write_text
 
 
@@ -107,3 +108,17 @@ def test_a_permission_that_is_missing(tmp_path: Path, monkeypatch: pytest.Monkey
         read_bytes(tmp_path / "data.csv")
     with pytest.raises(InputError, match="Permission denied"):
         write_text(tmp_path / "data.csv", "")
+
+
+def test_what_is_read_is_noted_where_somebody_wants_to_know_it(tmp_path: Path) -> None:
+    one, other = tmp_path / "one.txt", tmp_path / "other.txt"
+    one.write_text("first")
+    other.write_text("other")
+    with noted_reads() as noted:
+        read_text(one)
+        one.write_text("second")
+        read_bytes(one)
+        with pytest.raises(InputError):
+            read_text(tmp_path / "missing.txt")
+    read_text(other)
+    assert noted == {one: [sha256(b"first").hexdigest(), sha256(b"second").hexdigest()]}

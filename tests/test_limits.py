@@ -417,3 +417,25 @@ def test_a_large_campaign_is_calibrated_to_the_end_or_refused_first(
     for name in result.fit.free.names:
         assert result.fit.robot.values[name] == pytest.approx(whole.fit.robot.values[name], abs=1e-9)
     np.testing.assert_allclose(result.fit.covariance, whole.fit.covariance, atol=1e-6 * whole.fit.covariance.max())
+
+
+@pytest.mark.parametrize("how", [{"monte_carlo": 100}, {"base_changes": ["31"]}])
+def test_what_needs_all_derivatives_at_once_is_refused_before_anything_is_fitted(
+    how: dict[str, object], allowing: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, data = campaign("irb120", 60, 0.05e-3, 3)
+    for module in ("jobs.calibrate", "identification.base_changes"):
+        monkeypatch.setattr(f"truearm.{module}.identify", lambda *_, **__: pytest.fail("something was fitted"))
+    allowing("derivatives=12000")
+    told = refused(lambda: truearm.calibrate("irb120", data, train="all", **how))  # type: ignore[arg-type]
+    assert "there are too many readings for so many parameters" in told
+    assert "allowed: 12000 derivatives" in told
+
+
+def test_a_model_is_chosen_by_a_part_of_large_data_and_that_is_said(allowing: Callable[[str], None]) -> None:
+    _, data = campaign("irb120", 60, 0.05e-3, 3)
+    allowing("derivatives=200000")
+    result = truearm.calibrate("irb120", data, train="all", model="auto")
+    (notice,) = (one for one in result.warnings if one.code == "chosen-in-part")
+    assert notice.level == "note"
+    assert "of 60 training configurations, evenly spaced, and fitted to all of them" in notice.message

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
@@ -28,6 +32,21 @@ _NO_FILES: Final = (
     (stat.S_ISBLK, "a device"),
     (stat.S_ISSOCK, "a socket"),
 )
+
+
+#: Hashes of what has been read, where somebody wants to know them.
+_NOTED: Final[ContextVar[dict[Path, list[str]] | None]] = ContextVar("noted", default=None)
+
+
+@contextmanager
+def noted_reads() -> Iterator[dict[Path, list[str]]]:
+    """Note what is read: the SHA-256 of every content, in the order of reading, by the absolute path of its file."""
+    noted: dict[Path, list[str]] = {}
+    token = _NOTED.set(noted)
+    try:
+        yield noted
+    finally:
+        _NOTED.reset(token)
 
 
 def read_bytes(path: Path, most: str = "file_size") -> bytes:
@@ -57,6 +76,9 @@ def read_bytes(path: Path, most: str = "file_size") -> bytes:
             if len(content) > state.st_size:  # it grows, or its size is not known beforehand, as that of some of /proc
                 content += stream.read(limit(most) + 1)
         refuse_beyond(most, len(content), where=str(path))
+        noted = _NOTED.get()
+        if noted is not None:
+            noted.setdefault(path.absolute(), []).append(hashlib.sha256(content).hexdigest())
         return content
     except FileNotFoundError as error:
         raise _missing(path) from error

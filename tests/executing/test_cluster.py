@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import socket
+import struct
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import truearm
 from truearm.errors import InputError
 from truearm.executing import cluster
 from truearm.executing.cluster import Cluster, checked_address
+from truearm.executing.parts import done_parts
+from truearm.executing.workers import with_workers
 
 SERIES = """\
 truearm: truearm-fleet/1
@@ -83,6 +89,81 @@ def test_something_else_that_listens_is_no_scheduler(monkeypatch: pytest.MonkeyP
         Cluster(f"127.0.0.1:{silent.getsockname()[1]}", insecure=False)
 
 
+def greeted(*, frames: list[bytes]) -> bytes:
+    """Return a message as Dask sends it: its length, the number of frames, their lengths, frames."""
+    lengths = [len(frames), *map(len, frames)]
+    body = struct.pack(f"<{len(lengths)}Q", *lengths) + b"".join(frames)
+    return struct.pack("<Q", len(body)) + body
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        struct.pack("<Q", 60),
+        struct.pack("<Q", 60) + b"and then nothing",
+        b"SSH-2.0-OpenSSH_9.2p1 Debian\r\n",
+        b"HTTP/1.0 400 Bad Request\r\n\r\n",
+        b"\x15\x03\x03\x00\x02\x02\x46",
+        bytes(200),
+        struct.pack("<Q", 20) + bytes(range(100, 120)),
+        struct.pack("<3Q", 16, 10**6, 5) + bytes(50),
+        greeted(frames=[b"", b"no dictionary"]),
+        np.random.default_rng(3).bytes(300),
+    ],
+    ids=[
+        *(
+            "a length",
+            "half a message",
+            "SSH",
+            "HTTP",
+            "TLS",
+            "zeros",
+            "noise of a length",
+            "many frames",
+            "no greeting",
+        ),
+        "noise",
+    ],
+)
+def test_odd_greetings_are_refused_in_seconds_and_in_one_line(
+    words: bytes, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_GREETING", 0.3)
+    monkeypatch.setattr(cluster, "PATIENCE", 0.4)
+    monkeypatch.setattr(cluster, "_MARGIN", 0.1)
+    with socket.create_server(("127.0.0.1", 0)) as odd:
+        address = f"127.0.0.1:{odd.getsockname()[1]}"
+        kept = []
+
+        def speak() -> None:
+            with contextlib.suppress(OSError):
+                while True:
+                    kept.append(odd.accept()[0])
+                    kept[-1].sendall(words)
+
+        threading.Thread(target=speak, daemon=True).start()
+        with pytest.raises(InputError, match="no Dask scheduler answers there") as caught:
+            Cluster(address, insecure=False)
+    for one in kept:
+        one.close()
+    assert caught.value.came == f"tcp://{address}"
+    assert capfd.readouterr().err == ""
+
+
+def test_a_scheduler_with_another_dask_is_refused_with_the_cure(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+
+    def refuse(*_: object, **__: object) -> None:
+        raise ImportError("versions differ")
+
+    monkeypatch.setattr(Cluster, "_greeted", lambda *_: None)
+    monkeypatch.setattr(distributed.Client, "__init__", refuse)
+    with pytest.raises(InputError, match="another version of Dask") as caught:
+        Cluster("127.0.0.1:1", insecure=False)
+    assert "same versions of dask" in str(caught.value.cure)
+
+
 def test_tls_without_certificates_is_refused() -> None:
     pytest.importorskip("distributed")
     with socket.create_server(("127.0.0.1", 0)) as silent, pytest.raises(InputError, match="no certificates") as caught:
@@ -111,7 +192,7 @@ def started(*words: str, folder: Path) -> subprocess.Popen[bytes]:
 
 
 @pytest.fixture(scope="module")
-def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """A scheduler with one worker, each a process of its own."""
     pytest.importorskip("distributed")
     folder, port = tmp_path_factory.mktemp("cluster"), free_port()
@@ -133,7 +214,7 @@ def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
             *(address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder)),
             folder=folder,
         )
-        yield address
+        yield address, lead
     finally:
         for process in (worker, lead):
             if process is not None:
@@ -141,10 +222,13 @@ def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
                 process.wait()
 
 
-def test_a_cluster_finds_what_this_process_finds(
-    scheduler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def scheduler(running: tuple[str, subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.setattr(cluster, "PATIENCE", 30.0)
+    return running[0]
+
+
+def test_a_cluster_finds_what_this_process_finds(scheduler: str, tmp_path: Path) -> None:
     file = series(tmp_path)
     here = truearm.fleet(file, out=tmp_path / "here", workers=1)
     there = truearm.fleet(file, out=tmp_path / "there", scheduler=scheduler)
@@ -156,10 +240,51 @@ def test_a_cluster_finds_what_this_process_finds(
 
 
 def test_workers_with_another_version_are_refused_by_name(scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "PATIENCE", 30.0)
     monkeypatch.setattr(cluster, "__version__", "99.0")
     with pytest.raises(InputError, match="1 worker of the scheduler has another version of truearm") as caught:
         Cluster(scheduler, insecure=False)
     assert truearm.__version__ in str(caught.value)
     assert "tcp://127.0.0.1:" in str(caught.value)
     assert caught.value.allowed == "99.0"
+
+
+def test_workers_that_do_not_answer_are_refused(scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_ANSWER", 0.2)
+    monkeypatch.setattr(distributed.Client, "run", lambda *_, **__: time.sleep(1.0))
+    with pytest.raises(InputError, match="workers of the scheduler do not answer") as caught:
+        Cluster(scheduler, insecure=False)
+    assert "start them again" in str(caught.value.cure)
+
+
+def test_a_scheduler_that_does_not_answer_any_more_is_told(scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    workers = Cluster(scheduler, insecure=False)
+    monkeypatch.setattr(cluster, "_ANSWER", 0.2)
+    monkeypatch.setattr(cluster, "_LOOK", 0.0)
+    monkeypatch.setattr(workers._client, "scheduler_info", lambda **_: time.sleep(1.0))
+    with pytest.raises(InputError, match="the scheduler does not answer any more") as caught:
+        workers.news()
+    workers.close(finish=False)
+    assert "not computed twice" in str(caught.value.cure)
+
+
+def test_a_scheduler_that_is_killed_is_told_once_and_without_tracebacks(
+    scheduler: str,
+    running: tuple[str, subprocess.Popen[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """The last test: its scheduler is the others'."""
+
+    def work() -> None:
+        with with_workers(Cluster(scheduler, insecure=False)) as workers:
+            monkeypatch.setattr(cluster, "PATIENCE", 1.0)
+            for done in done_parts(abs, range(10**6), workers):
+                assert done.result == done.part
+                running[1].terminate()
+
+    with pytest.raises(InputError, match="the scheduler is gone") as caught:
+        work()
+    assert caught.value.came == scheduler
+    assert "not computed twice" in str(caught.value.cure)
+    assert capfd.readouterr().err == ""

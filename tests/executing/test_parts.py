@@ -13,7 +13,7 @@ from tests.executing.dying import deadly_once, divided, doubled, thread_setting
 
 from truearm.errors import InputError
 from truearm.executing.parts import done_parts
-from truearm.executing.workers import Given, Processes, ThisProcess, processes, with_workers
+from truearm.executing.workers import Given, Processes, processes, with_workers
 
 
 class Breaking(Executor):
@@ -34,19 +34,16 @@ class Breaking(Executor):
         return future
 
 
-class Renewing(ThisProcess):
+class Renewing(Given):
     """Workers of which some parts are deadly."""
 
-    in_flight = 4  # type: ignore[misc]
-
     def __init__(self, deadly: Callable[[Any], bool]) -> None:
+        super().__init__(Breaking(deadly), in_flight=4)
         self.deadly, self.renewed = deadly, 0
-        self.executor = Breaking(deadly)
 
-    def renew(self) -> bool:
+    def renew(self) -> None:
         self.renewed += 1
-        self.executor = Breaking(self.deadly)
-        return True
+        self._executor = Breaking(self.deadly)
 
 
 def collected(workers: Any, numbers: range, told: list[str]) -> dict[int, int | None]:
@@ -91,8 +88,59 @@ def test_workers_that_die_of_everything_are_given_up() -> None:
 
 
 def test_an_executor_of_somebody_else_is_not_replaced() -> None:
-    with pytest.raises(InputError, match="the workers are gone"):
+    with pytest.raises(InputError, match="the workers of the executor are gone") as caught:
         collected(Given(Breaking(lambda number: number == 1)), range(5), [])
+    assert caught.value.parameter == "executor"
+    assert "Make a new one" in str(caught.value.cure)
+
+
+class Odd(Executor):
+    """Raises an error, or returns something, in the place of a future."""
+
+    def __init__(self, found: object) -> None:
+        self.found = found
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
+        if isinstance(self.found, Exception):
+            raise self.found
+        return self.found
+
+
+def failed(error: Exception) -> Future[Any]:
+    future: Future[Any] = Future()
+    future.set_exception(error)
+    return future
+
+
+def shut_down() -> Executor:
+    pool = ThreadPoolExecutor(1)
+    pool.shutdown()
+    return pool
+
+
+@pytest.mark.parametrize(
+    ("executor", "words", "came"),
+    [
+        (shut_down(), "the executor takes no work", "RuntimeError: cannot schedule new futures after shutdown"),
+        (Executor(), "the executor takes no work", "NotImplementedError"),
+        (ThreadPoolExecutor.__new__(ThreadPoolExecutor), "the executor takes no work", "AttributeError: "),
+        (Odd(MemoryError()), "the executor takes no work", "MemoryError"),
+        (Odd(42), "does not return futures as concurrent.futures has them", "int"),
+        (Odd(failed(MemoryError())), "the executor has not done a part of the work", "MemoryError"),
+        (Odd(failed(TypeError("cannot pickle 'x'"))), "the executor has not done a part", "TypeError: cannot pickle"),
+    ],
+    ids=["shut down", "no executor at all", "not begun", "no memory", "no future", "no memory there", "not pickled"],
+)
+def test_executors_that_do_nothing_are_refused_by_what_they_raise(executor: Executor, words: str, came: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        collected(Given(executor), range(5), [])
+    assert caught.value.parameter == "executor"
+    assert str(caught.value.came).startswith(came)
+
+
+def test_a_refusal_of_the_work_is_no_fault_of_the_executor() -> None:
+    with pytest.raises(InputError, match="there is no such file"):
+        collected(Given(Odd(failed(InputError("there is no such file")))), range(5), [])
 
 
 def test_an_error_of_the_work_comes_out() -> None:

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from truearm.fleets.analysis.kind import Gathered, Kind
-from truearm.fleets.rows import FoundParameter, Row
+from truearm.fleets.rows import FoundParameter, FoundParameters, Row
 from truearm.identification.solving.models import named_model
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
@@ -107,10 +107,12 @@ def rows(
             status="calibrated",
             of=of,
             date=date,
-            parameters={
-                p.name: FoundParameter(p.unit, p.nominal + p.prior * x, p.prior * d, p.nominal, p.prior)
-                for p, x, d in zip(own, one, deviation.tolist(), strict=True)
-            },
+            parameters=FoundParameters.of(
+                {
+                    p.name: FoundParameter(p.unit, p.nominal + p.prior * x, p.prior * d, p.nominal, p.prior)
+                    for p, x, d in zip(own, one, deviation.tolist(), strict=True)
+                }
+            ),
             fit_status="converged",
             robot="irb120",
             covariance=lower,

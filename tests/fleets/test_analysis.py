@@ -9,7 +9,7 @@ import pytest
 from tests.fleets.simulated_series import campaign, rows
 
 from truearm.fleets.analysis.analysis import analysed
-from truearm.fleets.rows import Accuracy, Row
+from truearm.fleets.rows import Accuracy, FoundParameters, Row
 from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary
 
 COUNT = len(campaign().own)
@@ -36,7 +36,9 @@ def test_robots_are_looked_at_in_the_order_of_their_reasons() -> None:
     zero = fleet[11].parameters["theta_offset_3"]
     fleet[11] = replace(
         fleet[11],
-        parameters={**fleet[11].parameters, "theta_offset_3": replace(zero, value=zero.value + np.radians(2.0))},
+        parameters=FoundParameters.of(
+            {**fleet[11].parameters, "theta_offset_3": replace(zero, value=zero.value + np.radians(2.0))}
+        ),
     )
     found = analysed(fleet)
     why = {look.robot: [reason.why for reason in look.reasons] for look in found.looks}
@@ -140,3 +142,37 @@ def test_a_series_beside_nominal_is_told() -> None:
     truth[:, campaign().names.index("d_4")] += 2.0
     (line,) = [each for each in analysis_lines(analysed(rows(truth, rng))) if "beside nominal" in each]
     assert line.startswith("  The whole series lies beside nominal: d_4 +")
+
+
+def test_results_that_end_with_an_error_are_in_no_figure() -> None:
+    fleet = series(12)
+    whole = analysed([row for number, row in enumerate(fleet) if number != 4])
+    wrong = {name: replace(one, value=one.value + 50.0 * one.prior) for name, one in fleet[4].parameters.items()}
+    fleet[4] = replace(
+        fleet[4],
+        errors=("wrong-units",),
+        parameters=FoundParameters.of(wrong),
+        held_out=Accuracy(1.0, 1.0, 2.0, 20),
+        nominal=Accuracy(2.0, 2.0, 3.0, 20),
+    )
+    found = analysed(fleet)
+    assert (found.left_out, found.measurements, whole.left_out) == (("robot-5",), 12, ())
+    for name, errors in whole.errors.items():
+        assert found.errors[name].mean.tolist() == errors.mean.tolist()
+    assert found.kinds[0].spreads == whole.kinds[0].spreads
+    assert found.kinds[0].differences == whole.kinds[0].differences
+    assert [(look.robot, [reason.why for reason in look.reasons]) for look in found.looks[:1]] == [
+        ("robot-5", ["error"])
+    ]
+    assert "Left out of all figures, because their results end with an error: 1 robot (robot-5)." in analysis_lines(
+        found
+    )
+    assert analysis_summary(found)["left_out"] == ["robot-5"]
+
+
+def test_of_a_machine_the_last_campaign_without_an_error_counts() -> None:
+    first, second = series(2)
+    first = replace(first, of="m", date="2026-01-01")
+    second = replace(second, of="m", date="2026-07-01", errors=("wrong-units",))
+    assert first.held_out is not None
+    assert analysed([first, second]).errors["held_out"].mean.tolist() == [first.held_out.mean]

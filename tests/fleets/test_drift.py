@@ -12,7 +12,7 @@ from tests.fleets.simulated_series import Calibrations, calibrations, campaign, 
 from truearm.fleets.analysis.analysis import analysed
 from truearm.fleets.analysis.differing import differences
 from truearm.fleets.analysis.drift import MONTH, Drifts, drifts
-from truearm.fleets.rows import Row
+from truearm.fleets.rows import FoundParameters, Row
 from truearm.modeling.chain import Array
 from truearm.results.fleet_words import analysis_notices
 
@@ -95,17 +95,26 @@ def test_a_drift_is_found_with_its_rate_and_where_it_is() -> None:
     assert np.degrees(one.changes[-1]) == pytest.approx(0.02 * 334 / MONTH, abs=0.005)
 
 
-def test_intervals_of_rates_cover_the_truth() -> None:
+def test_intervals_of_rates_cover_the_truth_all_together() -> None:
     rng = np.random.default_rng(4)
     rate = 0.03 * rng.standard_normal(COUNT)
-    covered = []
+    off, together = [], []
     for _ in range(20):
         found = campaigns(rng.standard_normal((3, COUNT)), (0, 4, 9), rng, (STRONG, OTHER, OTHER), rate)
-        for one in found.found:
-            if one.alone:
-                number = NAMES.index(one.parameter)
-                covered.append(one.low <= rate[number] * campaign().prior[number] <= one.high)
-    assert 0.92 <= np.mean(covered) <= 0.98
+        alone = [one for one in found.found if one.alone]
+        true = [rate[NAMES.index(one.parameter)] * campaign().prior[NAMES.index(one.parameter)] for one in alone]
+        off += [(one.slope - t) / (one.slope / one.times) for one, t in zip(alone, true, strict=True)]
+        together.append(all(one.low <= t <= one.high for one, t in zip(alone, true, strict=True)))
+    assert 0.92 <= np.mean(np.abs(off) < 1.96) <= 0.98
+    assert sum(together) >= 17  # 19 are promised; chance gives fewer than 17 in 1 of 60 runs
+
+
+def test_an_interval_without_zero_is_a_change_by_more_than_chance() -> None:
+    rng = np.random.default_rng(6)
+    rate = 0.03 * rng.standard_normal(COUNT)
+    found = campaigns(rng.standard_normal((3, COUNT)), (0, 4, 9), rng, (STRONG, OTHER, OTHER), rate).found
+    assert {one.significant for one in found} == {True, False}
+    assert all(one.significant == (one.low > 0.0 or one.high < 0.0) for one in found)
 
 
 def test_a_jump_is_a_change_but_not_steady() -> None:
@@ -181,6 +190,7 @@ def test_a_parameter_that_few_robots_identified_is_not_compared_with_the_others(
     told = rows(rng.standard_normal((20, COUNT)), rng)
     for number in range(4, 20):
         kept = {name: one for name, one in told[number].parameters.items() if name != "a_3"}
-        told[number] = replace(told[number], parameters=kept, covariance=())
-    told[0] = replace(told[0], parameters={**told[0].parameters, "a_3": replace(told[0].parameters["a_3"], value=9.0)})
+        told[number] = replace(told[number], parameters=FoundParameters.of(kept), covariance=())
+    wrong = {**told[0].parameters, "a_3": replace(told[0].parameters["a_3"], value=9.0)}
+    told[0] = replace(told[0], parameters=FoundParameters.of(wrong))
     assert not [one for one in differences(kind_of(told)) if one.parameter == "a_3"]

@@ -20,7 +20,7 @@ HEADER = "name,robot,data,of,date,model,train,effects\n"
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     for name in ("a.csv", "b.csv", "arm.yaml", "bounds.yaml"):
-        (tmp_path / name).write_text("x\n", "utf-8")
+        (tmp_path / name).write_text(f"{name}\n", "utf-8")
     return tmp_path
 
 
@@ -83,6 +83,11 @@ REFUSED = {
         "line 2, column bounds",
         "no such file",
     ),
+    "readings of two campaigns": (
+        HEADER + "one,ur5,a.csv,4711,2026-01-01,,,\ntwo,ur5,a.csv,4711,2026-07-01,,,\n",
+        "line 3, column data",
+        "the same readings stand for two campaigns of one machine",
+    ),
     "a header alone": (HEADER, "robots.csv", "no rows"),
 }
 
@@ -127,3 +132,48 @@ def test_a_missing_table_and_no_robots_are_refused(folder: Path) -> None:
         robots_of("fleet.csv", {}, folder / "fleet.yaml")
     with pytest.raises(InputError, match="there are no robots"):
         robots_of([], {}, folder / "fleet.yaml")
+
+
+def test_a_copy_of_readings_is_no_second_campaign_and_another_machine_may_have_them(folder: Path) -> None:
+    (folder / "copy.csv").write_bytes((folder / "a.csv").read_bytes())
+    rows = "one,ur5,a.csv,4711,2026-01-01,,,\ntwo,ur5,copy.csv,{of},2026-07-01,,,\n"
+    with pytest.raises(InputError, match=r"line 3, column data: the same readings"):
+        read_manifest(table(folder, HEADER + rows.format(of="4711")))
+    assert len(read_manifest(table(folder, HEADER + rows.format(of="4712"))).robots) == 2
+
+
+@pytest.mark.parametrize("written", ["0123", "1_000", "0x7b", "+12"])
+@pytest.mark.parametrize("entry", ["of", "name"])
+def test_numbers_that_yaml_would_write_otherwise_belong_in_quotes(folder: Path, entry: str, written: str) -> None:
+    robot = {"name": "one", "robot": "ur5", "data": "a.csv", entry: written}
+    said = ", ".join(f"{name}: {text}" for name, text in robot.items())
+    (folder / "fleet.yaml").write_text(f"truearm: truearm-fleet/1\nrobots:\n  - {{{said}}}\n", "utf-8")
+    with pytest.raises(InputError, match=rf"robots\[1\].{entry}: without quotes this is a number") as refusal:
+        read_manifest(folder / "fleet.yaml")
+    assert refusal.value.came == written
+
+
+def test_numbers_in_quotes_and_plain_ones_stay_as_they_are_written(folder: Path) -> None:
+    (folder / "fleet.yaml").write_text(
+        "truearm: truearm-fleet/1\nrobots:\n"
+        "  - {name: 7, robot: ur5, data: a.csv, of: '0123'}\n  - {name: '08', robot: ur5, data: b.csv, of: 123}\n",
+        "utf-8",
+    )
+    assert [(one.name, one.of) for one in read_manifest(folder / "fleet.yaml").robots] == [("7", "0123"), ("08", "123")]
+
+
+def test_a_robot_is_computed_anew_where_its_own_entry_or_file_changes(folder: Path) -> None:
+    rows = ROW + "two,arm.yaml,b.csv,,,,,\n"
+
+    def keys(text: str) -> list[str]:
+        (folder / "robots.csv").write_text(HEADER + text, "utf-8")
+        path = folder / "fleet.yaml"
+        path.write_text("truearm: truearm-fleet/1\nrobots: robots.csv\nchunk: 1\n", "utf-8")
+        asked = read_manifest(path)
+        return [asked.key(part) for part in range(asked.parts)]
+
+    first, mended = keys(rows), keys(rows.replace("b.csv,,,,", "b.csv,,,,9"))
+    assert [a == b for a, b in zip(first, mended, strict=True)] == [True, False]
+    (folder / "arm.yaml").write_text("another arm\n", "utf-8")
+    assert [a == b for a, b in zip(first, keys(rows), strict=True)] == [True, False]
+    assert keys(rows + "three,ur5,bounds.yaml,,,,,\n")[:2] == keys(rows)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import json
+import re
+import shutil
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
@@ -17,10 +19,11 @@ import truearm
 from truearm import writing
 from truearm.errors import InputError
 from truearm.fleets import recorded
-from truearm.fleets.experiment import Series, experiment
-from truearm.fleets.manifest import ExperimentEntry, read_manifest
+from truearm.fleets.experiment import experiment
+from truearm.fleets.manifest import read_manifest
 from truearm.fleets.recorded import Recorded
 from truearm.fleets.rows import Row
+from truearm.fleets.series import Experiment, ExperimentEntry, Series
 from truearm.identification.judging.monte_carlo import calibrated
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import named_model
@@ -40,6 +43,14 @@ def manifest(folder: Path, chunk: int = 2, name: str = "fleet.yaml", **entries: 
 
 def without_seconds(rows: list[Row]) -> list[dict[str, Any]]:
     return [{name: value for name, value in row.content().items() if name != "seconds"} for row in rows]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a fleet that is done."""
+    folder = tmp_path_factory.mktemp("finished")
+    truearm.fleet(manifest(folder), out=folder / "out", workers=1)
+    return folder / "out"
 
 
 def test_each_robot_is_what_one_calibration_of_it_finds() -> None:
@@ -177,17 +188,85 @@ def test_folders_of_others_are_refused(tmp_path: Path) -> None:
     assert "whose it is" in str(refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1)))
 
 
-@pytest.mark.parametrize("damage", ["{}\n", "no JSON\n", "", None])
-def test_a_damaged_part_is_named(tmp_path: Path, damage: str | None) -> None:
+DAMAGES: dict[str, Callable[[str], str]] = {
+    "another file": lambda _: "{}\n",
+    "no JSON": lambda _: "no JSON\n",
+    "a robot less": lambda text: "".join(text.splitlines(keepends=True)[:-2]),
+    "no hash": lambda text: "".join(text.splitlines(keepends=True)[:-1]),
+    "another figure": lambda text: re.sub(r'"mean_mm":[0-9.]+', '"mean_mm":0.001', text, count=1),
+    "a figure that is none": lambda text: re.sub(r'"mean_mm":[0-9.]+', '"mean_mm":NaN', text, count=1),
+    "a huge figure": lambda text: re.sub(r'"mean_mm":[0-9.]+', '"mean_mm":1e308', text, count=1),
+    "a list for a figure": lambda text: re.sub(r'"mean_mm":[0-9.]+', '"mean_mm":[]', text, count=1),
+    "an unknown unit": lambda text: text.replace('"rad"', '"ft"', 1),
+    "a list for a robot": lambda text: "[]\n".join(text.splitlines(keepends=True)[:1]) + "[]\n",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_part_that_is_not_as_it_was_written_is_named(
+    tmp_path: Path, damage: str, finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file, out = manifest(tmp_path), tmp_path / "out"
-    truearm.fleet(file, out=out, workers=1)
+    shutil.copytree(finished, out)
     part = out / "parts" / "0000" / "0000002.jsonl"
-    lines = part.read_text().splitlines(keepends=True)
-    part.write_text("".join(lines[:-1]) if damage is None else damage)
+    part.write_text(DAMAGES[damage](part.read_text()))
+    begun: list[object] = []
+    monkeypatch.setattr("truearm.jobs.fleet._computed", lambda *given: begun.append(given))
     told = refused(lambda: truearm.fleet(file, out=out, workers=1))
-    assert told.where == str(part)
-    part.unlink()
+    assert (told.where, told.parameter, begun) == (str(part), "out", [])
+
+
+def test_a_part_that_was_removed_is_computed_again(tmp_path: Path, finished: Path) -> None:
+    file, out = manifest(tmp_path), tmp_path / "out"
+    shutil.copytree(finished, out)
+    (out / "parts" / "0000" / "0000002.jsonl").unlink()
     assert truearm.fleet(file, out=out, workers=1).run.before == 2
+
+
+def test_a_part_of_another_fleet_is_named(tmp_path: Path, finished: Path) -> None:
+    other = tmp_path / "other"
+    truearm.fleet(manifest(tmp_path, name="other.yaml", seed=7), out=other, workers=1)
+    file, out = manifest(tmp_path), tmp_path / "out"
+    shutil.copytree(finished, out)
+    name = Path("parts") / "0000" / "0000002.jsonl"
+    shutil.copy(other / name, out / name)
+    assert refused(lambda: truearm.fleet(file, out=out, workers=1)).where == str(out / name)
+
+
+def test_a_link_for_the_parts_is_refused(tmp_path: Path) -> None:
+    file, out = manifest(tmp_path), tmp_path / "out"
+    (tmp_path / "elsewhere").mkdir()
+    out.mkdir()
+    (out / "parts").symlink_to(tmp_path / "elsewhere")
+    assert "this is a link" in str(refused(lambda: truearm.fleet(file, out=out, workers=1)))
+
+
+def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = tmp_path / "plan.csv"
+    truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, out=plan)
+
+    def late(asked: ExperimentEntry) -> Experiment:
+        plan.write_text(plan.read_text() + "\n")
+        return experiment(asked)
+
+    monkeypatch.setattr("truearm.jobs.fleet.experiment", late)
+    file = manifest(tmp_path, configurations="plan.csv")
+    told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
+    assert ("changed while it was read" in str(told), told.where) == (True, "plan.csv")
+
+
+def test_a_fleet_without_any_result_ends_with_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from truearm.fleets import series as module
+
+    def unsettled(*given: Any) -> Any:
+        found, deviation, settled = calibrated(*given)
+        return found, deviation, np.zeros_like(settled)
+
+    monkeypatch.setattr(module, "calibrated", unsettled)
+    found = truearm.fleet(manifest(tmp_path), out=tmp_path / "out", workers=1)
+    assert ("no-result", "error") in [(notice.code, notice.level) for notice in found.warnings]
 
 
 def test_two_runs_at_once_in_one_folder_are_refused(tmp_path: Path) -> None:
@@ -209,7 +288,7 @@ def test_robots_of_lost_parts_are_named_and_an_error(tmp_path: Path) -> None:
 
 
 def test_a_calibration_that_does_not_settle_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from truearm.fleets import experiment as module
+    from truearm.fleets import series as module
 
     def unsettled(*given: Any) -> Any:
         found, deviation, settled = calibrated(*given)

@@ -61,7 +61,7 @@ ROBOTS = """\
 name,robot,data,of,date,train,effects,gravity,payload
 one,irb120,data.csv,4711,2026-01-05,40,,"0,0,-9.81",
 # again
-two,kr5,data.csv,4711,2026-07-05,all,backlash;clearance,,"2.7kg,50mm,25mm,100mm"
+two,kr5,data.csv,4712,2026-07-05,all,backlash;clearance,,"2.7kg,50mm,25mm,100mm"
 """
 EXPERIMENT = """\
 truearm: truearm-fleet/1

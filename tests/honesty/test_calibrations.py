@@ -17,6 +17,8 @@ from tests.honesty.telling import Told, told, written
 from tests.simulated import campaign, more_of
 
 import truearm
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import named_model
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -140,10 +142,10 @@ def test_intervals_hold_where_targets_share_the_error_of_the_joints(repeatabilit
     off, found = [], []
     for seed in range(3):
         twin, data = of_many_targets(seed, repeatability)
-        calibration = truearm.calibrate("irb120", data, train="all")
-        found += np.degrees(calibration.fit.joint_error).tolist()
-        for name in calibration.fit.free.names:
-            p = calibration.robot.parameters[name]
+        fit = identify(load_robot("irb120"), data, named_model("geometric"))
+        found += np.degrees(fit.joint_error).tolist()
+        for name in fit.free.names:
+            p = fit.robot.parameters[name]
             if p.group in ("geometry", "joint zero") and p.deviation and (p.informed or 0.0) >= 0.5:
                 off.append(abs(p.value - twin.robot.values[name]) / p.deviation)
     assert len(off) > 40

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from truearm.identification.choosing.folds import FOLDS, folds_of, layout_of
+from truearm.identification.choosing.folds import FOLDS, draws_of, folds_of, layout_of
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -67,3 +67,15 @@ def test_folds_follow_from_the_seed() -> None:
     data = dataset(path(120))
     assert np.array_equal(folds_of(data, 4).of, folds_of(data, 4).of)
     assert not np.array_equal(folds_of(data, 4).of, folds_of(data, 5).of)
+
+
+def test_few_configurations_are_held_out_several_times() -> None:
+    rng = np.random.default_rng(3)
+    counts = {}
+    for count in (20, 40, 100):
+        data = dataset(rng.uniform(-1.0, 1.0, (count, 6)))
+        draws = draws_of(data, 7)
+        counts[count] = len(draws)
+        assert np.array_equal(draws[0].of, folds_of(data, 7).of)
+        assert len({tuple(folds.of.tolist()) for folds in draws}) == len(draws)
+    assert counts == {20: 4, 40: 3, 100: 1}

@@ -206,7 +206,7 @@ def test_outside_the_measured_range_the_curve_is_uncertain() -> None:
     fit = identify(load_robot("irb120"), data, CURVED)
     told = {notice.code: notice.message for notice in check_curves(fit, data)}
     assert "axis_1 from -57 to 58 deg" in told["curve-range"]
-    assert "is rough: on twins it held 8 times of 31" in told["curve-expected"]
+    assert "contains what that may be off by" in told["curve-range"]
     names = [name for name in curve_names(1) if name in fit.free.names]
     places = [fit.free.names.index(name) for name in names]
     angle = np.radians([-30.0, 0.0, 30.0, 120.0, 150.0, 180.0])
@@ -224,6 +224,33 @@ def test_outside_the_measured_range_the_curve_is_uncertain() -> None:
     off = np.abs(wide.position[mine] - kinematics.position.T[wide.configuration[mine]])
     # Not all of it: through a third of a turn a line may be taken for its neighbour, which goes another way outside.
     assert ((off < 1.96 * np.hypot(spread, NOISE)[wide.configuration[mine]]).mean()) > 0.7
+
+
+def test_the_expected_error_holds_where_a_joint_was_measured_through_a_sixth_of_its_turn() -> None:
+    robot, rng = load_robot("ur5"), np.random.default_rng((1, 7))
+    twin = truth_twin(robot, "gear-errors", np.random.default_rng(1001))
+    joints = rng.uniform(-math.pi, math.pi, (150, 6))
+    joints[:, 1] /= 6.0
+    fit = identify(robot, measure(twin, joints, 3e-5, rng), CURVED)
+    stated = expected_error(fit).overall
+    true = mean_error(fit.robot, measure(twin, rng.uniform(-math.pi, math.pi, (300, 6)), 2e-9, rng))
+    assert stated.interval_90[0] < true < stated.interval_90[1]  # it was said to be at most a third of the truth
+    assert stated.interval_90[1] < 4.0 * true
+    zero = [name for name in fit.unfitted if name.endswith("_2")]
+    assert zero
+    assert all(fit.robot.values[name] == 0.0 for name in zero)
+
+
+def test_the_same_data_are_not_counted_twice(fitted: tuple[Twin, Dataset, Fit]) -> None:
+    _, data, once = fitted
+    twice = identify(once.robot, data, CURVED)
+    assert twice.free.names == once.free.names
+    assert_allclose(np.diag(twice.covariance), np.diag(once.covariance), rtol=0.1)
+    curves = [name for name in once.free.names if name.startswith("curve_")]
+    before, after = (np.array([fit.robot.values[name] for name in curves]) for fit in (once, twice))
+    assert_allclose(after, before, atol=2e-7)
+    kept = identify(once.robot, data, GEOMETRIC)  # without the effect the curves stay
+    assert [kept.robot.values[name] for name in curves] == before.tolist()
 
 
 def test_without_errors_of_gears_there_are_no_curves() -> None:
@@ -248,6 +275,7 @@ def test_a_joint_that_hardly_turned_has_no_curve() -> None:
     fit = identify(load_robot("irb120"), data, CURVED)
     message = next(notice.message for notice in check_curves(fit, data) if notice.code == "curve-left-out")
     assert "axis_4 (1 deg) turned" in message
+    assert {"curve_sin1_4", "curve_cos1_4"} <= set(fit.unfitted)  # the others have some
 
 
 def test_under_another_payload_curves_do_no_harm() -> None:

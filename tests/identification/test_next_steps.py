@@ -12,7 +12,7 @@ from tests.simulated import campaign
 
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
-from truearm.identification.judging.next_steps import steps_after_check
+from truearm.identification.judging.next_steps import _end, steps_after_check
 from truearm.identification.judging.off_configurations import off_configurations
 from truearm.identification.judging.unmodelled import explanation
 from truearm.identification.solving.bounds import Bounds
@@ -281,3 +281,12 @@ def test_what_is_left_out_is_left_out_of_everything() -> None:
     assert found is not None
     assert found.cause == "compliance"
     assert left.without(()) is left
+
+
+def test_a_choice_that_tried_everything_does_not_say_that_nobody_can_tell() -> None:
+    data = elastic(poses=14)
+    fit = identify(load_robot("irb120").with_payload(LOAD), data, named_model("elastic"))
+    few = _end(LeftOver.of(fit, data)).message
+    assert "too few readings to tell" in few
+    tried = replace(fit, model=replace(fit.model, name="auto", tried=("backlash",)))
+    assert "cross-validation found no other joint effect" in _end(LeftOver.of(tried, data)).message

@@ -12,7 +12,7 @@ import truearm
 from truearm.errors import InputError
 from truearm.fleets.entries import RobotEntry
 from truearm.jobs import fleet_robots
-from truearm.jobs.fleet_robots import calibrated_row
+from truearm.jobs.fleet_robots import calibrated_robot
 from truearm.results.calibration import RESULT_FILES
 
 
@@ -87,7 +87,7 @@ def test_a_robot_whose_result_ends_with_an_error_is_named(measured: Path, tmp_pa
 
 
 def test_a_row_holds_the_arm_alone_with_its_covariance(measured: Path) -> None:
-    row = calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15}))
+    row = calibrated_robot(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15})).row
     assert row.status == "calibrated"
     assert row.robot == "irb120"
     assert not any(name.startswith(("base", "target")) for name in row.parameters)
@@ -99,7 +99,7 @@ def test_a_row_holds_the_arm_alone_with_its_covariance(measured: Path) -> None:
 
 
 def test_values_without_priors_are_not_drawn(measured: Path) -> None:
-    row = calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15, "redundancy": "drop"}))
+    row = calibrated_robot(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15, "redundancy": "drop"})).row
     assert not row.drawn
     assert type(row).read(json.loads(json.dumps(row.content()))) == row
 
@@ -109,7 +109,7 @@ def test_a_robot_of_which_the_calibration_breaks_is_a_row(measured: Path, monkey
         raise ArithmeticError("singular")
 
     monkeypatch.setattr(fleet_robots, "calibrate", breaks)
-    row = calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", of="4711", date="2026-01-01"))
+    row = calibrated_robot(RobotEntry("one", "irb120", measured / "a.csv", of="4711", date="2026-01-01")).row
     assert (row.status, row.of, row.date) == ("failed", "4711", "2026-01-01")
     assert row.message == "the calibration failed (ArithmeticError: singular)"
 
@@ -117,7 +117,7 @@ def test_a_robot_of_which_the_calibration_breaks_is_a_row(measured: Path, monkey
 def test_a_folder_that_cannot_be_written_is_no_fault_of_the_robot(measured: Path, tmp_path: Path) -> None:
     (tmp_path / "robots").write_text("a file where the folder belongs", "utf-8")
     with pytest.raises(InputError, match="a folder is needed"):
-        calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15}), tmp_path)
+        calibrated_robot(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15}), tmp_path)
 
 
 def test_nothing_is_started_where_the_table_is_wrong(measured: Path, tmp_path: Path) -> None:

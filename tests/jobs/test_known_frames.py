@@ -281,6 +281,8 @@ def test_contradicting_holds_are_refused(
 def test_holds_without_numbers_and_numbers_without_holds_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"what is held has no numbers; got 'base, targets'"):
         calibrate("irb120", exact()[1], hold=["base", "targets"])
+    with pytest.raises(InputError, match=r"nothing of this name to hold; got 'curve_sin99_1'; allowed: base, targets"):
+        calibrate("irb120", exact()[1], hold=["curve_sin99_1"])
     with pytest.raises(InputError, match=r"frames are given, and nothing is held at them"):
         calibrate("irb120", exact()[1], frames=frames_of(exact()[0].robot, tmp_path / "f.yaml"))
     with pytest.raises(InputError, match=r"a sequence of names belongs here"):

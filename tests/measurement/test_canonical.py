@@ -406,7 +406,7 @@ def datasets(draw: st.DrawFn) -> Dataset:
     return part(tuple(names[:-1]), beside)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(datasets(), st.sampled_from(["mm", "m", "um", "in"]), st.sampled_from(["deg", "rad"]))
 def test_writing_what_was_read_changes_nothing(drawn: Dataset, length: str, angle: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
@@ -425,7 +425,7 @@ def test_writing_what_was_read_changes_nothing(drawn: Dataset, length: str, angl
         np.testing.assert_allclose(read.quaternion, drawn.quaternion, rtol=1e-14)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.text(max_size=200) | st.text(st.sampled_from('a1.,;"\n\r\t -e'), max_size=60).map(lambda t: f"{HEADER}\n{t}"))
 def test_any_text_is_read_or_refused_and_nothing_else(text: str) -> None:
     with tempfile.TemporaryDirectory() as folder:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import runpy
 from collections.abc import Iterator
 from dataclasses import replace
@@ -262,6 +263,8 @@ NAMED_ELSEWHERE = {
 
 def spelled_lists(source: str, names: frozenset[str]) -> Iterator[int]:
     """Return the lines of lists that spell the name of a joint effect, and of tables that spell several."""
+    if not re.search(rf"""['"]({"|".join(map(re.escape, names))})['"]""", source):
+        return  # a text without such a name need not be parsed
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Dict):
             entries = [*(key for key in node.keys if key is not None), *node.values]

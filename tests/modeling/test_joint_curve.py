@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -133,6 +134,11 @@ def test_a_curve_may_be_written_by_hand(tmp_path: Path) -> None:
         ("0.01 0.02", "0.01 x", ["joint_curves[1].value"]),
         ("0.1 0.1", "0.1 -0.1", ["joint_curves[1].prior", "0 or more"]),
         ("0.1 0.1", "0.1 0.0", ["joint_curves[1].prior"]),
+        ("0.01 0.02", "0.01 -1000", ["joint_curves[1].value", "got '-1000 deg'", "allowed: 30 deg or less"]),
+        ("0.1 0.1", "0.1 31", ["joint_curves[1].prior", "too large for a curve", "got '31 deg'"]),
+        ('"0.1 0.1"', '"0.1 0.1", nominal: "99 0"', ["joint_curves[1].nominal", "got '99 deg'"]),
+        ('"0.1 0.1"', '"0.1 0.1", informed: "0.5 2"', ["joint_curves[1].informed", "got '2'", "allowed: 0 to 1"]),
+        ('"0.1 0.1"', '"0.1 0.1", informed: "-0.5 1"', ["joint_curves[1].informed", "got '-0.5'"]),
     ],
 )
 def test_a_wrong_entry_is_refused(tmp_path: Path, old: str, new: str, told: list[str]) -> None:
@@ -141,6 +147,27 @@ def test_a_wrong_entry_is_refused(tmp_path: Path, old: str, new: str, told: list
         read_robot(tmp_path / "robot.yaml")
     for part in told:
         assert part in str(refusal.value)
+
+
+def test_a_term_that_stands_alone_is_no_larger_and_its_share_is_a_share(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    text = robot_text(load_robot("irb120").with_effects(["joint-curve"]))
+    entry = "{nominal: 0.0, value: 0.1, prior: 0.1, unit: deg, informed: 0.9}"
+    for old, new, told in (
+        ("0.9", "0.9", None),
+        (
+            "value: 0.1",
+            "value: 31.0",
+            "curve_sin1_2.value: the number is too large for a curve of a joint; got '31 deg'",
+        ),
+        ("0.9", "2.0", "curve_sin1_2.informed: the number is too large; got 2.0; allowed: 1 or less"),
+    ):
+        path.write_text(f"{text}\nparameters:\n  curve_sin1_2: {entry.replace(old, new)}\n")
+        if told is None:
+            assert read_robot(path).parameters["curve_sin1_2"].informed == 0.9
+            continue
+        with pytest.raises(InputError, match=re.escape(told)):
+            read_robot(path)
 
 
 def test_a_term_stands_in_one_place(tmp_path: Path) -> None:

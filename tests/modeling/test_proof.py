@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +14,8 @@ from tests.simulated import campaign
 from truearm.errors import InputError
 from truearm.jobs.calibrate import calibrate
 from truearm.modeling.conversion import converted
-from truearm.modeling.formats.robot_file import arm_is_known, is_intact, read_robot, robot_text, sealed
+from truearm.modeling.formats.robot_file import arm_is_known, correlations, is_intact, read_robot, robot_text, sealed
+from truearm.modeling.formats.robot_file.correlations import correlations_text, factor_from
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import Payload
 from truearm.modeling.proof import Proof
@@ -203,3 +206,62 @@ def test_a_damaged_entry_is_refused(
     message = refusal(text.replace(old, new, 1), tmp_path)
     for part in ["calibrated.yaml", *parts]:
         assert part in message
+
+
+# -- correlations of hundreds of parameters -------------------------------------------------------------------
+
+
+def many(count: int) -> tuple[tuple[float, ...], ...]:
+    rng = np.random.default_rng(1)
+    rows = [np.append(rng.normal(0, 0.02, number), rng.uniform(-1, 1)).round(7).tolist() for number in range(count)]
+    return ((1.0,), (-1.0, 0.0), *map(tuple, rows[2:]))
+
+
+@pytest.mark.parametrize("count", [1, 60, 61, 130])
+def test_a_factor_of_any_size_is_read_as_it_was_written(count: int) -> None:
+    written = correlations_text(many(count)[:count])
+    assert isinstance(written, str) == (count > 60)
+    assert factor_from(written, count, "here", "") == many(count)[:count]
+    digits = [" ".join(f"{v:.7g}" for v in row) for row in many(count)[:count]]
+    assert factor_from(digits, count, "here", "") == many(count)[:count]
+    if isinstance(written, str):
+        assert len(written) < 0.5 * sum(map(len, digits))
+
+
+def test_a_factor_that_is_not_rounded_is_written_in_digits() -> None:
+    factor = (*many(70)[:-1], (1.234567e-5,) * 70)
+    assert factor_from(correlations_text(factor), 70, "here", "") == factor
+
+
+def test_a_seal_holds_whichever_way_the_factor_is_written(
+    calibration: Calibration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files of either form are about the same robot, and may be read and written again."""
+    rows = robot_text(calibration.robot)
+    monkeypatch.setattr(correlations, "_READABLE", 5)
+    short = robot_text(calibration.robot)
+    assert "    - '1'" in rows
+    assert "correlations: " in short
+    assert len(short) < len(rows)
+    for text in (rows, short):
+        robot = read(text, tmp_path)
+        assert robot.proof is not None
+        assert calibration.robot.proof is not None
+        assert robot.proof.factor == calibration.robot.proof.factor
+        assert is_intact(robot)
+        assert is_intact(read(robot_text(robot), tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda text: text[:-4], "no text of correlations of so many parameters; got '5907 bytes'; allowed: 5910"),
+        (lambda text: f"{text[:-4]}???!", "got 'other signs than those of base64'"),
+        (lambda text: "/" * 8 + text[8:], "correlations are -1 to 1"),
+    ],
+)
+def test_a_damaged_text_of_correlations_is_refused(change: Callable[[str], str], told: str) -> None:
+    text = correlations_text(many(61))
+    assert isinstance(text, str)
+    with pytest.raises(InputError, match=re.escape(told)):
+        factor_from(change(text), 61, "robot.yaml, proof.correlations", "")

@@ -218,7 +218,7 @@ def test_configurations_chosen_for_a_program_on_ten_robots(monkeypatch: pytest.M
         error = dict.fromkeys(plans, 0.0)
         true = [twin.robot.world_poses(targets, name)[0] for name in ("1", "2", "3")]
         for objective, plan in plans.items():
-            for campaign in range(5):
+            for campaign in range(3):
                 data = measure(twin, plan.joints, 1e-4, np.random.default_rng(100 * campaign + seed))
                 fit = identify(nominal, data, model).robot
                 found = [fit.world_poses(targets, name)[0] for name in data.targets]

@@ -6,19 +6,29 @@ import ipaddress
 import logging
 import pkgutil
 import socket
+import threading
 import time
-from concurrent.futures import Executor
-from typing import Any, Final
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from contextlib import suppress
+from typing import Any, Final, TypeVar
 from urllib.parse import urlsplit
 
 from truearm.errors import InputError, Words
 from truearm.shown import counted, listed
 from truearm.version import __version__
 
+P = TypeVar("P")
+R = TypeVar("R")
+
 #: How long to wait for the scheduler, and for its first worker [s].
 PATIENCE: Final = 4.0
 #: How long to wait for its first words [s].
 _GREETING: Final = 2.0
+#: How much longer than that reaching it may take in all [s].
+_MARGIN: Final = 1.0
+#: How long scheduler and workers may take to answer while they work [s].
+_ANSWER: Final = 60.0
 #: How long there may be no worker before the work is given up [s].
 _ALONE: Final = 60.0
 #: How often to ask the scheduler about its workers [s].
@@ -28,6 +38,8 @@ _LENGTH: Final = 8
 _LONGEST_GREETING: Final = 1_000_000
 #: How schedulers are reached.
 _PROTOCOLS: Final = ("tcp", "tls")
+#: Who prints tracebacks where a connection is lost; Dask gives the second one a level of its own.
+_LOGGERS: Final = ("distributed", "distributed.client", "tornado.application")
 #: What to do where the cluster has gone.
 _RUN_AGAIN: Final = "Run this again when it is there: what is on disk is not computed twice."
 
@@ -53,8 +65,8 @@ class Cluster:
         self._address = checked_address(address, insecure=insecure)
         distributed = _distributed()
         self.lost: tuple[type[BaseException], ...] = (distributed.KilledWorker,)
-        for name in ("client", "core", "comm", "batched"):
-            logging.getLogger(f"distributed.{name}").setLevel(logging.CRITICAL)  # what happens is told, and once
+        for name in _LOGGERS:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what happens is told, and once
         self._client = self._reached(distributed)
         try:
             self._workers = self._waited_for_workers()
@@ -63,23 +75,35 @@ class Cluster:
             self._client.close(timeout=1)
             raise
         self._looked = self._seen = time.monotonic()
-        self.executor: Executor = self._client.get_executor(pure=False)
+        self._executor: Executor = self._client.get_executor(pure=False)
 
     def _reached(self, distributed: Any) -> Any:
-        """Return a client of the scheduler, once it is sure that one listens: Dask waits for others for ever."""
+        """Return a client of the scheduler; Dask alone would wait for ever for what begins to speak and stops."""
         client = distributed.Client.__new__(distributed.Client)
-        try:
+
+        def connect() -> None:
             self._greeted(distributed)
             client.__init__(self._address, timeout=PATIENCE, set_as_default=False)
-        except Exception as error:
+
+        try:
+            _within(PATIENCE + _MARGIN, connect)
+        except Exception as error:  # whatever the words of something else are taken for
             client.status = "closed"  # or it would be waited for when it is forgotten
-            if isinstance(error, InputError) or not isinstance(error, OSError | ValueError | RuntimeError):
+            if isinstance(error, InputError):
                 raise
+            if isinstance(error, ImportError):
+                raise InputError(
+                    "the scheduler has another version of Dask, or of what Dask needs",
+                    parameter="scheduler",
+                    came=self._address,
+                    cure="Install the same versions of dask and distributed on all machines.",
+                ) from error
+            certificates = ", or its certificates" if self._address.startswith("tls") else ""
             raise InputError(
                 "no Dask scheduler answers there",
                 parameter="scheduler",
                 came=self._address,
-                cure="Start one with 'dask scheduler', or correct the address.",
+                cure=f"Start one with 'dask scheduler', or correct the address{certificates}.",
             ) from error
         return client
 
@@ -98,9 +122,9 @@ class Cluster:
                         cure="Name them in Dask's configuration: distributed.comm.tls.",
                     )
                 stream = context.wrap_socket(plain, server_hostname=parts.hostname)
-            first = b""
-            stream.settimeout(_GREETING)
+            first, until = b"", time.monotonic() + _GREETING
             while len(first) < _LENGTH:
+                stream.settimeout(max(until - time.monotonic(), 0.01))
                 came = stream.recv(_LENGTH - len(first))
                 if not came:
                     raise OSError("nothing is said there")
@@ -111,7 +135,7 @@ class Cluster:
     def _waited_for_workers(self) -> dict[str, Any]:
         """Return the workers as soon as there are any."""
         until = time.monotonic() + PATIENCE
-        while not (found := self._known()):
+        while not (found := self._known(PATIENCE)):
             if time.monotonic() > until:
                 raise InputError(
                     "the scheduler has no workers",
@@ -122,14 +146,33 @@ class Cluster:
             time.sleep(0.1)
         return found
 
-    def _known(self) -> dict[str, Any]:
-        return dict(self._client.scheduler_info()["workers"])
+    def _known(self, patience: float) -> dict[str, Any]:
+        """Return all workers by their addresses."""
+        try:
+            return dict(_within(patience, lambda: self._client.scheduler_info(n_workers=-1))["workers"])
+        except TimeoutError as error:
+            raise InputError(
+                "the scheduler does not answer any more", parameter="scheduler", came=self._address, cure=_RUN_AGAIN
+            ) from error
 
     def _refuse_other_versions(self, workers: list[str]) -> None:
         """Refuse workers whose results would not be those of this version."""
-        there = self._client.run(
-            pkgutil.resolve_name, "truearm.version:__version__", workers=workers, on_error="return"
-        )
+        if not workers:
+            return
+        try:
+            there = _within(
+                _ANSWER,
+                lambda: self._client.run(
+                    pkgutil.resolve_name, "truearm.version:__version__", workers=workers, on_error="return"
+                ),
+            )
+        except TimeoutError as error:
+            raise InputError(
+                "workers of the scheduler do not answer",
+                parameter="scheduler",
+                came=self._address,
+                cure="Look at what they print, and start them again.",
+            ) from error
         others = {address: version for address, version in there.items() if version != __version__}
         if others:
             address, version = next(iter(others.items()))
@@ -148,7 +191,18 @@ class Cluster:
         """Two a thread: the next one is there when one is done."""
         return 2 * max(1, sum(int(worker["nthreads"]) for worker in self._workers.values()))
 
-    def renew(self) -> bool:
+    def handed(self, work: Callable[[P], R], part: P) -> Future[R] | None:
+        """Hand out a part; None if the connection was lost."""
+        try:
+            return self._executor.submit(work, part)
+        except Exception:  # of Dask, which has sent nothing: the work is done elsewhere
+            return None
+
+    def refusal(self, error: Exception) -> InputError | None:
+        """Return none: what the cluster adds is broken connections and parts that workers died of."""
+        return None
+
+    def renew(self) -> None:
         """Wait for the scheduler, where its connection was lost, and for workers."""
         until = time.monotonic() + PATIENCE
         while self._client.status != "running":
@@ -158,12 +212,13 @@ class Cluster:
         try:
             self._workers = self._waited_for_workers()
             self._refuse_other_versions([*self._workers])
-        except OSError as error:
+        except InputError:
+            raise
+        except Exception as error:  # of Dask, whose connection is lost again
             raise InputError(
                 "the scheduler is gone", parameter="scheduler", came=self._address, cure=_RUN_AGAIN
             ) from error
-        self.executor = self._client.get_executor(pure=False)
-        return True
+        self._executor = self._client.get_executor(pure=False)
 
     def news(self) -> list[str]:
         """Return which workers have gone and come.
@@ -178,9 +233,11 @@ class Cluster:
             return []
         self._looked = now
         try:
-            found = self._known()
+            found = self._known(_ANSWER)
             self._refuse_other_versions([address for address in found if address not in self._workers])
-        except OSError:  # the connection is being lost: its parts will say so
+        except InputError:
+            raise
+        except Exception:  # of Dask, whose connection is being lost: its parts will say so
             return []
         gone = [address for address in self._workers if address not in found]
         self._workers = found
@@ -194,8 +251,9 @@ class Cluster:
 
     def close(self, *, finish: bool) -> None:
         """Leave the cluster as it is, without what it is still doing."""
-        self.executor.shutdown(wait=finish)
-        self._client.close(timeout=1)
+        for end in (lambda: self._executor.shutdown(wait=finish), lambda: self._client.close(timeout=1)):
+            with suppress(Exception):  # of Dask, where the scheduler is gone
+                _within(PATIENCE, end)
 
 
 def checked_address(address: str, *, insecure: bool) -> str:
@@ -239,6 +297,26 @@ def _is_here(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def _within(seconds: float, work: Callable[[], R]) -> R:
+    """Return what a function returns.
+
+    Raises
+    ------
+    TimeoutError
+        If it takes longer. What it does is then nobody's, and ends with this process.
+    """
+    done = Future[R]()
+
+    def do() -> None:
+        try:
+            done.set_result(work())
+        except BaseException as error:
+            done.set_exception(error)
+
+    threading.Thread(target=do, daemon=True).start()
+    return done.result(seconds)
 
 
 def _distributed() -> Any:

@@ -96,6 +96,13 @@ class _Run(Generic[Part, Result]):
                     yield Done(self._taken(future), None)
                 except (BrokenExecutor, CancelledError) as error:
                     broken = error
+                except InputError:
+                    raise
+                except Exception as error:
+                    refusal = self._workers.refusal(error)
+                    if refusal is None:
+                        raise
+                    raise refusal from error
                 else:
                     self._in_a_row = 0
                     yield Done(self._taken(future), result)
@@ -124,10 +131,10 @@ class _Run(Generic[Part, Result]):
 
     def _handed(self, part: Part) -> bool:
         """Hand out a part; False if a worker has just died."""
-        try:
-            self.running[self._workers.executor.submit(self._work, part)] = part
-        except BrokenExecutor:
+        future = self._workers.handed(self._work, part)
+        if future is None:
             return False
+        self.running[future] = part
         return True
 
     def _broken(self, reason: BaseException) -> Iterator[Done[Part, Result]]:
@@ -158,9 +165,4 @@ class _Run(Generic[Part, Result]):
                 cure="Look at what they print. In a script that Python runs, call the job below: "
                 "if __name__ == '__main__'.",
             )
-        if not self._workers.renew():
-            raise InputError(
-                "the workers are gone",
-                parameter="workers",
-                cure="Start them again and run this again: what is on disk is not computed twice.",
-            )
+        self._workers.renew()

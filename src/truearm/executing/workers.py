@@ -7,18 +7,21 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import Final, ParamSpec, Protocol, TypeVar
 
-from truearm.errors import InputError
+from truearm.errors import InputError, Words
 
 P = ParamSpec("P")
 T = TypeVar("T")
+R = TypeVar("R")
 
 #: BLAS of one thread in every worker: NumPy reads this when it is first imported.
 _ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+#: What to do where workers have gone.
+_RUN_AGAIN: Final = "Run this again with it: what is on disk is not computed twice."
 
 
 class Workers(Protocol):
@@ -29,15 +32,29 @@ class Workers(Protocol):
         """How many parts are handed out at once: enough that nobody waits, and no more."""
 
     @property
-    def executor(self) -> Executor:
-        """Who takes the next part."""
-
-    @property
     def lost(self) -> tuple[type[BaseException], ...]:
-        """What its executor raises for a part that workers died of, after it was repeated."""
+        """What is raised for a part that workers died of, after it was repeated."""
 
-    def renew(self) -> bool:
-        """Put new workers in the place of those that died; False if that cannot be done."""
+    def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
+        """Hand out a part; None if workers have just died.
+
+        Raises
+        ------
+        InputError
+            If nobody takes it.
+        """
+
+    def refusal(self, error: Exception) -> InputError | None:
+        """Return what to say of an error in the place of a result; None if it is the work's own."""
+
+    def renew(self) -> None:
+        """Put new workers in the place of those that died.
+
+        Raises
+        ------
+        InputError
+            If that cannot be done.
+        """
 
     def news(self) -> list[str]:
         """Return what has happened to workers since the last time, in plain words.
@@ -52,31 +69,27 @@ class Workers(Protocol):
         """Let go of the workers, of what they are doing too unless they shall finish it."""
 
 
-class _AtOnce(Executor):
-    """Does what it is given where it stands."""
-
-    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Do it, and return what came out."""
-        future = Future[T]()
-        try:
-            future.set_result(fn(*args, **kwargs))
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-
 class ThisProcess:
     """Parts are done here, one after the other."""
 
     in_flight: Final = 1
     lost: tuple[type[BaseException], ...] = ()
 
-    def __init__(self) -> None:
-        self.executor: Executor = _AtOnce()
+    def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
+        """Do it, and return what came out."""
+        future = Future[R]()
+        try:
+            future.set_result(work(part))
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
-    def renew(self) -> bool:
-        """Refuse: there are no workers to put in their place."""
-        return False
+    def refusal(self, error: Exception) -> InputError | None:
+        """Return none: the work was done here."""
+        return None
+
+    def renew(self) -> None:
+        """Do nothing."""
 
     def news(self) -> list[str]:
         """Return nothing."""
@@ -110,7 +123,7 @@ class Processes:
         self._workers = workers
         self._environment = {name: os.environ.get(name) for name in _ONE_THREAD}
         os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-        self.executor: Executor = self._pool()
+        self._executor = self._pool()
 
     def _pool(self) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(self._workers, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
@@ -120,11 +133,21 @@ class Processes:
         """Two a worker: the next one is there when one is done."""
         return 2 * self._workers
 
-    def renew(self) -> bool:
+    def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
+        """Hand out a part; None if a process has just died."""
+        try:
+            return self._executor.submit(work, part)
+        except BrokenExecutor:
+            return None
+
+    def refusal(self, error: Exception) -> InputError | None:
+        """Return none: these processes add no errors of their own."""
+        return None
+
+    def renew(self) -> None:
         """Start new processes."""
-        self.executor.shutdown(wait=False, cancel_futures=True)
-        self.executor = self._pool()
-        return True
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        self._executor = self._pool()
 
     def news(self) -> list[str]:
         """Return nothing: a process that dies breaks its pool."""
@@ -132,7 +155,7 @@ class Processes:
 
     def close(self, *, finish: bool) -> None:
         """End the processes."""
-        self.executor.shutdown(wait=finish, cancel_futures=True)
+        self._executor.shutdown(wait=finish, cancel_futures=True)
         for name, value in self._environment.items():
             if value is None:
                 os.environ.pop(name, None)
@@ -168,12 +191,46 @@ class Given:
     lost: tuple[type[BaseException], ...] = ()
 
     def __init__(self, executor: Executor, in_flight: int = 32) -> None:
-        self.executor = executor
+        self._executor = executor
         self.in_flight = in_flight
 
-    def renew(self) -> bool:
+    def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
+        """Hand out a part; None if it is broken, as a pool is whose worker died."""
+        try:
+            future = self._executor.submit(work, part)
+        except BrokenExecutor:
+            return None
+        except Exception as error:
+            raise InputError(
+                "the executor takes no work",
+                parameter="executor",
+                came=_words(error),
+                cure="Give one that works and is not shut down. " + _RUN_AGAIN,
+            ) from error
+        if not isinstance(future, Future):
+            raise InputError(
+                "the executor does not return futures as concurrent.futures has them",
+                parameter="executor",
+                came=Words(type(future).__qualname__),
+            )
+        return future
+
+    def refusal(self, error: Exception) -> InputError | None:
+        """Return that the executor has not done a part: what goes wrong in the work itself is a result."""
+        return InputError(
+            "the executor has not done a part of the work",
+            parameter="executor",
+            came=_words(error),
+            cure=f"Give one whose workers have what this process has. {_RUN_AGAIN}",
+        )
+
+    def renew(self) -> None:
         """Refuse: it is not ours."""
-        return False
+        raise InputError(
+            "the workers of the executor are gone",
+            parameter="executor",
+            cure=f"Make a new one. {_RUN_AGAIN}",
+        )
 
     def news(self) -> list[str]:
         """Return nothing."""
@@ -181,6 +238,12 @@ class Given:
 
     def close(self, *, finish: bool) -> None:
         """Leave it open."""
+
+
+def _words(error: Exception) -> Words:
+    """Return the kind of an error and what it says, on one line."""
+    said = " ".join(str(error).split())
+    return Words(f"{type(error).__name__}: {said}" if said else type(error).__name__)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ of all. Files are named from the manifest's folder.
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, BeforeValidator
 
 from truearm.errors import InputError, did_you_mean, nearest_names
-from truearm.files import exists, read_text
+from truearm.files import exists, noted_reads, read_bytes, read_text
 from truearm.fleets.options import FILES, OPTIONS, checked_options, of_cells
 from truearm.limits import refuse_beyond
 from truearm.measurement.readers.cells import Layout, read_cells
@@ -69,6 +70,10 @@ class RobotEntry:
         Serial number or name of the machine, where it was measured several times.
     date
         When (ISO 8601).
+    hashes
+        SHA-256 of the files that are read for it, by their paths.
+    places
+        Where ``robot`` and each option stand, by their names.
     """
 
     name: str
@@ -77,6 +82,13 @@ class RobotEntry:
     options: Mapping[str, Any] = field(default_factory=dict)
     of: str | None = None
     date: str | None = None
+    hashes: Mapping[Path, str] = field(default_factory=dict, repr=False)
+    places: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def machine(self) -> str:
+        """The machine that was measured: entries of one machine are measurements of it at several times."""
+        return self.of or self.name
 
 
 @dataclass(frozen=True)
@@ -87,14 +99,14 @@ class Robots:
     ----------
     entries
         One each.
-    files
-        All files that are read, by the names that manifest and table give them.
+    hashes
+        SHA-256 of all files that are read, by the names that manifest and table give them.
     content
         What is said, as JSON holds it, without where the manifest stands.
     """
 
     entries: tuple[RobotEntry, ...]
-    files: dict[str, Path]
+    hashes: dict[str, str]
     content: list[dict[str, Any]]
 
 
@@ -123,37 +135,92 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
         Naming file and entry, or file, line and column: for two robots of one name, a file that is not there, columns
         and options that are not known, and a date that is none.
     """
-    folder, files = manifest.parent.absolute(), dict[str, Path]()  # workers may stand elsewhere
+    folder, hashes = manifest.parent.absolute(), dict[str, str]()  # workers may stand elsewhere
     if isinstance(said, str):
         table = manifest.parent / said
-        entries = _rows(table, manifest)
-        files[said] = table
+        entries, hashes[said] = _rows(table, manifest)
     else:
         entries = [_listed(one, f"{manifest}, robots[{number}]") for number, one in enumerate(said, 1)]
     if not entries:
         raise InputError("there are no robots", where=f"{manifest}, robots")
     refuse_beyond("robots", len(entries), where=str(manifest))
     general = checked_options(options, folder, lambda name: f"{manifest}, options.{name}")
-    files |= _named_files(options, folder)
     seen: dict[str, str] = {}
+    campaigns: dict[tuple[str, str], str] = {}
     robots = []
     for one in entries:
         entry = one.entry
         _check_name(entry.name, one.place("name"), seen)
-        path = _existing(folder, entry.data, one.place("data"))
-        files[entry.data] = path
+        files = {entry.data: _existing(folder, entry.data, one.place("data"))}
         robot = entry.robot
         if Path(robot).suffix:
             files[robot] = _existing(folder, robot, one.place("robot"))
             robot = str(files[robot])
         own = checked_options(entry.options, folder, one.place_of_option)
-        files |= _named_files(entry.options, folder)
+        files |= _named_files({**options, **entry.options}, folder)
+        for name, path in files.items():
+            if name not in hashes:
+                hashes[name] = hashlib.sha256(read_bytes(path)).hexdigest()
         _check_date(entry.date, one.place("date"))
         if entry.of is not None and not (entry.of and is_one_line(entry.of)):
             raise InputError("a serial number belongs here", where=one.place("of"), came=entry.of, allowed="one line")
-        robots.append(RobotEntry(entry.name, robot, path, {**general, **own}, entry.of, entry.date))
+        made = RobotEntry(
+            entry.name,
+            robot,
+            folder / entry.data,
+            {**general, **own},
+            entry.of,
+            entry.date,
+            {path: hashes[name] for name, path in files.items()},
+            {
+                "robot": one.place("robot"),
+                **{name: f"{manifest}, options.{name}" for name in general},
+                **{name: one.place_of_option(name) for name in own},
+            },
+        )
+        _check_campaign(made, hashes[entry.data], one.place("data"), campaigns)
+        robots.append(made)
     content = [one.entry.model_dump(mode="json") | {"options": {**options, **one.entry.options}} for one in entries]
-    return Robots(tuple(robots), files, content)
+    return Robots(tuple(robots), hashes, content)
+
+
+def _check_campaign(robot: RobotEntry, data: str, where: str, campaigns: dict[tuple[str, str], str]) -> None:
+    """Refuse the same readings as two campaigns of one machine: they would say that nothing has changed."""
+    other = campaigns.setdefault((robot.machine, data), where)
+    if other != where:
+        raise InputError(
+            "the same readings stand for two campaigns of one machine",
+            where=where,
+            came=robot.data.name,
+            cure=f"{other} has them too. Give each campaign its own file, or another 'of' if these are two machines.",
+        )
+
+
+def refuse_respelled(said: list[Any], manifest: Path) -> None:
+    """Refuse names and serial numbers of a list that YAML takes for numbers and writes otherwise, as 0123.
+
+    Raises
+    ------
+    InputError
+        Naming the entry.
+    """
+    names = ("name", "of")
+    if not any(isinstance(one.get(name), int) for one in said if isinstance(one, dict) for name in names):
+        return
+    from ruamel.yaml import YAML
+
+    root = YAML(typ="safe", pure=True).compose(read_text(manifest, "yaml_size"))
+    robots: list[Any] = next((node.value for key, node in root.value if key.value == "robots"), [])
+    for number, (one, node) in enumerate(zip(said, robots, strict=False), 1):
+        written = {key.value: entry.value for key, entry in node.value} if isinstance(one, dict) else {}
+        for name in names:
+            if isinstance(one, dict) and isinstance(one.get(name), int) and written.get(name) != str(one[name]):
+                raise InputError(
+                    "without quotes this is a number, and its digits would be others",
+                    where=f"{manifest}, robots[{number}].{name}",
+                    came=written.get(name),
+                    cure="Put it into quotes.",
+                )
 
 
 def _listed(one: object, where: str) -> _Said:
@@ -161,11 +228,12 @@ def _listed(one: object, where: str) -> _Said:
     return _Said(entry, lambda part: f"{where}.{part}", lambda name: f"{where}.options.{name}")
 
 
-def _rows(table: Path, manifest: Path) -> list[_Said]:
-    """Return the rows of a table."""
+def _rows(table: Path, manifest: Path) -> tuple[list[_Said], str]:
+    """Return the rows of a table, and the SHA-256 of what was read."""
     if not exists(table):
         raise InputError("there is no such file", where=f"{manifest}, robots", came=str(table), cure="Check the path.")
-    cells = read_cells(read_text(table), str(table), Layout(comment="#"))
+    with noted_reads() as noted:
+        cells = read_cells(read_text(table), str(table), Layout(comment="#"))
     header = f"{table}, line {cells.header}"
     known = (*_COLUMNS, *OPTIONS)
     for name in cells.names:
@@ -197,7 +265,7 @@ def _rows(table: Path, manifest: Path) -> list[_Said]:
             options=of_cells({name: cell for name, cell in line.items() if name in OPTIONS}, place),
         )
         made.append(_Said(entry, place, place))
-    return made
+    return made, noted[table.absolute()][0]
 
 
 def _check_name(name: str, where: str, seen: dict[str, str]) -> None:

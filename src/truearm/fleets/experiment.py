@@ -1,57 +1,19 @@
-"""A whole series simulated: robots drawn from their priors, measured, calibrated, and judged by their truth.
-
-Every robot has random numbers of its own, spawned from the seed by its number, and is calibrated as if it were alone:
-so what is found of it depends neither on the robots beside it nor on who computes it.
-"""
+"""An experiment prepared: its robot with targets, and the configurations at which robots are measured and judged."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, Final
 
 import numpy as np
 
 from truearm.errors import InputError, name_parameter, name_place
-from truearm.fleets.manifest import ExperimentEntry
-from truearm.fleets.rows import Accuracy, FoundParameter, Row
-from truearm.identification.judging.monte_carlo import calibrated, of_itself
-from truearm.identification.solving.models import FRAMES, named_model
-from truearm.identification.solving.problem import Problem
+from truearm.fleets.series import Experiment, ExperimentEntry
+from truearm.identification.solving.models import named_model
 from truearm.library import load_robot
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.readers.canonical import read_csv
-from truearm.modeling.chain import Array
-from truearm.modeling.parameters import PLACES
-from truearm.modeling.robot import Robot
-from truearm.planning.choosing.measurement_plan import with_targets
-
-#: Readings of robots calibrated together, so that their Jacobians stay in the processor's cache.
-_TOGETHER: Final = 9_000
-
-
-@dataclass(frozen=True, eq=False)
-class Experiment:
-    """An experiment that is ready to be done, here or elsewhere.
-
-    Attributes
-    ----------
-    asked
-        What the manifest says.
-    robot
-        The nominal robot with its targets.
-    joints
-        Joint positions at which each robot is measured, ``(configurations, joints)`` [rad or m].
-    held_out
-        Joint positions at which it is judged, likewise.
-    """
-
-    asked: ExperimentEntry
-    robot: Robot
-    joints: Array
-    held_out: Array
+from truearm.simulation.truths import carrying_targets
 
 
 def experiment(asked: ExperimentEntry) -> Experiment:
@@ -66,7 +28,7 @@ def experiment(asked: ExperimentEntry) -> Experiment:
         nominal = load_robot(asked.robot)
     with _refusals_of_entry("model"):
         model = named_model(asked.model)
-    known = with_targets(nominal)
+    known = carrying_targets(nominal)
     places = {target.name: tuple(known.values[target.parameter(axis)] for axis in "xyz") for target in known.targets}
     if asked.targets > len(places):
         raise InputError(
@@ -99,95 +61,3 @@ def _refusals_of_entry(entry: str) -> Iterator[None]:
         if error.where is None:
             name_place(error, f"experiment.{entry}")
         raise
-
-
-class Series:
-    """Robots of an experiment, calibrated by the part; what all of them share is made once."""
-
-    def __init__(self, made: Experiment) -> None:
-        self.made = made
-        model = named_model(made.asked.model)
-        robot = model.prepared(made.robot)
-        self.problem = of_itself(robot, made.joints, model, made.asked.noise)
-        self.frames = Problem(robot, self.problem.data, FRAMES.free(robot), {})
-        self.drawn = np.array([p.group not in PLACES for p in self.problem.free.parameters])
-
-    @property
-    def shared(self) -> dict[str, dict[str, Any]]:
-        """What is the same of every robot's parameters, by their names."""
-        return {
-            p.name: {"unit": p.unit, "nominal": p.nominal, "prior": p.prior}
-            for p in self.problem.free.parameters
-            if p.group not in PLACES
-        }
-
-    def rows(self, numbers: Sequence[int]) -> list[Row]:
-        """Return what is found of some robots, counted from 0."""
-        size = max(1, _TOGETHER // len(self.problem.components))
-        return [row for first in range(0, len(numbers), size) for row in self._rows(numbers[first : first + size])]
-
-    def _rows(self, numbers: Sequence[int]) -> list[Row]:
-        began = time.perf_counter()
-        made, free = self.made, self.problem.free
-        judged = (len(made.robot.targets), 3, len(made.held_out))
-        truth = np.tile(free.nominal, (len(numbers), 1))
-        readings = np.empty((len(numbers), self.problem.rows))
-        noise = np.empty((len(numbers), *judged))
-        for i, number in enumerate(numbers):
-            rng = np.random.default_rng(np.random.SeedSequence(made.asked.seed, spawn_key=(1, number)))
-            truth[i, self.drawn] += (free.prior * rng.standard_normal(len(free.prior)))[self.drawn]
-            readings[i] = rng.standard_normal(self.problem.rows)
-            noise[i] = made.asked.noise * rng.standard_normal(judged)
-        readings += self.problem.at(truth).residual
-        found, deviation, settled = calibrated(self.problem, readings)
-        placed, _, _ = calibrated(self.frames, readings)
-        true, calibrated_there = (self._positions(self.problem, vectors) for vectors in (truth, found))
-        nominal_there = self._positions(self.frames, placed)
-        errors = {
-            "held_out": calibrated_there - true - noise,
-            "nominal": nominal_there - true - noise,
-            "truth": calibrated_there - true,
-        }
-        lengths = {name: np.linalg.norm(apart, axis=2).reshape(len(numbers), -1) for name, apart in errors.items()}
-        seconds = (time.perf_counter() - began) / len(numbers)
-        kept = np.flatnonzero(self.drawn)
-        rows = []
-        for i, number in enumerate(numbers):
-            name = made.asked.name(number)
-            if not settled[i]:
-                rows.append(
-                    Row(name, "failed", "the calibration did not settle", seconds=seconds, robot=made.robot.name)
-                )
-                continue
-            parameters = {
-                free.parameters[k].name: FoundParameter(
-                    free.parameters[k].unit,
-                    float(found[i, k]),
-                    float(deviation[i, k]),
-                    free.parameters[k].nominal,
-                    free.parameters[k].prior,
-                    float(truth[i, k]),
-                )
-                for k in kept
-            }
-            rows.append(
-                Row(
-                    name,
-                    "calibrated",
-                    held_out=Accuracy.of(lengths["held_out"][i]),
-                    nominal=Accuracy.of(lengths["nominal"][i]),
-                    truth=Accuracy.of(lengths["truth"][i]),
-                    parameters=parameters,
-                    fit_status="converged",
-                    seconds=seconds,
-                    robot=made.robot.name,
-                )
-            )
-        return rows
-
-    def _positions(self, problem: Problem, vectors: Array) -> Array:
-        """Return where targets are at the configurations that judge, ``(robots, targets, 3, configurations)`` [m]."""
-        values = {**problem.robot.values, **problem.free.values(vectors)}
-        names = [target.name for target in self.made.robot.targets]
-        at = [problem.robot.forward_kinematics(self.made.held_out, name, values).position for name in names]
-        return np.stack([np.broadcast_to(np.moveaxis(p, 0, 1), (len(vectors), 3, p.shape[-1])) for p in at], axis=1)

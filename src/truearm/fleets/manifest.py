@@ -24,16 +24,19 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, Field
 
 from truearm.errors import InputError, refusals_at
 from truearm.files import read_bytes, read_yaml
-from truearm.fleets.entries import RobotEntry, robots_of
+from truearm.fleets.series import ExperimentEntry
 from truearm.limits import refuse_beyond
 from truearm.modeling.formats.entries import STRICT, NotNegative
 from truearm.units import sized_si
+
+if TYPE_CHECKING:  # what a calibration can be asked for takes long to import, and an experiment needs none of it
+    from truearm.fleets.entries import RobotEntry
 
 SCHEMA: Final = "truearm-fleet/1"
 
@@ -76,44 +79,6 @@ class ManifestFile(BaseModel):
     robots: list[Any] | str | None = None
     options: dict[str, Any] = {}
     chunk: Count | None = None
-
-
-@dataclass(frozen=True)
-class ExperimentEntry:
-    """The experiment that is asked for: many robots simulated, calibrated and judged.
-
-    Attributes
-    ----------
-    robot
-        What :func:`truearm.load_robot` takes, files from the manifest's folder.
-    count
-        Simulated robots.
-    configurations
-        How many configurations each is measured at, drawn within the limits; or the file of them.
-    targets
-        How many targets the instrument sees.
-    model
-        Which parameters are drawn and identified.
-    noise
-        Standard deviation of each coordinate [m].
-    held_out
-        Configurations that judge.
-    seed
-        Of everything.
-    """
-
-    robot: str
-    count: int
-    configurations: int | Path
-    targets: int
-    model: str
-    noise: float
-    held_out: int
-    seed: int
-
-    def name(self, number: int) -> str:
-        """Return the name of a simulated robot, counted from 0."""
-        return f"robot-{number + 1:0{len(str(self.count))}}"
 
 
 @dataclass(frozen=True)
@@ -164,6 +129,14 @@ class Manifest:
         told = json.dumps([self.content, self.hashes], sort_keys=True, default=str)
         return hashlib.sha256(told.encode()).hexdigest()
 
+    def key(self, part: int) -> str:
+        """Return the hash of what is asked of a part, counted from 0: robots beside it change nothing of it."""
+        if self.experiment is not None:
+            return self.digest
+        robots = [self.content["robots"][number] for number in self.numbers(part)]
+        files = [[*self.robots[number].hashes.values()] for number in self.numbers(part)]
+        return hashlib.sha256(json.dumps([robots, files], sort_keys=True, default=str).encode()).hexdigest()
+
     def numbers(self, part: int) -> range:
         """Return which robots are in a part; both are counted from 0."""
         return range(part * self.chunk, min((part + 1) * self.chunk, self.count))
@@ -197,9 +170,13 @@ def read_manifest(path: Path) -> Manifest:
         return Manifest(path, experiment, (), said.chunk or SIMULATED_TOGETHER, content, _hashes(files))
     if said.units is not None:
         raise InputError("nothing here has a unit", where=f"{path}, units", cure="Remove it.")
+    from truearm.fleets.entries import refuse_respelled, robots_of
+
+    if isinstance(said.robots, list):
+        refuse_respelled(said.robots, path)
     named = robots_of(said.robots or [], said.options, path)
     content |= {"robots": named.content}
-    return Manifest(path, None, named.entries, said.chunk or MEASURED_TOGETHER, content, _hashes(named.files))
+    return Manifest(path, None, named.entries, said.chunk or MEASURED_TOGETHER, content, named.hashes)
 
 
 def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[str, Path]]:

@@ -1,40 +1,54 @@
 """The parts of a fleet on disk: written once, never computed twice, and read robot by robot.
 
-``record.json`` says what is asked; ``parts/`` holds a file for each part that is done, a line of JSON for each robot
-behind a line of what they share. A file is there as a whole or not at all.
+``record.json`` says what is asked; ``parts/`` holds a file for each part that is done: a line of JSON with what its
+robots share, one for each robot, and one with the hash of those before. A file is there as a whole or not at all.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic_core import from_json, to_json
+from pydantic_core import from_json
 
 from truearm.errors import InputError
-from truearm.files import exists, read_text
+from truearm.files import exists, read_bytes, read_text
 from truearm.fleets.manifest import Manifest
 from truearm.fleets.rows import Row
+from truearm.shown import counted, listed
 from truearm.version import __version__
 from truearm.writing import write_text
 
 RECORD: Final = "record.json"
 PARTS: Final = "parts"
+#: Folder of a fleet for the folders of its robots.
+ROBOTS: Final = "robots"
 _RECORD_SCHEMA: Final = "truearm-fleet-record/1"
 _PART_SCHEMA: Final = "truearm-fleet-part/1"
 #: Files of a folder at most.
 _TOGETHER: Final = 1000
 
 
-def part_text(rows: list[Row], shared: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return robots as a part holds them, behind its first line."""
-    lines = [to_json({"shared": shared}), *(to_json(row.content(shared)) for row in rows)]
-    return "".join(f"{line.decode()}\n" for line in lines)
+@dataclass(frozen=True)
+class Known:
+    """Which parts of a fleet are on disk.
+
+    Attributes
+    ----------
+    done
+        Numbers of those that are not computed again, counted from 0.
+    again
+        Why others are, in plain words.
+    """
+
+    done: frozenset[int]
+    again: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -51,22 +65,31 @@ class Recorded:
 
     folder: Path
     manifest: Manifest
+    _keys: dict[int, str] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def file(self, part: int) -> Path:
         """Return where a part is, counted from 0."""
         return self.folder / PARTS / f"{part // _TOGETHER:04}" / f"{part + 1:07}.jsonl"
 
     def check(self) -> None:
-        """Refuse a folder in which something else was asked.
+        """Refuse a folder in which something else was asked, or that leads elsewhere.
 
         Raises
         ------
         InputError
             If parts of another manifest, other files or another version of truearm stand there.
         """
+        for name in (PARTS, ROBOTS):
+            if (self.folder / name).is_symlink():
+                raise InputError(
+                    "this is a link, and the folder itself belongs here",
+                    parameter="out",
+                    where=str(self.folder / name),
+                    cure="Remove the link, or choose another `out`.",
+                )
         path = self.folder / RECORD
         if exists(path):
-            self._refuse_others(path)
+            self._refuse_others(self._read())
             return
         if exists(self.folder / PARTS):
             raise InputError(
@@ -77,11 +100,14 @@ class Recorded:
             )
 
     def begin(self) -> None:
-        """Write down what is asked, where it does not stand there yet."""
+        """Write down what is asked, where nothing stands there yet."""
         path = self.folder / RECORD
         if not exists(path):
-            write_text(path, json.dumps(self._record(), indent=1, default=str) + "\n")
+            self._write_record()
         self.check()
+
+    def _write_record(self) -> None:
+        write_text(self.folder / RECORD, json.dumps(self._record(), indent=1, default=str) + "\n")
 
     def _record(self) -> dict[str, Any]:
         asked = self.manifest
@@ -96,7 +122,8 @@ class Recorded:
             "files": asked.hashes,
         }
 
-    def _refuse_others(self, path: Path) -> None:
+    def _read(self) -> dict[str, Any]:
+        path = self.folder / RECORD
         try:
             known = json.loads(read_text(path))
             schema = known["truearm"] if isinstance(known, dict) else None
@@ -104,7 +131,9 @@ class Recorded:
             known, schema = {}, None
         if schema != _RECORD_SCHEMA:
             raise InputError("this is no record of a fleet", parameter="out", where=str(path), cure="Choose another.")
-        another = "Choose another `out`, or give what was asked there."
+        return dict(known)
+
+    def _refuse_others(self, known: Mapping[str, Any]) -> None:
         if known.get("version") != __version__:
             raise InputError(
                 "the parts there were computed by another version of truearm",
@@ -114,8 +143,9 @@ class Recorded:
                 allowed=__version__,
                 cure="Choose another `out`, or go on with that version.",
             )
-        if known.get("digest") == self.manifest.digest:
+        if known.get("digest") == self.manifest.digest or self._goes_on(known):
             return
+        another = "Choose another `out`, or give what was asked there."
         files = known.get("files", {})
         changed = [name for name, hash_ in self.manifest.hashes.items() if files.get(name, hash_) != hash_]
         if changed and json.dumps(known.get("manifest")) == json.dumps(self.manifest.content, default=str):
@@ -127,18 +157,66 @@ class Recorded:
                 cure=another,
             )
         raise InputError(
-            "the parts there are of another manifest", parameter="out", where=str(self.folder), cure=another
+            "the parts there are of another manifest",
+            parameter="out",
+            where=str(self.folder),
+            cure=another
+            if self.manifest.experiment is not None
+            else "Choose another `out`. Only a manifest with the same robots in the same order, and more behind them, "
+            "and with the same 'chunk', goes on there.",
         )
 
+    def _goes_on(self, known: Mapping[str, Any]) -> bool:
+        """Return whether the manifest is that of the record with entries mended, and robots added behind them."""
+        if self.manifest.experiment is not None or known.get("chunk") != self.manifest.chunk:
+            return False
+        try:
+            names = [str(robot["name"]) for robot in known["manifest"]["robots"]]
+        except (KeyError, TypeError):
+            return False
+        return bool(names) and names == [robot.name for robot in self.manifest.robots[: len(names)]]
+
     @contextmanager
-    def alone(self) -> Iterator[None]:
-        """Let no other run work in the folder; the lock ends with the process, however that ends.
+    def alone(self) -> Iterator[Known]:
+        """Let no other run work in the folder, and return what is done there; the lock ends with the process.
+
+        Where entries of the manifest have been mended, the parts that they are in are removed.
 
         Raises
         ------
         InputError
-            If another one does.
+            If another run works there, or somebody has changed a part.
         """
+        with self._locked():
+            known = self._read()
+            self._refuse_others(known)
+            if known.get("digest") == self.manifest.digest:
+                yield self.known()
+                return
+            removed = self._remove_mended()
+            self._write_record()
+            with self._locked():  # what was locked before is the old file
+                found = self.known()
+                yield Known(found.done, (*removed, *found.again))
+
+    def _remove_mended(self) -> tuple[str, ...]:
+        """Remove the parts with robots whose entries or files are others than they were computed from."""
+        removed = []
+        for part in self._on_disk():
+            head = self._head(self._content(part), part)
+            if head.get("key") != self._key(part):
+                self.file(part).unlink()
+                removed.append(part)
+        if not removed:
+            return ()
+        names = [name for part in removed for name in self.manifest.names(part)]
+        return (
+            f"{counted(len(removed), 'part')} computed again, because the manifest or files of it have changed: "
+            f"{listed(names)}",
+        )
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
         if sys.platform == "win32":
             yield
             return
@@ -158,49 +236,117 @@ class Recorded:
                 pass
             yield
 
-    def done(self) -> set[int]:
-        """Return which parts are on disk, counted from 0."""
+    def known(self) -> Known:
+        """Return which parts are on disk.
+
+        A part of which files have been removed, or whose data changed while it was computed, is computed again.
+
+        Raises
+        ------
+        InputError
+            Naming a part that somebody has changed.
+        """
+        done, again = set[int](), list[str]()
+        for part in self._on_disk():
+            head = self._checked(part)[0]
+            gone = [name for name in head["written"] if not exists(self.folder / name)]
+            if head["changed"]:
+                again.append(
+                    f"1 part computed again, because files changed while it was computed: {listed(head['changed'])}"
+                )
+            elif gone:
+                again.append(f"1 part computed again, because files of it are missing: {listed(gone)}")
+            else:
+                done.add(part)
+        return Known(frozenset(done), tuple(again))
+
+    def missing(self) -> int:
+        """Return how many parts are to be computed; all of them where another manifest goes on."""
+        path = self.folder / RECORD
+        same = exists(path) and self._read().get("digest") == self.manifest.digest
+        return self.manifest.parts - (len(self.known().done) if same else 0)
+
+    def _on_disk(self) -> list[int]:
+        """Return which parts have a file, in their order."""
         names = {path.name for path in (self.folder / PARTS).glob("*/*.jsonl")}
-        return {part for part in range(self.manifest.parts) if self.file(part).name in names}
+        return [part for part in range(self.manifest.parts) if self.file(part).name in names]
 
     def write(self, part: int, text: str) -> None:
-        """Write a part that is done, as a whole or not at all; `text` as of :func:`part_text`."""
+        """Write a part that is done, as a whole or not at all; `text` as of :func:`truearm.fleets.rows.part_text`."""
         first, _, rest = text.partition("\n")
         head = {
             "truearm": _PART_SCHEMA,
-            "digest": self.manifest.digest,
+            "key": self._key(part),
             "part": part + 1,
             "robots": len(self.manifest.numbers(part)),
             **json.loads(first),
         }
-        write_text(self.file(part), json.dumps(head) + "\n" + rest)
+        whole = f"{json.dumps(head)}\n{rest}"
+        write_text(self.file(part), f"{whole}{json.dumps({'sha256': _hash_of(whole.encode())})}\n")
 
     def rows(self) -> Iterator[Row]:
-        """Read the robots of all parts that are done, in their order, a part at a time.
+        """Read the robots of all parts that are on disk, in their order, a part at a time.
 
         Raises
         ------
         InputError
             Naming the part that somebody has changed.
         """
-        for part in sorted(self.done()):
+        for part in self._on_disk():
             yield from self._rows(part)
 
     def _rows(self, part: int) -> list[Row]:
-        path = self.file(part)
-        head, *lines = read_text(path).splitlines()
+        head, lines = self._checked(part)
         try:
-            said = from_json(head)
-            rows = [Row.read(from_json(line), said["shared"]) for line in lines]
-            ours = said["truearm"] == _PART_SCHEMA and said["digest"] == self.manifest.digest
+            shared = {kind: tuple(column) for kind, column in head["shared"].items()}
+            rows = [Row.read(row, shared) for row in from_json(b"[" + lines.rstrip(b"\n").replace(b"\n", b",") + b"]")]
             names = [row.name for row in rows]
-        except (ValueError, KeyError, TypeError):
-            ours, names = False, []
-        if not ours or names != self.manifest.names(part):
-            raise InputError(
-                "this part of the fleet is not as it was written",
-                parameter="out",
-                where=str(path),
-                cure="Remove it and run this again: it is computed anew.",
-            )
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise self._not_ours(part) from error
+        if names != self.manifest.names(part):
+            raise self._not_ours(part)
         return rows
+
+    def _checked(self, part: int) -> tuple[dict[str, Any], bytes]:
+        """Return the first line of a part and the lines of its robots, or refuse what is not as it was written."""
+        content = self._content(part)
+        whole, _, last = content.removesuffix(b"\n").rpartition(b"\n")
+        head = self._head(content, part)
+        try:
+            told = from_json(last)["sha256"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise self._not_ours(part) from error
+        if told != _hash_of(whole + b"\n") or head["key"] != self._key(part):
+            raise self._not_ours(part)
+        return head, (whole + b"\n").partition(b"\n")[2]
+
+    def _content(self, part: int) -> bytes:
+        return read_bytes(self.file(part))
+
+    def _head(self, content: bytes, part: int) -> dict[str, Any]:
+        try:
+            head = from_json(content.partition(b"\n")[0])
+            ours = head["truearm"] == _PART_SCHEMA and {"key", "shared", "written", "changed"} <= {*head}
+        except (ValueError, KeyError, TypeError) as error:
+            raise self._not_ours(part) from error
+        if not ours:
+            raise self._not_ours(part)
+        return dict(head)
+
+    def _key(self, part: int) -> str:
+        """Return the hash of what is asked of a part."""
+        if part not in self._keys:
+            self._keys[part] = self.manifest.key(part)
+        return self._keys[part]
+
+    def _not_ours(self, part: int) -> InputError:
+        return InputError(
+            "this part of the fleet is not as it was written",
+            parameter="out",
+            where=str(self.file(part)),
+            cure="Remove it and run this again: it is computed anew.",
+        )
+
+
+def _hash_of(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

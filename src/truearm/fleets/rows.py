@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 import numpy as np
+from pydantic_core import to_json
 
 from truearm.measurement.statistics import Spread
 from truearm.modeling.chain import Array
 
 Status = Literal["calibrated", "failed"]
 
-#: What is the same for the robots of a part, and stands in its first line once.
-SHARED: Final = ("unit", "nominal", "prior")
+#: Columns of the parameters that may be the same for all robots of a part, and stand in its first line once.
+_SHARED: Final = ("name", "unit", "nominal", "prior")
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,11 @@ class Accuracy:
     n: int
 
     @classmethod
-    def of(cls, errors: Array) -> Accuracy:
-        """Summarise error norms ``(k,)``, k at least 1."""
-        return cls(float(errors.mean()), float(np.sqrt(np.mean(errors**2))), float(errors.max()), len(errors))
+    def of_each(cls, errors: Array) -> list[Accuracy]:
+        """Summarise error norms of several robots, ``(robots, k)``, k at least 1."""
+        means, squares, largest = errors.mean(axis=1), np.mean(errors**2, axis=1), errors.max(axis=1)
+        figures = zip(means.tolist(), np.sqrt(squares).tolist(), largest.tolist(), strict=True)
+        return [cls(*three, errors.shape[1]) for three in figures]
 
     @classmethod
     def of_spread(cls, spread: Spread, n: int) -> Accuracy:
@@ -51,8 +54,7 @@ class Accuracy:
     @classmethod
     def read(cls, content: Mapping[str, Any]) -> Accuracy:
         """Read what :meth:`content` returned."""
-        mean, rms, largest = (float(content[name]) / 1e3 for name in ("mean_mm", "rms_mm", "max_mm"))
-        return cls(mean, rms, largest, int(content["n"]))
+        return cls(content["mean_mm"] / 1e3, content["rms_mm"] / 1e3, content["max_mm"] / 1e3, content["n"])
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,86 @@ class FoundParameter:
     nominal: float
     prior: float
     truth: float | None = None
+
+
+@dataclass(frozen=True)
+class FoundParameters(Mapping[str, FoundParameter]):
+    """The parameters of one robot by their names, kept as columns: of ten thousand robots no object each is made.
+
+    Attributes
+    ----------
+    name, unit
+        Of each.
+    nominal, prior, value, deviation
+        Of each, in SI units, see :class:`FoundParameter`.
+    truth
+        True values of a simulated robot; None of others.
+    """
+
+    name: tuple[str, ...] = ()
+    unit: tuple[str, ...] = ()
+    nominal: tuple[float, ...] = ()
+    prior: tuple[float, ...] = ()
+    value: tuple[float, ...] = ()
+    deviation: tuple[float, ...] = ()
+    truth: tuple[float, ...] | None = None
+
+    @classmethod
+    def of(cls, parameters: Mapping[str, FoundParameter]) -> FoundParameters:
+        """Return parameters, of which all or none have a truth, as columns."""
+        those = [*parameters.values()]
+        truths = tuple(p.truth for p in those if p.truth is not None)
+        return cls(
+            tuple(parameters),
+            tuple(p.unit for p in those),
+            tuple(p.nominal for p in those),
+            tuple(p.prior for p in those),
+            tuple(p.value for p in those),
+            tuple(p.deviation for p in those),
+            truths if truths else None,
+        )
+
+    def __getitem__(self, name: str) -> FoundParameter:
+        """Return one of them."""
+        try:
+            i = self.name.index(name)
+        except ValueError:
+            raise KeyError(name) from None
+        truth = None if self.truth is None else self.truth[i]
+        return FoundParameter(self.unit[i], self.value[i], self.deviation[i], self.nominal[i], self.prior[i], truth)
+
+    def __iter__(self) -> Iterator[str]:
+        """Return their names."""
+        return iter(self.name)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.name)
+
+    @property
+    def shared(self) -> dict[str, tuple[Any, ...]]:
+        """Columns that other robots may have too, as JSON holds them."""
+        return {column: getattr(self, column) for column in _SHARED}
+
+    def content(self, shared: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
+        """Return them as JSON holds them, column by column, without those of `shared`."""
+        columns = {} if shared == self.shared else self.shared
+        columns |= {"value": self.value, "deviation": self.deviation}
+        return columns if self.truth is None else {**columns, "truth": self.truth}
+
+    @classmethod
+    def read(cls, content: Mapping[str, Any], shared: Mapping[str, Any]) -> FoundParameters:
+        """Read what :meth:`content` returned.
+
+        Raises
+        ------
+        ValueError
+            If columns are not equally long.
+        """
+        columns = {kind: tuple(column) for kind, column in {**shared, **content}.items()}
+        if len({*map(len, columns.values())}) > 1:
+            raise ValueError("columns of different lengths")
+        return cls(**columns)
 
 
 @dataclass(frozen=True)
@@ -125,7 +207,7 @@ class Row:
     held_out: Accuracy | None = None
     nominal: Accuracy | None = None
     truth: Accuracy | None = None
-    parameters: Mapping[str, FoundParameter] = field(default_factory=dict)
+    parameters: FoundParameters = field(default_factory=FoundParameters)
     fit_status: str | None = None
     notices: tuple[str, ...] = ()
     seconds: float = 0.0
@@ -139,14 +221,8 @@ class Row:
         """The machine that was measured: rows of one machine are measurements of it at several times."""
         return self.of or self.name
 
-    def content(self, shared: Mapping[str, Mapping[str, Any]] | None = None) -> dict[str, Any]:
+    def content(self, shared: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Return it as JSON holds it, without what `shared` says of its parameters already."""
-        known = shared or {}
-        parameters = {}
-        for name, found in self.parameters.items():
-            one = {"value": found.value, "deviation": found.deviation}
-            one |= {} if name in known else {kind: getattr(found, kind) for kind in SHARED}
-            parameters[name] = one if found.truth is None else {**one, "truth": found.truth}
         return {
             "name": self.name,
             "status": self.status,
@@ -156,7 +232,7 @@ class Row:
             "held_out": None if self.held_out is None else self.held_out.content(),
             "nominal": None if self.nominal is None else self.nominal.content(),
             "truth": None if self.truth is None else self.truth.content(),
-            "parameters": parameters,
+            "parameters": self.parameters.content(shared or {}),
             "fit_status": self.fit_status,
             "notices": [*self.notices],
             "seconds": self.seconds,
@@ -167,9 +243,8 @@ class Row:
         }
 
     @classmethod
-    def read(cls, content: Mapping[str, Any], shared: Mapping[str, Mapping[str, Any]] | None = None) -> Row:
+    def read(cls, content: Mapping[str, Any], shared: Mapping[str, Any] | None = None) -> Row:
         """Read what :meth:`content` returned."""
-        known = shared or {}
 
         def accuracy(name: str) -> Accuracy | None:
             return None if content[name] is None else Accuracy.read(content[name])
@@ -183,9 +258,7 @@ class Row:
             held_out=accuracy("held_out"),
             nominal=accuracy("nominal"),
             truth=accuracy("truth"),
-            parameters={
-                name: FoundParameter(**{**known.get(name, {}), **one}) for name, one in content["parameters"].items()
-            },
+            parameters=FoundParameters.read(content["parameters"], shared or {}),
             fit_status=content["fit_status"],
             notices=tuple(content["notices"]),
             seconds=content["seconds"],
@@ -194,3 +267,22 @@ class Row:
             drawn=content.get("drawn", True),
             covariance=tuple(content.get("covariance", ())),
         )
+
+
+def part_text(
+    rows: Sequence[Row], shared: Mapping[str, Any], written: Sequence[str] = (), changed: Sequence[str] = ()
+) -> str:
+    """Return robots as a part holds them, behind its first line and before its hash.
+
+    Parameters
+    ----------
+    shared
+        Columns that the parameters of all robots have, see :attr:`FoundParameters.shared`.
+    written
+        Files that were written of them, from the folder of the fleet.
+    changed
+        Robots whose files changed while they were computed: they are computed again by the next run.
+    """
+    first = to_json({"shared": shared, "written": [*written], "changed": [*changed]})
+    lines = [first, *(to_json(row.content(shared)) for row in rows)]
+    return b"\n".join([*lines, b""]).decode()

@@ -75,6 +75,8 @@ from truearm.version import __version__
 
 Train = int | Literal["all"] | None
 
+#: The step at which everything that was given has been read and found usable.
+ACCEPTED: Final = "checking the data"
 #: Every model that can be asked for by name; None chooses.
 _MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *MODELS)} | {AUTO: None}
 
@@ -273,7 +275,7 @@ def calibrate(
             )
         check_split(readings.of_configurations(training), readings.of_configurations(held_out))
 
-        progress("checking the data")
+        progress(ACCEPTED)
         steady = without_table_motion(readings)
         moved: list[Notice] = []
         if base_changes:

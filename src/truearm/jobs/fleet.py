@@ -12,10 +12,10 @@ from pathlib import Path
 from truearm.errors import InputError, refusals_of
 from truearm.executing.parts import done_parts
 from truearm.executing.workers import Given, ThisProcess, Workers, processes, with_workers
-from truearm.files import path_argument
+from truearm.files import noted_reads, path_argument
 from truearm.fleets.experiment import experiment
 from truearm.fleets.manifest import Manifest, read_manifest
-from truearm.fleets.recorded import RECORD, Recorded
+from truearm.fleets.recorded import RECORD, Known, Recorded
 from truearm.jobs.arguments import (
     command_argument,
     count_argument,
@@ -92,12 +92,19 @@ def fleet(
         make = _tasks(asked, folder.absolute())
     recorded = Recorded(folder, asked)
     recorded.check()
-    missing = asked.parts - len(recorded.done())
+    missing = recorded.missing()
+    if asked.experiment is None and missing:
+        from truearm.jobs.fleet_checks import check_folders, check_options  # with all that a calibration needs
+
+        check_folders(asked, folder)
+        progress("checking the options")
+        with refusals_of("manifest"):
+            check_options(asked)
     chosen = _workers(count, address, insecure, executor, missing) if missing else ThisProcess()
     with with_workers(chosen):
         recorded.begin()
-        with recorded.alone():
-            run = _computed(recorded, make, chosen, progress)
+        with recorded.alone() as known:
+            run = _computed(recorded, known, make, chosen, progress)
             progress("reading the parts")
             found = Fleet(recorded, run, call)
             found.write()
@@ -122,18 +129,26 @@ def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
     if asked.experiment is None:
         robots = asked.robots
         return lambda part: Task(part, __version__, robots=tuple(robots[n] for n in asked.numbers(part)), folder=folder)
-    made = pickle.dumps(experiment(asked.experiment))
+    with noted_reads() as noted:
+        made = pickle.dumps(experiment(asked.experiment))
+    for name, known in asked.hashes.items():
+        if {*noted.get((asked.file.parent / name).absolute(), ())} - {known}:
+            raise InputError("this file changed while it was read", where=name, cure="Run this again.")
     return lambda part: Task(part, __version__, made, tuple(asked.numbers(part)))
 
 
 def _computed(
-    recorded: Recorded, make: Callable[[int], Task], workers: Workers, progress: Callable[[str], None]
+    recorded: Recorded,
+    known: Known,
+    make: Callable[[int], Task],
+    workers: Workers,
+    progress: Callable[[str], None],
 ) -> Run:
     """Let workers do what is missing, and write each part as it comes."""
-    asked, known = recorded.manifest, recorded.done()
-    tasks = (make(part) for part in range(asked.parts) if part not in known)
-    told, lost = list[str](), list[int]()
-    done, failed, began = len(known), 0, time.perf_counter()
+    asked, before = recorded.manifest, len(known.done)
+    tasks = (make(part) for part in range(asked.parts) if part not in known.done)
+    told, lost = [*known.again], list[int]()
+    done, failed, began = before, 0, time.perf_counter()
 
     def tell(words: str) -> None:
         told.append(words)
@@ -147,8 +162,8 @@ def _computed(
             continue
         recorded.write(one.part.part, one.result.text)
         failed += one.result.failed
-        left = (time.perf_counter() - began) / (done - len(known)) * (asked.parts - done)
+        left = (time.perf_counter() - began) / (done - before) * (asked.parts - done)
         words = f", {counted(failed, 'robot')} failed" if failed else ""
         progress(f"part {done} of {asked.parts}{words}, about {left:.0f} s left")
     names = [name for part in sorted(lost) for name in asked.names(part)]
-    return Run(asked.parts, len(known), tuple(told), tuple(names))
+    return Run(asked.parts, before, tuple(told), tuple(names))

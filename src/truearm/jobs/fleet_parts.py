@@ -6,12 +6,15 @@ import pickle
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from truearm.errors import InputError
-from truearm.fleets.entries import RobotEntry
-from truearm.fleets.experiment import Experiment, Series
-from truearm.fleets.recorded import part_text
+from truearm.fleets.rows import part_text
+from truearm.fleets.series import Experiment, Series
 from truearm.version import __version__
+
+if TYPE_CHECKING:  # with all that a calibration needs
+    from truearm.fleets.entries import RobotEntry
 
 
 @dataclass(frozen=True)
@@ -72,12 +75,16 @@ def finished(task: Task) -> Finished:
         )
     if task.experiment is not None:
         series = _series(task.experiment)
-        rows, shared = series.rows(task.numbers), series.shared
+        rows = series.rows(task.numbers)
+        text = part_text(rows, series.shared)
     else:
-        from truearm.jobs.fleet_robots import calibrated_row  # with all that a calibration needs, only for these
+        from truearm.jobs.fleet_robots import calibrated_robot  # with all that a calibration needs, only for these
 
-        rows, shared = [calibrated_row(entry, task.folder) for entry in task.robots], {}
-    return Finished(part_text(rows, shared), sum(row.status == "failed" for row in rows))
+        done = [calibrated_robot(entry, task.folder) for entry in task.robots]
+        rows = [one.row for one in done]
+        written = [name for one in done for name in one.written]
+        text = part_text(rows, {}, written, [one.row.name for one in done if one.changed])
+    return Finished(text, sum(row.status == "failed" for row in rows))
 
 
 @lru_cache(maxsize=2)

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.files import noted_reads, read_bytes
 from truearm.fleets.entries import RobotEntry
-from truearm.fleets.rows import Accuracy, FoundParameter, Row
+from truearm.fleets.recorded import ROBOTS
+from truearm.fleets.rows import Accuracy, FoundParameter, FoundParameters, Row
 from truearm.jobs.calibrate import calibrate
 from truearm.measurement.statistics import Errors
 from truearm.modeling.parameters import PLACES, SCALE_GROUP
 from truearm.results.calibration import Calibration
 
-#: Folder of a fleet for the folders of its robots.
-ROBOTS: Final = "robots"
 #: Decimals of a covariance in priors: what a combination of two parameters is known by is seen to a hundredth of a
 #: micrometre where each alone is known to a millimetre.
 _DECIMALS: Final = 10
@@ -25,7 +28,26 @@ _DECIMALS: Final = 10
 _OF_CAMPAIGN: Final = (*PLACES, SCALE_GROUP)
 
 
-def calibrated_row(entry: RobotEntry, folder: Path | None = None) -> Row:
+@dataclass(frozen=True)
+class Done:
+    """What was done with a robot that was measured.
+
+    Attributes
+    ----------
+    row
+        What was found.
+    written
+        Files that were written, from the folder of the fleet.
+    changed
+        Whether its files are others than those that the manifest meant: then the row says nothing but that.
+    """
+
+    row: Row
+    written: tuple[str, ...] = ()
+    changed: bool = False
+
+
+def calibrated_robot(entry: RobotEntry, folder: Path | None = None) -> Done:
     """Calibrate a robot that was measured; what cannot be calibrated is a row too, with the reason.
 
     Parameters
@@ -42,17 +64,42 @@ def calibrated_row(entry: RobotEntry, folder: Path | None = None) -> Row:
     began = time.perf_counter()
     said = {"date": entry.date, "serial": entry.of}
     notes = {name: text for name, text in said.items() if text is not None}
-    message = None
-    try:
-        made = calibrate(entry.robot, entry.data, notes=notes or None, **entry.options)
-    except InputError as error:
-        message = str(error)
-    except (ArithmeticError, ValueError, LookupError) as error:  # LinAlgError is a ValueError
-        message = f"the calibration failed ({type(error).__name__}: {error})"
+    message, changed = None, None
+    with noted_reads() as noted:
+        try:
+            made = calibrate(entry.robot, entry.data, notes=notes or None, **entry.options)
+        except InputError as error:
+            message = str(error)
+        except (ArithmeticError, ValueError, LookupError) as error:  # LinAlgError is a ValueError
+            message = f"the calibration failed ({type(error).__name__}: {error})"
+    changed = _changed(entry, noted)
+    if changed is not None:
+        message = f"{changed.name} changed while the fleet ran; start it again"
     if message is not None:
-        return Row(entry.name, "failed", message, entry.of, entry.date, seconds=time.perf_counter() - began)
+        row = Row(entry.name, "failed", message, entry.of, entry.date, seconds=time.perf_counter() - began)
+        return Done(row, changed=changed is not None)
+    written = []
     if folder is not None:  # a folder that cannot be written to is no fault of the robot
-        made.save(folder / ROBOTS / entry.name)
+        written = [path.relative_to(folder).as_posix() for path in made.save(folder / ROBOTS / entry.name)]
+    return Done(_row(entry, made, began), tuple(written))
+
+
+def _changed(entry: RobotEntry, noted: Mapping[Path, Sequence[str]]) -> Path | None:
+    """Return a file whose content, as it was read, is not the one that the manifest meant."""
+    for path, known in entry.hashes.items():
+        if not noted.get(path):
+            try:
+                seen = [hashlib.sha256(read_bytes(path)).hexdigest()]
+            except InputError:
+                return path
+        else:
+            seen = [*noted[path]]
+        if {*seen} != {known}:
+            return path
+    return None
+
+
+def _row(entry: RobotEntry, made: Calibration, began: float) -> Row:
     names, covariance = _own(made)
     found = made.fit.robot.parameters
     return Row(
@@ -63,10 +110,12 @@ def calibrated_row(entry: RobotEntry, folder: Path | None = None) -> Row:
         entry.date,
         held_out=_accuracy(made.validation),
         nominal=_accuracy(made.nominal),
-        parameters={
-            p.name: FoundParameter(p.unit, p.value, p.deviation or 0.0, p.nominal, p.prior)
-            for p in (found[name] for name in names)
-        },
+        parameters=FoundParameters.of(
+            {
+                p.name: FoundParameter(p.unit, p.value, p.deviation or 0.0, p.nominal, p.prior)
+                for p in (found[name] for name in names)
+            }
+        ),
         fit_status=made.status.value,
         notices=tuple(notice.code for notice in made.warnings),
         seconds=time.perf_counter() - began,

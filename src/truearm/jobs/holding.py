@@ -48,6 +48,7 @@ def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Datas
             came=str(frames),
             cure="Say with `hold` what is known: base, targets, fixtures, or names.",
         )
+    base, targets, fixtures = _named(hold, data)
     if frames is None:
         raise InputError(
             "what is held has no numbers",
@@ -55,7 +56,6 @@ def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Datas
             came=", ".join(hold),
             cure="Give its places in a file with `frames`.",
         )
-    base, targets, fixtures = _named(hold, data)
     with refusals_of("frames"):
         path = path_argument(frames, "frames")
         tools, places = read_known_places(robot, path)

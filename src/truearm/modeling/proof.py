@@ -16,15 +16,15 @@ from truearm.units import SHOWN_AS, from_si, to_si
 #: Digits of deviations, and decimals of the rows of the factor: a prediction changes by less than a thousandth of its
 #: own deviation.
 _DIGITS: Final = 9
-_DECIMALS: Final = 7
+DECIMALS: Final = 7
 #: How a proof says that the base was known, or by targets on it all of the flange's pose.
 BASE: Final = "base"
 FLANGE: Final = "flange"
 HELD: Final = (BASE, FLANGE)
 #: Measured joint positions that are kept, and their decimals in deg or mm.
 MOST_MEASURED: Final = 1000
-_POSITION_DECIMALS: Final = 3
-_LOAD_DECIMALS: Final = 6
+_POSITIONDECIMALS: Final = 3
+_LOADDECIMALS: Final = 6
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class Proof:
                 for d, unit in zip(deviation.tolist(), units, strict=True)
             ),
             tuple(
-                tuple(round(v, _DECIMALS) + 0.0 for v in row[: number + 1])
+                tuple(round(v, DECIMALS) + 0.0 for v in row[: number + 1])
                 for number, row in enumerate(_factor(covariance, deviation).tolist())
             ),
             lower_bound,
@@ -135,7 +135,7 @@ class Proof:
                 tuple(to_si(float(position_text(v, u)), u) for v, u in zip(row, joint_units, strict=True))
                 for row in _some(measured)
             ),
-            loads=tuple((round(low, _LOAD_DECIMALS) + 0.0, round(high, _LOAD_DECIMALS) + 0.0) for low, high in loads),
+            loads=tuple((round(low, _LOADDECIMALS) + 0.0, round(high, _LOADDECIMALS) + 0.0) for low, high in loads),
         )
 
     def summary(self) -> dict[str, Any]:
@@ -159,7 +159,7 @@ class Proof:
 
 def position_text(value: float, unit: str) -> str:
     """Return a measured joint position [rad or m] as a file holds it, in deg or mm."""
-    text = f"{from_si(value, unit):.{_POSITION_DECIMALS}f}"
+    text = f"{from_si(value, unit):.{_POSITIONDECIMALS}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 

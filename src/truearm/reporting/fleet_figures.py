@@ -26,6 +26,12 @@ _BINS: Final = 40
 _MOST_MARKS: Final = 300
 #: Informed share from which on a parameter is drawn: two that are told together have half each.
 _TOLD: Final = 0.4
+#: Legends of many entries, where no toolbar comes to lie upon them.
+_BELOW: Final = {"orientation": "h", "x": 0, "y": 0, "yref": "container", "xanchor": "left", "yanchor": "bottom"}
+#: A value so many times as far out as the others is not drawn at its place, but at the edge.
+_FAR: Final = 4.0
+#: Robots beyond a picture that are named.
+_NAMED: Final = 3
 #: Largest error over smallest beyond which an axis is logarithmic.
 _LOGARITHMIC: Final = 15.0
 
@@ -89,7 +95,9 @@ def accuracy_figure(found: Analysis) -> Figure:
 
 def histogram_figure(errors: Errors) -> Figure:
     """Show how many calibrated robots have which mean error."""
-    values = errors.mean * 1e3
+    whole = errors.mean * 1e3
+    end = _FAR * float(np.median(whole))
+    values, beyond = whole[whole <= end], np.flatnonzero(whole > end)
     bins = min(_BINS, max(5, int(np.sqrt(len(values)) * 2)))
     low, high = float(values.min()), float(values.max())
     edges = np.linspace(low, high if high > low else low * 1.01 + 1e-9, bins + 1)
@@ -105,7 +113,25 @@ def histogram_figure(errors: Errors) -> Figure:
         "hovertemplate": "%{customdata}: %{y} robots<extra></extra>",
     }
     x = axis("mean held-out error of a calibrated robot [mm]")
-    return figure([trace], 300, xaxis=x, yaxis=axis("robots"), bargap=0)
+    words = []
+    if len(beyond):
+        worst = beyond[np.argsort(-whole[beyond])]
+        told = ", ".join(f"{html.escape(errors.names[i])} {significant(whole[i])} mm" for i in worst[:_NAMED].tolist())
+        more = f" and {len(beyond) - _NAMED} more" if len(beyond) > _NAMED else ""
+        words = [
+            {
+                "text": f"beyond: {told}{more}",
+                "xref": "paper",
+                "yref": "paper",
+                "x": 0,
+                "y": 1.02,
+                "xanchor": "left",
+                "yanchor": "bottom",
+                "showarrow": False,
+                "font": {"color": _ALARM},
+            }
+        ]
+    return figure([trace], 300, xaxis=x, yaxis=axis("robots"), bargap=0, annotations=words)
 
 
 def _drawn(found: KindFound) -> NDArray[np.intp]:
@@ -122,9 +148,14 @@ def parameters_figure(found: KindFound) -> Figure:
     names = [html.escape(kind.parameters[i]) for i in chosen.tolist()]
     robots = [html.escape(kind.names[i]) for i in rows.tolist()]
     traces: list[Figure] = []
-    if len(rows) <= _EACH // 4:
+    each = len(rows) <= _EACH // 4
+    edge = _edge(values)
+    shown = np.clip(values, -edge, edge)
+    if each:
         for row, robot in enumerate(robots):
-            those = [(n, v) for n, v in zip(names, values[row].tolist(), strict=True) if np.isfinite(v)]
+            those = [
+                (n, v) for n, v in zip(names, values[row].tolist(), strict=True) if np.isfinite(v) and abs(v) <= edge
+            ]
             traces.append(
                 {
                     "type": "scatter",
@@ -149,28 +180,70 @@ def parameters_figure(found: KindFound) -> Figure:
                 "showlegend": False,
             }
         )
-    at = {(kind.names[int(r)], kind.parameters[c]): (i, j) for i, r in enumerate(rows) for j, c in enumerate(chosen)}
-    marks = [(one, at[one.robot, one.parameter]) for one in found.differences[:_MOST_MARKS]]
+    row_of = {kind.names[row]: place for place, row in enumerate(rows.tolist())}
+    column_of = {kind.parameters[column]: place for place, column in enumerate(chosen.tolist())}
+    marks = [(one, (row_of[one.robot], column_of[one.parameter])) for one in found.differences[:_MOST_MARKS]]
     if marks:
+        sizes = [values[place] for _, place in marks]
         traces.append(
             {
                 "type": "scatter",
                 "mode": "markers",
                 "name": "differs",
                 "x": [html.escape(one.parameter) for one, _ in marks],
-                "y": rounded(np.array([values[place] for _, place in marks]), 4),
+                "y": rounded(np.array([shown[place] for _, place in marks]), 4),
                 "text": [html.escape(one.robot) for one, _ in marks],
-                "marker": {"size": 11, "color": _ALARM, "symbol": "diamond"},
-                "hovertemplate": "%{text}, %{x}: %{y} of its prior<extra></extra>",
+                "customdata": rounded(np.array(sizes), 4),
+                "marker": {
+                    "size": 11,
+                    "color": _ALARM,
+                    "symbol": [_symbol(size, edge) for size in sizes],
+                },
+                "hovertemplate": "%{text}, %{x}: %{customdata} of its prior<extra></extra>",
             }
         )
+    marked = {place for _, place in marks}
+    out = [(i, j) for i, j in np.argwhere(np.abs(values) > edge).tolist() if each or (i, j) in marked]
+    unmarked = [place for place in out if place not in marked]
+    if unmarked:
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "x": [names[j] for _, j in unmarked],
+                "y": rounded(np.array([shown[i, j] for i, j in unmarked]), 4),
+                "text": [robots[i] for i, _ in unmarked],
+                "customdata": rounded(np.array([values[i, j] for i, j in unmarked]), 4),
+                "marker": {"size": 9, "color": AFTER, "symbol": [_symbol(values[i, j], edge) for i, j in unmarked]},
+                "hovertemplate": "%{text}, %{x}: %{customdata} of its prior<extra></extra>",
+                "showlegend": False,
+            }
+        )
+    far = list(dict.fromkeys(robots[i] for i, _ in sorted(out, key=lambda at: -abs(values[at[0], at[1]]))))
+    title = "difference from nominal [priors]"
+    if far:
+        more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
+        title = f"{title}<br>triangles: beyond ({', '.join(far[:_NAMED])}{more})"
     return figure(
         traces,
         420,
         xaxis=axis("parameter") | {"type": "category", "tickangle": -60},
-        yaxis=axis("difference from nominal [priors]"),
+        yaxis=axis(title),
         showlegend=bool(marks),
     )
+
+
+def _edge(values: NDArray[np.float64]) -> float:
+    """Return how far out values are drawn at their places: as most of them need, so that one does not hide the rest."""
+    sizes = np.sort(np.abs(values[np.isfinite(values)]))
+    usual = max(float(np.quantile(sizes, 0.75)), 1.0) if len(sizes) else 1.0
+    return _FAR * usual if len(sizes) and sizes[-1] > _FAR**2 * usual else np.inf
+
+
+def _symbol(value: float, edge: float) -> str:
+    if abs(value) <= edge:
+        return "diamond"
+    return "triangle-up" if value > 0.0 else "triangle-down"
 
 
 def spread_figure(found: KindFound) -> Figure:
@@ -262,10 +335,11 @@ def drift_figure(changes: list[Drift]) -> Figure:
         )
     return figure(
         traces,
-        360,
+        380,
         xaxis=axis("months after the first campaign"),
         yaxis=axis(f"change since then [{unit}]"),
         showlegend=True,
+        legend=_BELOW,
     )
 
 

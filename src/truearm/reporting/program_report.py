@@ -166,7 +166,7 @@ def _flat_view(points: Array) -> _View | None:
     if len(points) < 3:
         return None
     away = points - points.mean(axis=0)
-    _, spread, directions = np.linalg.svd(away, full_matrices=True)
+    _, spread, directions = np.linalg.svd(away, full_matrices=False)
     normal = directions[2]
     if len(spread) > 1 and spread[1] < 1e-6 * spread[0]:  # on a line: the plane that is level across it
         normal = np.array([0.0, 0.0, 1.0]) - directions[0][2] * directions[0]

@@ -54,7 +54,7 @@ def proof_of(
     repeated = [notice for notice in warnings if notice.code == _REPEATED]
     lower_bound = expected.lower_bound
     held = [*held_by(fit)]
-    names, root = uncertain_names(fit), covariance_root(fit, fit.covariance)
+    names, root = uncertain_names(fit), covariance_root(fit, fit.covariance_with_unfitted)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
     measured = training.joints.tolist()

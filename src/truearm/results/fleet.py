@@ -5,15 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.fleets.analysis.analysis import Analysis, analysed
+from truearm.files import exists
+from truearm.fleets.analysis.analysis import ACCURACIES, Analysis, analysed
 from truearm.fleets.analysis.priors import with_proposed
-from truearm.fleets.recorded import Recorded
-from truearm.fleets.rows import Accuracy
+from truearm.fleets.recorded import ROBOTS, Recorded
+from truearm.fleets.rows import Accuracy, Row
 from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
@@ -98,16 +100,53 @@ class Fleet(Record):
                     "robots-in-error",
                     f"The {'result' if len(wrong) == 1 else 'results'} of {counted(len(wrong), 'robot')} "
                     f"({listed([look.robot for look in wrong])}) should not be used: calibrated alone, each ends "
-                    "with an error. The figures of the series contain them. Look at their reports first, mend their "
-                    "data and run this again with another folder.",
+                    "with an error. No figure of the series contains them. Look at their reports first, mend their "
+                    "data or options, and run this again.",
+                )
+            )
+        if len(failed) + len(self.analysis.left_out) == self.analysis.measurements:
+            found.append(
+                Notice(
+                    "no-result",
+                    f"None of {counted(self.analysis.measurements, 'robot')} has a result that can be used. Mend what "
+                    "their messages name, and run this again.",
+                    "error",
+                )
+            )
+        outdated = self._outdated()
+        if outdated:
+            found.append(
+                Notice(
+                    "robots-outdated",
+                    f"{listed(outdated)} could not be calibrated, and what an earlier run wrote of it stands below "
+                    f"{ROBOTS}: remove these folders, or do not use them.",
                 )
             )
         return (*found, *analysis_notices(self.analysis))
 
+    def _outdated(self) -> list[str]:
+        """Return the robots that could not be calibrated and have a folder from before."""
+        if self.recorded.manifest.experiment is not None:
+            return []
+        folder = self.recorded.folder / ROBOTS
+        return [name for name, _ in self.analysis.failed if exists(folder / name)]
+
     @cached_property
     def analysis(self) -> Analysis:
-        """What the fleet says, of all rows, read once."""
-        return analysed(self.recorded.rows())
+        """What the fleet says, of all rows."""
+        return self._read[0]
+
+    @cached_property
+    def _read(self) -> tuple[Analysis, list[_Line]]:
+        """What the fleet says, and what its table has of each robot: the parts are read once."""
+        lines: list[_Line] = []
+
+        def rows() -> Iterator[Row]:
+            for row in self.recorded.rows():
+                lines.append(_Line.of(row))
+                yield row
+
+        return analysed(rows()), lines
 
     @cached_property
     def proposed(self) -> tuple[Robot, tuple[str, ...]] | None:
@@ -175,21 +214,11 @@ class Fleet(Record):
         figures = [f"{kind} {figure} [mm]" for kind in kinds for figure in ("mean", "max")]
         table.writerow(["name", "of", "date", "status", "fit", *figures, "errors", "look", "message"])
         looks = {look.robot: look.reasons for look in self.analysis.looks}
-        for row in self.recorded.rows():
-            errors = [getattr(row, kind) for kind in kinds]
-            table.writerow(
-                [
-                    row.name,
-                    row.of or "",
-                    row.date or "",
-                    row.status,
-                    row.fit_status or "",
-                    *("" if v != v else f"{v * 1e3:.6f}" for a in errors for v in _mean_and_max(a)),
-                    " ".join(row.errors),
-                    " ".join(reason.why.replace(" ", "-") for reason in looks.get(row.name, ())),
-                    row.message,
-                ]
-            )
+        for one in self._read[1]:
+            reasons = " ".join(reason.why.replace(" ", "-") for reason in looks.get(one.name, ()))
+            errors = [_mean_and_max(one.errors.get(kind)) for kind in kinds]
+            figures = [f"{v * 1e3:.6f}" if v is not None else "" for pair in errors for v in pair]
+            table.writerow([*one.begin, *figures, one.codes, reasons, one.message])
         return stream.getvalue()
 
     def write(self) -> tuple[Path, ...]:
@@ -212,5 +241,30 @@ class Fleet(Record):
         return tuple(folder / name for name in files)
 
 
-def _mean_and_max(errors: Accuracy | None) -> tuple[float, float]:
-    return (float("nan"),) * 2 if errors is None else (errors.mean, errors.max)
+def _mean_and_max(errors: Accuracy | None) -> tuple[float | None, float | None]:
+    return (None, None) if errors is None else (errors.mean, errors.max)
+
+
+@dataclass(frozen=True)
+class _Line:
+    """What the table has of a robot."""
+
+    begin: tuple[str, ...]
+    errors: Mapping[str, Accuracy]
+    codes: str
+    message: str
+
+    @property
+    def name(self) -> str:
+        """Of the robot."""
+        return self.begin[0]
+
+    @classmethod
+    def of(cls, row: Row) -> _Line:
+        """Take it from what was found."""
+        return cls(
+            (row.name, row.of or "", row.date or "", row.status, row.fit_status or ""),
+            {kind: found for kind in ACCURACIES if (found := getattr(row, kind)) is not None},
+            " ".join(row.errors),
+            row.message,
+        )

@@ -75,6 +75,9 @@ def accuracy_lines(found: Analysis) -> list[str]:
         told = [quantile_words(one, count) for one in errors.of_means if one.value is not None]
         worst = f"the worst {errors.mean.max() * 1e3:.3f} mm"
         text.append(f"{ERRORS_OF[name]}, mean error: {', '.join([*told, worst])}.")
+    if found.left_out:
+        out = f"{counted(len(found.left_out), 'robot')} ({listed(found.left_out)})"
+        text.append(f"Left out of all figures, because their results end with an error: {out}.")
     if found.failed:
         low, high = (100.0 * end for end in found.failing)
         text.append(
@@ -266,6 +269,7 @@ def analysis_summary(found: Analysis) -> dict[str, Any]:
     return {
         "measurements": found.measurements,
         "machines": found.machines,
+        "left_out": [*found.left_out],
         "failing_95": [*found.failing] if found.measurements else None,
         "errors_mm": {name: _errors_summary(errors) for name, errors in found.errors.items()},
         "kinds": [_kind_summary(kind) for kind in found.kinds],

@@ -163,6 +163,15 @@ def _contact(robot: Robot) -> Contact:
     return "document" if any(isinstance(effect, LinearContactClearance) for effect in robot.effects) else "exact"
 
 
+def carrying_targets(robot: Robot) -> Robot:
+    """Return a robot with its own targets, else with those of its tool: the file's first, or three reflectors."""
+    if robot.targets:
+        return robot
+    tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
+    carrying = robot.with_payload(Payload(tool.mass, tool.cog)) if robot.payload == NO_PAYLOAD else robot
+    return carrying.with_frames(robot.base, tool.targets)
+
+
 def at_station(robot: Robot, tool: Tool) -> Robot:
     """Return a robot with its base as it is, seen from the station, carrying a tool.
 

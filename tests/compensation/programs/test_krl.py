@@ -482,7 +482,7 @@ def test_many_targets() -> None:
 PIECES = [*"{}[]()\"';:,=.#$&\r\n 019eEXA", "PTP ", "DECL ", "END\n", "FP1", "XP1", "$TOOL=", "CIRC", "WITH "]
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_damaged_programs_are_read_or_refused(data: st.DataObject) -> None:
     sources = sample(*CELL)

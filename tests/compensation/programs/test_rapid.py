@@ -488,7 +488,7 @@ def test_a_truncated_program_is_refused_wherever_it_ends() -> None:
             RAPID.read([replace(source, text=source.text[:stop])])
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_no_text_breaks_the_reader(data: st.DataObject) -> None:
     (source,) = sources("polish.mod")

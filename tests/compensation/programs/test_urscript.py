@@ -517,7 +517,7 @@ def test_truncated_files_are_refused_or_read(path: Path) -> None:
     assert refused > 0.6 * len(text) / 41
 
 
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 @given(
     name=st.sampled_from(sorted(path.name for path in SAMPLES.iterdir())),
     at=st.floats(0, 1),

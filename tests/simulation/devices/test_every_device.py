@@ -340,29 +340,26 @@ def test_a_robot_of_three_joints_is_calibrated_or_refused(name: str) -> None:
 def covered(name: str) -> tuple[int, int]:
     """Return how many of the well determined parameters lie in their stated 95 % intervals, and how many there are."""
     within = counted = 0
-    for twin, data in (
-        read_by(name, sigma=None),
-        read_by(name, count=50, sigma=None, seed=101),
-    ):
-        fit = identify(nominal("irb120"), data, GEOMETRIC)
-        assert fit.excess == 1.0
-        for p in fit.robot.parameters.values():
-            if p.group in ("geometry", "joint zero") and p.informed is not None and p.informed > 0.5:
-                assert p.deviation is not None
-                counted += 1
-                within += abs(p.value - twin.robot.values[p.name]) < 1.96 * p.deviation
+    twin, data = read_by(name, sigma=None)
+    fit = identify(nominal("irb120"), data, GEOMETRIC)
+    assert fit.excess == 1.0
+    for p in fit.robot.parameters.values():
+        if p.group in ("geometry", "joint zero") and p.informed is not None and p.informed > 0.5:
+            assert p.deviation is not None
+            counted += 1
+            within += abs(p.value - twin.robot.values[p.name]) < 1.96 * p.deviation
     return within, counted
 
 
 def test_stated_intervals_hold_the_truth_as_often_as_they_say() -> None:
-    """Over all devices: 550 parameters of 36 robots; those of one robot go together, so 3 % either way is chance."""
+    """Over all devices: 300 parameters of 19 robots; those of one robot go together, so 4 % either way is chance."""
     found = {name: covered(name) for name in NAMES}
     for name, (within, counted) in found.items():
-        assert counted > 25, name
-        assert within >= 0.8 * counted, name
+        assert counted > 12, name
+        assert within >= 0.75 * counted, name
     within, counted = np.sum(list(found.values()), axis=0).tolist()
-    assert counted > 450
-    assert 0.92 <= within / counted <= 0.98
+    assert counted > 230
+    assert 0.91 <= within / counted <= 0.99
 
 
 # -- refusals ----------------------------------------------------------------------------------------------

@@ -23,16 +23,19 @@ ACCURACIES: Final = ("nominal", "held_out", "truth")
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors of robots, one machine an entry, by its last measurement [m].
+    """Errors of robots, one machine an entry, by its last measurement that can be used [m].
 
     Attributes
     ----------
     mean, largest
         Over the configurations of each robot that its calibration has not seen, ``(machines,)``.
+    names
+        Of these measurements.
     """
 
     mean: Array
     largest: Array
+    names: tuple[str, ...]
 
     @property
     def of_means(self) -> tuple[Quantile, ...]:
@@ -65,6 +68,8 @@ class Analysis:
         How many there are.
     failed
         Names of those that could not be calibrated, with the reason.
+    left_out
+        Names of those whose result should not be used as it is: nothing of it is in the figures.
     errors
         By what they are of, see :data:`ACCURACIES`; those that were not judged are left out.
     kinds
@@ -76,6 +81,7 @@ class Analysis:
     measurements: int
     machines: int
     failed: tuple[tuple[str, str], ...]
+    left_out: tuple[str, ...]
     errors: Mapping[str, Errors]
     kinds: tuple[KindFound, ...]
     looks: tuple[Look, ...]
@@ -92,22 +98,26 @@ class Analysis:
 
 
 def analysed(rows: Iterable[Row]) -> Analysis:
-    """Return what a fleet says."""
+    """Return what a fleet says; a result that ends with an error is named and has no part in any figure."""
     kinds: dict[str, Gathered] = {}
     judged: list[Judged] = []
-    last: dict[str, tuple[float, dict[str, Accuracy]]] = {}
+    last: dict[str, tuple[float, str, dict[str, Accuracy]]] = {}
     count = 0
     machines = set()
     for row in rows:
         count += 1
         machines.add(row.machine)
-        kinds.setdefault(row.robot, Gathered(row.robot)).add(row)
         judged.append(Judged.of(row))
+        if row.errors:
+            continue
+        if row.robot not in kinds:
+            kinds[row.robot] = Gathered(row.robot)
+        kinds[row.robot].add(row)
         known = {name: accuracy for name in ACCURACIES if (accuracy := getattr(row, name)) is not None}
         day = day_of(row.date)
         when = -np.inf if np.isnan(day) else day
         if known and (row.machine not in last or when >= last[row.machine][0]):
-            last[row.machine] = (when, known)
+            last[row.machine] = (when, row.name, known)
     found = []
     for kind in sorted((g.kind for g in kinds.values() if g.names), key=lambda kind: -len(kind.names)):
         differing = differences(kind)
@@ -116,7 +126,8 @@ def analysed(rows: Iterable[Row]) -> Analysis:
         measurements=count,
         machines=len(machines),
         failed=tuple((one.name, one.message) for one in judged if one.message),
-        errors=_errors([known for _, known in last.values()]),
+        left_out=tuple(one.name for one in judged if one.errors),
+        errors=_errors([(name, known) for _, name, known in last.values()]),
         kinds=tuple(found),
         looks=first_looks(
             judged,
@@ -126,10 +137,11 @@ def analysed(rows: Iterable[Row]) -> Analysis:
     )
 
 
-def _errors(known: list[dict[str, Accuracy]]) -> dict[str, Errors]:
+def _errors(known: list[tuple[str, dict[str, Accuracy]]]) -> dict[str, Errors]:
     made = {}
-    for name in ACCURACIES:
-        those = [one[name] for one in known if name in one]
+    for kind in ACCURACIES:
+        those = [(name, one[kind]) for name, one in known if kind in one]
         if those:
-            made[name] = Errors(np.array([one.mean for one in those]), np.array([one.max for one in those]))
+            mean, largest = np.array([(one.mean, one.max) for _, one in those]).T
+            made[kind] = Errors(mean, largest, tuple(name for name, _ in those))
     return made

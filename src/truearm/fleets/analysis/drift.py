@@ -54,7 +54,8 @@ class Drift:
     months
         From the first to the last.
     slope, low, high
-        Change in a month with its interval of 95 %.
+        Change in a month with its interval, in which the true ones of all comparisons together lie in 95 % of fleets:
+        it holds no zero where the change is more than chance.
     times
         The slope in its deviations.
     chance
@@ -327,11 +328,17 @@ def _covariances(kind: Kind, rows: NDArray[np.intp]) -> Array:
 
 
 def _with_chances(lines: list[Drift], compared: int) -> list[Drift]:
-    from scipy.special import ndtr
+    """Return changes with their chances, and intervals that hold for all comparisons together (Bonferroni)."""
+    from scipy.special import ndtr, ndtri
 
     times = np.array([one.times for one in lines])
     chances = np.minimum(2.0 * ndtr(-np.abs(times)) * compared, 1.0)
-    return [replace(one, chance=chance) for one, chance in zip(lines, chances.tolist(), strict=True)]
+    reach = float(-ndtri(FALSE_ALARMS / (2.0 * max(compared, 1))))
+    made = []
+    for one, chance in zip(lines, chances.tolist(), strict=True):
+        half = reach / _Z * (one.high - one.slope)
+        made.append(replace(one, chance=chance, low=one.slope - half, high=one.slope + half))
+    return made
 
 
 def _alike(slopes: Mapping[str, Sequence[float]], units: Mapping[str, str]) -> tuple[AllDrift, ...]:

@@ -124,7 +124,7 @@ def first_looks(
     def add(robot: str, reason: Reason) -> None:
         reasons.setdefault(robot, []).append(reason)
 
-    means = np.array([one.mean for one in judged])
+    means = np.array([float("nan") if one.errors else one.mean for one in judged])
     limit = _limit(means)
     median = float(np.nanmedian(means)) if np.isfinite(means).any() else 0.0
     last = {one.machine: one.name for one in judged}
@@ -138,7 +138,7 @@ def first_looks(
             add(one.name, Reason("unsound", codes=(one.fit_status or "",)))
         if one.mean > one.before * (1.0 + 1e-9):  # False for NaN
             add(one.name, Reason("not better", error=one.mean, beside=one.before))
-        if one.mean > limit:
+        if one.mean > limit and not one.errors:
             add(one.name, Reason("inaccurate", error=one.mean, beside=median))
     differing: dict[str, list[Difference]] = {}
     for difference in differences:

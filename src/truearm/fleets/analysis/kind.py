@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.fleets.rows import Row
+from truearm.fleets.rows import FoundParameters, Row
 from truearm.modeling.chain import Array
 
 #: Informed share from which on a parameter is determined, and below which nothing but its prior holds it.
@@ -29,6 +29,8 @@ UNINFORMED: Final = 0.05
 _SAME: Final = 1e-9
 #: Correlation beyond which two shared parameters are named together.
 _TOGETHER: Final = 0.5
+#: Robots that wait to be made arrays of.
+_AT_ONCE: Final = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +130,7 @@ def day_of(text: str | None) -> float:
 
 
 class Gathered:
-    """Robots of one kind, taken up one after the other: only their figures are kept."""
+    """Robots of one kind, taken up one after the other: only their figures are kept, as arrays."""
 
     def __init__(self, robot: str) -> None:
         self.robot = robot
@@ -137,34 +139,47 @@ class Gathered:
         self._days: list[float] = []
         self._drawn: list[bool] = []
         self._units: dict[str, str] = {}
-        self._places: dict[tuple[str, ...], list[int]] = {}
-        self._found: list[tuple[list[int], Array]] = []
+        self._waiting: dict[tuple[str, ...], list[tuple[int, FoundParameters]]] = {}
+        self._found: list[tuple[list[int], list[int], Array]] = []
         self._covariances: list[tuple[float, ...]] = []
 
     def add(self, row: Row) -> None:
         """Take up a robot; one that was not calibrated has nothing to compare."""
         if row.status != "calibrated" or not row.parameters:
             return
+        waiting = self._waiting.setdefault(row.parameters.name, [])
+        waiting.append((len(self.names), row.parameters))
         self.names.append(row.name)
         self._machines.append(row.machine)
         self._days.append(day_of(row.date))
         self._drawn.append(row.drawn)
-        names = tuple(row.parameters)
-        if names not in self._places:
-            for name, one in row.parameters.items():
-                self._units.setdefault(name, one.unit)
-            place = {name: number for number, name in enumerate(self._units)}
-            self._places[names] = [place[name] for name in names]
-        figures = [(p.value, p.nominal, p.deviation, p.prior) for p in row.parameters.values()]
-        self._found.append((self._places[names], np.array(figures)))
         self._covariances.append(row.covariance)
+        if len(waiting) == _AT_ONCE:
+            self._take(row.parameters.name)
+
+    def _take(self, names: tuple[str, ...]) -> None:
+        """Make an array of what waits of robots with the same parameters."""
+        waiting = self._waiting.pop(names)
+        for name, unit in zip(names, waiting[0][1].unit, strict=True):
+            self._units.setdefault(name, unit)
+        known = {name: number for number, name in enumerate(self._units)}
+        columns = [
+            [getattr(found, kind) for _, found in waiting] for kind in ("value", "nominal", "deviation", "prior")
+        ]
+        figures = np.stack([np.array(column) for column in columns], axis=2)
+        self._found.append(([number for number, _ in waiting], [known[name] for name in names], figures))
 
     @property
     def kind(self) -> Kind:
         """All of them as arrays."""
+        for names in [*self._waiting]:
+            self._take(names)
         figures = np.full((len(self.names), len(self._units), 4), np.nan)
-        for number, (places, one) in enumerate(self._found):
-            figures[number, places] = one
+        places: list[list[int]] = [[]] * len(self.names)
+        for rows, columns, found in self._found:
+            figures[np.ix_(rows, columns)] = found
+            for number in rows:
+                places[number] = columns
         value, nominals, deviation, priors = np.moveaxis(figures, 2, 0)
         drawn = np.array(self._drawn)
         share = (deviation / priors) ** 2
@@ -183,8 +198,8 @@ class Gathered:
             informed=np.where(drawn[:, None], np.maximum(1.0 - share, 0.0), 1.0 / (1.0 + share)),
             drawn=drawn,
             covariances=tuple(
-                _whole(covariance, places, len(self._units))
-                for covariance, (places, _) in zip(self._covariances, self._found, strict=True)
+                _whole(covariance, of_row, len(self._units))
+                for covariance, of_row in zip(self._covariances, places, strict=True)
             ),
         )
 

@@ -23,6 +23,7 @@ from truearm.measurement.thinning import PARAMETERS_OF_A_PLACE, equations_of, ev
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.effects.joint_curve import JointCurve
+from truearm.modeling.effects.transmission import TransmissionError
 from truearm.modeling.loads import has_weight
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
@@ -46,6 +47,8 @@ def closed_because(robot: Robot, data: Dataset, name: str) -> str | None:
     """Return why an effect cannot be tried, None if it can."""
     effect = next(effect for effect in EFFECTS if effect.name == name)
     if not effect(robot.layout).parameters:
+        if name == TransmissionError.name and any(joint.kind == "revolute" for joint in robot.joints):
+            return "the robot file gives no joint a number of periods"
         return "the robot has nothing that it moves"
     if effect.ordered and (data.approach is None or data.number is None):
         return "the order of measurement is not known"
@@ -99,7 +102,7 @@ class CurveColumns:
     others: int
 
     def scaled(self, without: int | None = None) -> Array | None:
-        """Return the columns per prior, ``(rows, k)``; None where the data show no curve.
+        """Return the columns per prior, ``(rows, k)``; None where the data show no curve, or not how large it is.
 
         The priors are the likeliest ones, band by band: so few numbers say little of the readings that they were found
         from. Those of single lines would be praised for what they took from the folds that are held out.
@@ -127,7 +130,10 @@ class CurveColumns:
             kept[without + 1] = False
         moments = moments_without(self.moments[kept].sum(axis=0), self.others)
         rows = float(self.rows[kept].sum())
-        return curve_variances(moments, rows, self.joint, self.period, most=LARGEST).variance
+        try:
+            return curve_variances(moments, rows, self.joint, self.period, most=LARGEST).variance
+        except np.linalg.LinAlgError:  # the likelihood has no maximum: what is left over is next to nothing
+            return np.zeros(len(self.joint))
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,6 +116,22 @@ class Selection:
         passed_over = (*self.passed_over, (self.model.effects, status))
         return replace(self, model=model, smaller=tuple(smaller), candidates=candidates, passed_over=passed_over)
 
+    def without_curves(self) -> Selection:
+        """Return the choice without joint curves, because a fit to all readings gave no joint one."""
+        curve, fourier = "joint-curve", "fourier"
+        model = model_with([name for name in self.model.effects if name != curve], (*self.model.tried, curve))
+        reasons = {
+            curve: "the fit to all training readings gave no joint a curve",
+            fourier: "it was not looked at apart from the curves",
+        }
+        candidates = tuple(
+            replace(one, taken=False, reason=reasons[one.effect])
+            if one.effect == curve or (one.effect == fourier and not one.taken and one.gain is None)
+            else one
+            for one in self.candidates
+        )
+        return replace(self, model=model, candidates=candidates)
+
 
 def with_lines(robot: Robot, lines: Sequence[PeriodicError]) -> Robot:
     """Return a robot whose gears err as often in a turn as was found."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from truearm.identification.choosing.choice import ORDERED, Selection
+from truearm.identification.choosing.search import CURVE
 from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, Status, identify
@@ -37,7 +38,7 @@ def identify_chosen(
     """Identify a robot with the model that was chosen.
 
     Where that ends in ``rank-loss`` or ``not-converged``, the next smaller model is taken; where none is sound, the
-    first one stays.
+    first one stays. Where no joint gets a curve, joint curves are no part of the model.
 
     Parameters
     ----------
@@ -66,6 +67,9 @@ def identify_chosen(
             seed=seed,
             progress=progress,
         )
+        if CURVE in fit.model.effects and not any(p.group == CURVE for p in fit.free.parameters):
+            selection = selection.without_curves()
+            continue
         if fit.status not in _UNSOUND:
             return selection, fit
         first = first or (selection, fit)

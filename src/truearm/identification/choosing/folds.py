@@ -22,6 +22,9 @@ FOLDS: Final = 5
 Layout = Literal["scattered", "path", "grid", "close"]
 _BLOCKS: Final = 3  # a fold, at least
 _LEAST_FOR_BLOCKS: Final = 40  # configurations
+#: Configurations that are held out in all, each once in every draw, and draws at most.
+_HELD_OUT: Final = 100
+_MOST_DRAWS: Final = 4
 #: Median step from one configuration to the next, over the median distance of any two, below which it is a path.
 _PATH: Final = 0.75
 #: Distinct positions of a joint, by configurations, up to which it was moved in steps.
@@ -57,9 +60,15 @@ class Folds:
         return 0 if self.layout == "scattered" else int(self.group.max()) + 1
 
 
-def folds_of(data: Dataset, seed: int) -> Folds:
-    """Return the folds of a dataset."""
-    n, rng = data.configurations, np.random.default_rng(seed)
+def folds_of(data: Dataset, seed: int, again: int = 0) -> Folds:
+    """Return the folds of a dataset.
+
+    Parameters
+    ----------
+    again
+        Number of the draw, from 0: others draw other folds.
+    """
+    n, rng = data.configurations, np.random.default_rng([seed, again] if again else seed)
     layout = layout_of(data)
     of = np.empty(n, dtype=np.intp)
     if layout == "scattered" or n < _LEAST_FOR_BLOCKS:
@@ -70,6 +79,16 @@ def folds_of(data: Dataset, seed: int) -> Folds:
     of_block = np.empty(count, dtype=np.intp)
     of_block[rng.permutation(count)] = np.arange(count) % FOLDS
     return Folds(layout, of_block[group], group)
+
+
+def draws_of(data: Dataset, seed: int) -> tuple[Folds, ...]:
+    """Return as many draws of folds as let enough configurations be held out.
+
+    Of few configurations, one draw says much by chance (Kohavi 1995, "A study of cross-validation and bootstrap for
+    accuracy estimation and model selection").
+    """
+    count = min(max(-(-_HELD_OUT // max(data.configurations, 1)), 1), _MOST_DRAWS)
+    return tuple(folds_of(data, seed, again) for again in range(count))
 
 
 def layout_of(data: Dataset) -> Layout:

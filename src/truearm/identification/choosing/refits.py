@@ -10,6 +10,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.identification.choosing.folds import FOLDS, Folds
+from truearm.identification.choosing.search import mean_over
 from truearm.identification.held import Held
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
@@ -57,42 +58,53 @@ class Refits:
     ----------
     robot, data
         The robot and its training data.
-    folds
-        Which configurations are held out together.
+    draws
+        Which configurations are held out together, as often as that was drawn.
     how
         How parameters are identified.
     model_of
         The model with some joint effects.
     robot_of
-        The robot as a fold knows it, by the fold's number and the effects: with the periods found without the fold.
+        The robot as a fold knows it, by the numbers of the draw and of the fold and the effects: with the periods found
+        without the fold.
     """
 
     robot: Robot
     data: Dataset
-    folds: Folds
+    draws: tuple[Folds, ...]
     how: How
     model_of: Callable[[Sequence[str]], Model]
-    robot_of: Callable[[int, Sequence[str]], Robot]
+    robot_of: Callable[[int, int, Sequence[str]], Robot]
     _known: dict[tuple[str, ...], Array | None] = field(default_factory=dict)
 
     def errors(self, effects: Sequence[str]) -> Array | None:
-        """Return the mean held-out error of each configuration [m], ``(n,)``, NaN where there is none.
+        """Return the mean held-out error of each configuration over the draws [m], ``(n,)``, NaN where there is none.
 
         None if some fold is not enough for the model.
         """
         key = tuple(sorted(effects))
         if key not in self._known:
-            self._known[key] = self._found(key)
+            self._known[key] = self._over_draws(key)
         return self._known[key]
 
-    def _found(self, effects: tuple[str, ...]) -> Array | None:
+    def _over_draws(self, effects: tuple[str, ...]) -> Array | None:
+        found = []
+        for draw in range(len(self.draws)):
+            errors = self._found(draw, effects)
+            if errors is None:
+                return None
+            found.append(errors)
+        return mean_over(found)
+
+    def _found(self, draw: int, effects: tuple[str, ...]) -> Array | None:
         found = np.full(self.data.configurations, np.nan)
         solved: Solved | None = None
         before: Robot | None = None
         for number in range(FOLDS):
-            inside, outside = np.flatnonzero(self.folds.of != number), np.flatnonzero(self.folds.of == number)
+            of = self.draws[draw].of
+            inside, outside = np.flatnonzero(of != number), np.flatnonzero(of == number)
             training = self.data.of_configurations(inside)
-            robot = self.robot_of(number, effects)
+            robot = self.robot_of(draw, number, effects)
             near = solved if robot == before and self.how.redundancy == "prior" else None
             try:
                 solved, before = self.how.find(robot, training, self.model_of(effects), _TOLERANCE, near), robot

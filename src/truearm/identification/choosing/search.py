@@ -17,25 +17,42 @@ from truearm.identification.choosing.linear_cross_validation import Extensions, 
 from truearm.modeling.chain import Array
 
 CURVE: Final = "joint-curve"
+#: Effects that say how something differs from its base, which a model without the base would have them stand in for.
+BASES: Final = {"hardening": "compliance", "bearing-compliance": "compliance"}
 #: So many choices are all looked at; of more, one effect after the other is added, or two.
 _ALL: Final = 1024
 #: Standard errors, and share of the held-out error, that curves have to gain: hundreds of coefficients are looked at no
 #: further for less.
 CLEAR: Final = 3.0
 _WORTH_IT: Final = 0.05
+#: Share of the held-out error below which a gain is none.
+_NEGLIGIBLE: Final = 0.02
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What a choice gains over another: mean and standard error of the paired differences of held-out errors [m]."""
+    """What a choice gains over another.
+
+    Attributes
+    ----------
+    mean, error
+        Mean and standard error of the paired differences of held-out errors [m].
+    before
+        Mean held-out error of the other [m].
+    """
 
     mean: float
     error: float
+    before: float = 0.0
 
     @property
     def believed(self) -> bool:
-        """Whether it is larger than its standard error."""
-        return self.mean > self.error
+        """Whether it is larger than its standard error, and more than a negligible share of the error."""
+        return self.mean > max(self.error, _NEGLIGIBLE * self.before)
+
+    def clear(self, errors: float) -> bool:
+        """Return whether it is larger than so many standard errors, and more than a negligible share of the error."""
+        return self.mean > max(errors * self.error, _NEGLIGIBLE * self.before)
 
     @property
     def harms(self) -> bool:
@@ -53,7 +70,31 @@ def gain(before: Array, after: Array, folds: Folds) -> Gain:
     if not known.any():
         return Gain(0.0, 0.0)
     apart = (before - after)[known]
-    return Gain(float(apart.mean()), max(_standard_error(apart, of[known]) for of in (folds.group, folds.of)))
+    error = max(_standard_error(apart, of[known]) for of in (folds.group, folds.of))
+    return Gain(float(apart.mean()), error, float(before[known].mean()))
+
+
+def mean_over(draws: Sequence[Array]) -> Array:
+    """Return the mean of errors of configurations over draws of the folds, NaN where there is none, ``(n,)``."""
+    every = np.stack(draws)
+    known = np.isfinite(every)
+    count = known.sum(axis=0)
+    return np.where(count > 0, np.where(known, every, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+
+
+def complete(chosen: frozenset[str]) -> bool:
+    """Return whether every effect of a choice is there with what it is a part of."""
+    return all(BASES.get(name, name) in chosen for name in chosen)
+
+
+def without(chosen: frozenset[str], name: str) -> frozenset[str]:
+    """Return a choice without an effect, and without those that are nothing without it."""
+    return frozenset(one for one in chosen if one != name and BASES.get(one) != name)
+
+
+def with_bases(chosen: frozenset[str]) -> frozenset[str]:
+    """Return a choice with what its effects are parts of."""
+    return chosen.union(BASES.get(name, name) for name in chosen)
 
 
 def _standard_error(apart: Array, group: NDArray[np.intp]) -> float:
@@ -64,13 +105,80 @@ def _standard_error(apart: Array, group: NDArray[np.intp]) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
-    """A linear fit, effects that could be added to it, and the held-out errors of every choice asked for.
+class Draw:
+    """Folds as they were drawn once: held-out errors of every choice among some columns.
 
     Attributes
     ----------
     ground
         What turns rows into errors.
+    fit
+        What columns are added to.
+    columns
+        Of all effects beside each other, per prior.
+    unordered
+        The same where the order of a campaign is not known.
+    """
+
+    ground: Ground
+    fit: LinearFit
+    columns: Array
+    unordered: Array
+
+    @cached_property
+    def extensions(self) -> Extensions:
+        """The fit, and the columns that could be added."""
+        return Extensions(replace(self.fit, fold=self.ground.fold), self.columns)
+
+    @cached_property
+    def _without_order(self) -> Extensions:
+        return replace(self.extensions, predicting=self.unordered)
+
+    def errors(self, places: NDArray[np.intp]) -> Array:
+        """Return the mean held-out error of each configuration with some columns [m], ``(n,)``."""
+        return self._found(self.extensions, self._shown, places)
+
+    def errors_without_order(self, places: NDArray[np.intp]) -> Array:
+        """Return the same where the order of the held-out configurations is not known."""
+        return self._found(self._without_order, self._shown_without_order, places)
+
+    def _found(self, extensions: Extensions, shown: Array, places: NDArray[np.intp]) -> Array:
+        left = shown[:, -1].copy()
+        for fold, mine in zip(extensions.folds, self._of_fold, strict=True):
+            if len(places):
+                left[mine] += shown[np.ix_(mine, places)] @ fold.values(places)
+        return self.ground.by_configuration(left)
+
+    @cached_property
+    def _of_fold(self) -> tuple[NDArray[np.intp], ...]:
+        """Compared rows of each fold, among the compared ones."""
+        fold = self.ground.fold[self.ground.compared[0]]
+        return tuple(np.flatnonzero(fold == number) for number in range(self.extensions.fit.folds))
+
+    @cached_property
+    def _shown(self) -> Array:
+        return self._in_metres(self.extensions)
+
+    @cached_property
+    def _shown_without_order(self) -> Array:
+        return self._in_metres(self._without_order)
+
+    def _in_metres(self, extensions: Extensions) -> Array:
+        """Return what each held-out column adds and what is left without any [m], ``(compared rows, k + 1)``."""
+        rows = np.zeros((len(self.ground.fold), extensions.columns.shape[1] + 1))
+        for fold in extensions.folds:
+            rows[fold.rows, :-1], rows[fold.rows, -1] = fold.columns, fold.residual
+        return np.asarray(self.ground.in_metres(rows)[self.ground.compared[0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A linear fit, effects that could be added to it, and the held-out errors of every choice asked for.
+
+    Attributes
+    ----------
+    grounds
+        What turns rows into errors: one for each draw of the folds.
     fit
         What effects are added to.
     columns
@@ -79,7 +187,7 @@ class Search:
         Columns of the effects that follow the order of a campaign, where the order is not known.
     """
 
-    ground: Ground
+    grounds: tuple[Ground, ...]
     fit: LinearFit
     columns: dict[str, Array]
     unordered: dict[str, Array] = field(default_factory=dict)
@@ -87,13 +195,15 @@ class Search:
     _means: dict[frozenset[str], float] = field(default_factory=dict, init=False)
 
     @cached_property
-    def _extensions(self) -> Extensions:
-        return Extensions(self.fit, self.together(self.columns))
-
-    @cached_property
-    def _without_order(self) -> Extensions:
+    def draws(self) -> tuple[Draw, ...]:
+        """The folds of each draw."""
         changed = {name: self.unordered.get(name, columns) for name, columns in self.columns.items()}
-        return replace(self._extensions, predicting=self.together(changed))
+        together, unordered = self.together(self.columns), self.together(changed)
+        return tuple(Draw(ground, self.fit, together, unordered) for ground in self.grounds)
+
+    @property
+    def _extensions(self) -> Extensions:
+        return self.draws[0].extensions
 
     def together(self, columns: dict[str, Array]) -> Array:
         """Return the columns of some effects beside each other, ``(rows, k)``."""
@@ -113,48 +223,19 @@ class Search:
         return np.concatenate([np.zeros(0, np.intp), *mine])
 
     def errors(self, chosen: Sequence[str] | frozenset[str]) -> Array:
-        """Return the mean held-out error of each configuration with some effects [m], ``(n,)``."""
+        """Return the mean held-out error of each configuration with some effects over the draws [m], ``(n,)``."""
         key = frozenset(chosen)
         if key not in self._errors:
-            self._errors[key] = self._found(self._extensions, self._shown, key)
+            self._errors[key] = mean_over([draw.errors(self.places(key)) for draw in self.draws])
         return self._errors[key]
 
     def errors_without_order(self, chosen: Sequence[str] | frozenset[str]) -> Array:
         """Return the same where the order of the held-out configurations is not known."""
-        return self._found(self._without_order, self._shown_without_order, frozenset(chosen))
-
-    def _found(self, extensions: Extensions, shown: Array, chosen: frozenset[str]) -> Array:
-        places = self.places(chosen)
-        left = shown[:, -1].copy()
-        for fold, mine in zip(extensions.folds, self._of_fold, strict=True):
-            if len(places):
-                left[mine] += shown[np.ix_(mine, places)] @ fold.values(places)
-        return self.ground.by_configuration(left)
-
-    @cached_property
-    def _of_fold(self) -> tuple[NDArray[np.intp], ...]:
-        """Compared rows of each fold, among the compared ones."""
-        fold = self.fit.fold[self.ground.compared[0]]
-        return tuple(np.flatnonzero(fold == number) for number in range(self.fit.folds))
-
-    @cached_property
-    def _shown(self) -> Array:
-        return self._in_metres(self._extensions)
-
-    @cached_property
-    def _shown_without_order(self) -> Array:
-        return self._in_metres(self._without_order)
-
-    def _in_metres(self, extensions: Extensions) -> Array:
-        """Return what each held-out column adds and what is left without any [m], ``(compared rows, k + 1)``."""
-        rows = np.zeros((len(self.fit.fold), extensions.columns.shape[1] + 1))
-        for fold in extensions.folds:
-            rows[fold.rows, :-1], rows[fold.rows, -1] = fold.columns, fold.residual
-        return np.asarray(self.ground.in_metres(rows)[self.ground.compared[0]])
+        return mean_over([draw.errors_without_order(self.places(chosen)) for draw in self.draws])
 
     def gain(self, before: Sequence[str] | frozenset[str], after: Sequence[str] | frozenset[str]) -> Gain:
         """Return what one choice gains over another."""
-        return gain(self.errors(before), self.errors(after), self.ground.folds)
+        return gain(self.errors(before), self.errors(after), self.grounds[0].folds)
 
     def excited(self, name: str) -> bool:
         """Return whether the readings know any parameter of an effect better than its prior does."""
@@ -164,9 +245,9 @@ class Search:
         """Return the residual of every row with some effects, ``(rows,)``."""
         return self._extensions.solved(self.places(chosen))
 
-    def left_without(self, number: int, chosen: Sequence[str] | frozenset[str]) -> Array:
-        """Return the residual of every row as the fit without a fold leaves it, ``(rows,)``."""
-        return self._extensions.without_fold(number, self.places(chosen))
+    def left_without(self, draw: int, number: int, chosen: Sequence[str] | frozenset[str]) -> Array:
+        """Return the residual of every row as the fit without a fold of a draw leaves it, ``(rows,)``."""
+        return self.draws[draw].extensions.without_fold(number, self.places(chosen))
 
     def spent(self, chosen: Sequence[str] | frozenset[str]) -> float:
         """Return how many equations' worth of residual the fit uses up with some effects, at most."""
@@ -179,6 +260,7 @@ class Search:
         3.4.3), over paired differences.
         """
         looked_at = self._every(among) if 2 ** len(among) <= _ALL else self._one_by_one(among)
+        looked_at = [chosen for chosen in looked_at if complete(chosen)]
         lowest = min(looked_at, key=self._mean)
         limit = self._mean(lowest)
         fewest = sorted(looked_at, key=lambda chosen: (len(self.places(chosen)), self._mean(chosen)))
@@ -201,7 +283,7 @@ class Search:
         while True:
             rest = [name for name in among if name not in now]
             for size in (1, 2):
-                larger = [now | set(some) for some in combinations(rest, size)]
+                larger = [with_bases(now.union(some)) for some in combinations(rest, size)]
                 seen += larger
                 better = [one for one in larger if self.gain(now, one).believed]
                 if better:
@@ -209,7 +291,7 @@ class Search:
             if not rest or not better:
                 break
             now = min(better, key=self._mean)
-            smaller = [now - {name} for name in now]
+            smaller = [without(now, name) for name in now]
             seen += smaller
             idle = [one for one in smaller if not self.gain(one, now).believed]
             now = min(idle, key=self._mean) if idle and min(idle, key=self._mean) not in seen[: -len(smaller)] else now
@@ -255,7 +337,7 @@ class Choices:
 
     def gain(self, before: frozenset[str], after: frozenset[str]) -> Gain:
         """Return what one choice gains over another."""
-        return gain(self.errors(before), self.errors(after), self.plain.ground.folds)
+        return gain(self.errors(before), self.errors(after), self.plain.grounds[0].folds)
 
     def left(self, chosen: frozenset[str]) -> Array:
         """Return the residual of every row with some effects, ``(rows,)``."""
@@ -267,10 +349,10 @@ class Choices:
         search, effects = self._of(chosen)
         return search.spent(effects)
 
-    def left_without(self, number: int, chosen: frozenset[str]) -> Array:
-        """Return the residual of every row as the fit without a fold leaves it, ``(rows,)``."""
+    def left_without(self, draw: int, number: int, chosen: frozenset[str]) -> Array:
+        """Return the residual of every row as the fit without a fold of a draw leaves it, ``(rows,)``."""
         search, effects = self._of(chosen)
-        return search.left_without(number, effects)
+        return search.left_without(draw, number, effects)
 
     def best(self, without: Collection[str]) -> frozenset[str]:
         """Return the best choice without some effects; with curves if these gain clearly."""

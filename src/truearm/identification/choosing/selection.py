@@ -28,11 +28,21 @@ from truearm.identification.choosing.choice import (
     model_with,
     with_lines,
 )
-from truearm.identification.choosing.folds import FOLDS, Folds, folds_of
+from truearm.identification.choosing.folds import FOLDS, Folds, draws_of
 from truearm.identification.choosing.refits import How, Refits
-from truearm.identification.choosing.search import CLEAR, CURVE, Choices, Search, gain
+from truearm.identification.choosing.search import (
+    BASES,
+    CLEAR,
+    CURVE,
+    Choices,
+    Search,
+    gain,
+    mean_over,
+    with_bases,
+    without,
+)
 from truearm.identification.held import NOTHING_HELD, Held
-from truearm.identification.judging.transmission import FEWEST, PeriodicError, Pulls, lines_of
+from truearm.identification.judging.transmission import FEWEST, LEAST_CONFIGURATIONS, PeriodicError, Pulls, lines_of
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import named_model
@@ -45,9 +55,12 @@ from truearm.modeling.robot import Robot
 
 #: What a curve contains.
 _IN_CURVE: Final = "fourier"
-#: A gain of fewer standard errors in closed form is looked at again by real fits.
+#: Standard errors by which fits in the folds have to be better than those of the better plain model, and of the next
+#: smaller choice where configurations are so few that folds are drawn several times.
 _SURE: Final = 2.0
+#: Choices that are fitted in the folds at most, where they are drawn once, and draws that fits are made in.
 _MOST_REFITS: Final = 3
+_DRAWS_OF_REFITS: Final = 2
 _NOT_BORNE_OUT: Final = "what it gains is not borne out by fits in the folds"
 
 
@@ -104,7 +117,8 @@ def select(
         bounds_file=bounds_file,
         held=held,
     )
-    choice = _Choice(robot, data, names, how, Ground(solved, folds_of(data, seed)), progress)
+    grounds = tuple(Ground(solved, folds) for folds in draws_of(data, seed))
+    choice = _Choice(robot, data, names, how, grounds, progress)
     return choice.made()
 
 
@@ -116,11 +130,15 @@ class _Choice:
     data: Dataset
     names: tuple[str, ...]
     how: How
-    ground: Ground
+    grounds: tuple[Ground, ...]
     progress: Callable[[str], None]
     reasons: dict[str, str] = field(default_factory=dict)
     lines: tuple[PeriodicError, ...] = ()
-    curves: CurveColumns | None = None
+    curves: tuple[CurveColumns, ...] = ()
+
+    @property
+    def ground(self) -> Ground:
+        return self.grounds[0]
 
     @property
     def folds(self) -> Folds:
@@ -151,10 +169,13 @@ class _Choice:
         there = with_lines(self.ground.solved.robot, self.lines)
         columns = self.ground.columns(open_, there)
         unordered = self.ground.columns([name for name in open_ if name in ORDERED], there, ordered=False)
-        plain = Search(self.ground, self.ground.start((COMPLIANCE,)), columns, unordered)
+        plain = Search(self.grounds, self.ground.start((COMPLIANCE,)), columns, unordered)
         for name in columns:
             if not plain.excited(name):
                 self.reasons[name] = "the readings tell less of it than is known beforehand"
+        for name, base in BASES.items():
+            if name in columns and (base in self.reasons or base not in columns):
+                self.reasons.setdefault(name, f"it is a part of {base}, which cannot be found")
         return Choices(plain, self._curved(plain))
 
     def _curved(self, plain: Search) -> Search | None:
@@ -163,14 +184,13 @@ class _Choice:
             return None
         rest = {name: columns for name, columns in plain.columns.items() if name != _IN_CURVE}
         beside = plain.best([name for name in rest if name not in self.reasons])
-        self.curves = self.ground.curves(
-            (COMPLIANCE,), plain.together({name: rest[name] for name in rest if name in beside})
-        )
-        columns = self.curves.scaled()
+        taken = plain.together({name: rest[name] for name in rest if name in beside})
+        self.curves = tuple(ground.curves((COMPLIANCE,), taken) for ground in self.grounds)
+        columns = self.curves[0].scaled()
         if columns is None:
             self.reasons[CURVE] = "what is left over does not repeat with the joints' angles"
             return None
-        return Search(self.ground, plain.fit.with_columns(columns), rest, plain.unordered)
+        return Search(self.grounds, plain.fit.with_columns(columns), rest, plain.unordered)
 
     def _settled(self, search: Choices) -> frozenset[str]:
         """Return the best choice among effects that the data show and that do not harm predictions without order."""
@@ -180,7 +200,7 @@ class _Choice:
             now = search.errors_without_order(chosen)
             if not ordered or not gain(search.errors_without_order(chosen - ordered), now, self.folds).harms:
                 return chosen
-            worst = min(sorted(ordered), key=lambda name: _mean(search.errors_without_order(chosen - {name})))
+            worst = min(sorted(ordered), key=lambda name: _mean(search.errors_without_order(without(chosen, name))))
             self.reasons[worst] = "it makes predictions worse whose place in the order is not known"
 
     def _found_lines(self, search: Choices, chosen: frozenset[str]) -> bool:
@@ -189,6 +209,14 @@ class _Choice:
             return False
         pulls = self.ground.pulls(search.left(chosen), search.spent(chosen))
         self.lines = () if pulls is None else self._lines_of(pulls, chosen)
+        if not self.lines and TRANSMISSION in self.reasons:
+            self.reasons[TRANSMISSION] = (
+                "no position was read in which to look for errors that repeat with a joint's angle"
+                if pulls is None
+                else f"fewer than {LEAST_CONFIGURATIONS} configurations cannot tell how often a joint's errors repeat"
+                if len(pulls.joints) < LEAST_CONFIGURATIONS
+                else "no error that repeats with a joint's angle was found"
+            )
         return bool(self.lines)
 
     def _lines_of(self, pulls: Pulls, chosen: frozenset[str]) -> tuple[PeriodicError, ...]:
@@ -196,18 +224,17 @@ class _Choice:
         return lines_of(self.robot, pulls, HIGHEST + 1 if CURVE in chosen else FEWEST)
 
     def _refits(self, search: Choices, chosen: frozenset[str]) -> Refits:
-        without = chosen - {TRANSMISSION}
+        beside = chosen - {TRANSMISSION}
 
-        def robot_of(number: int, effects: Sequence[str]) -> Robot:
+        def robot_of(draw: int, number: int, effects: Sequence[str]) -> Robot:
             if not self.lines or TRANSMISSION not in effects:
                 return self.robot
-            left = search.left_without(number, without)
-            pulls = self.ground.pulls(left, search.spent(without), self.ground.fold != number)
-            return self.robot if pulls is None else with_lines(self.robot, self._lines_of(pulls, without))
+            left, ground = search.left_without(draw, number, beside), self.grounds[draw]
+            pulls = ground.pulls(left, search.spent(beside), ground.fold != number)
+            return self.robot if pulls is None else with_lines(self.robot, self._lines_of(pulls, beside))
 
-        return Refits(
-            self.robot, self.data, self.folds, self.how, lambda effects: model_with(effects, self.names), robot_of
-        )
+        draws = tuple(ground.folds for ground in self.grounds[:_DRAWS_OF_REFITS])
+        return Refits(self.robot, self.data, draws, self.how, lambda effects: model_with(effects, self.names), robot_of)
 
     def _confirmed(self, search: Choices, chosen: frozenset[str]) -> tuple[frozenset[str], list[Confirmation]]:
         """Return the choice as far as fits in the folds bear it out."""
@@ -217,72 +244,92 @@ class _Choice:
             self.progress("choosing a model: curves in the folds")
             errors, before = self._errors_of_curves(search, chosen), search.errors(plain)
             found.append(_confirmation(chosen, plain, errors, before, self.folds))
-            if found[-1].gain.mean > CLEAR * found[-1].gain.error:
+            if found[-1].gain.clear(CLEAR):
                 return chosen, found
             self.reasons[CURVE] = _NOT_BORNE_OUT
             chosen = plain
         refits = self._refits(search, chosen)
         start = self._start(search)
-        for _ in range(_MOST_REFITS):
+        for _ in range(_MOST_REFITS if len(self.grounds) == 1 else len(self.names)):
             if chosen <= start:
-                return chosen, found
+                return start, found
             smaller = self._next_smaller(search, chosen)
-            sure = search.gain(smaller, chosen)
-            against = start if sure.mean > _SURE * sure.error and start < chosen else smaller
             self.progress(f"choosing a model: fits with {', '.join(_listed(chosen))} in the folds")
-            refitted, before_refitted = refits.errors(tuple(chosen)), refits.errors(tuple(against))
-            if refitted is not None and before_refitted is not None:
-                found.append(_confirmation(chosen, against, refitted, before_refitted, self.folds))
-                if found[-1].gain.believed:
-                    return chosen, found
+            reason = self._refuted(refits, chosen, [smaller, start], found)
+            if not reason:
+                return chosen, found
             for name in chosen - smaller:
-                self.reasons[name] = (
-                    "there are too few readings in a fold to find it" if refitted is None else _NOT_BORNE_OUT
-                )
+                self.reasons[name] = reason
             chosen = smaller
-        return (chosen if chosen <= start else start & chosen), found
+        return start, found
+
+    def _refuted(
+        self, refits: Refits, chosen: frozenset[str], others: Sequence[frozenset[str]], found: list[Confirmation]
+    ) -> str:
+        """Return why fits in the folds do not bear a choice out against others; empty if they do."""
+        errors = refits.errors(tuple(chosen))
+        if errors is None:
+            return "there are too few readings in a fold to find it"
+        for other in dict.fromkeys(others):
+            before = None if other == chosen else refits.errors(tuple(other))
+            if before is None:
+                continue
+            found.append(_confirmation(chosen, other, errors, before, self.folds))
+            few = len(self.grounds) > 1
+            if not found[-1].gain.clear(_SURE if few or other == others[-1] else 1.0):
+                return _NOT_BORNE_OUT
+        return ""
 
     def _errors_of_curves(self, search: Choices, chosen: frozenset[str]) -> Array:
         """Return held-out errors with curves and lines whose priors and periods are found without each fold.
 
         It is the linear problem: with hundreds of coefficients real fits would take far longer than all the rest.
         """
-        if search.curved is None or self.curves is None:
+        if search.curved is None or not self.curves:
             raise ValueError("there are no curves to choose")
-        held_out = np.zeros(len(self.ground.fold))
+        return mean_over([self._errors_of_draw(search, chosen, draw) for draw in range(len(self.grounds))])
+
+    def _errors_of_draw(self, search: Choices, chosen: frozenset[str], draw: int) -> Array:
+        ground, beside = self.grounds[draw], chosen - {TRANSMISSION}
+        held_out = np.zeros(len(ground.fold))
         for number in range(FOLDS):
-            columns = {name: search.curved.columns[name] for name in search.curved.columns if name in chosen}
+            columns = {name: found for name, found in search.plain.columns.items() if name in chosen}
             if self.lines and TRANSMISSION in columns:
-                without = chosen - {TRANSMISSION}
-                pulls = self.ground.pulls(
-                    search.left_without(number, without), search.spent(without), self.ground.fold != number
-                )
-                lines = () if pulls is None else self._lines_of(pulls, without)
-                there = with_lines(self.ground.solved.robot, lines)
-                columns |= self.ground.columns([TRANSMISSION], there) if lines else {}
-            curve = self.curves.scaled(number)
+                left = search.left_without(draw, number, beside)
+                pulls = ground.pulls(left, search.spent(beside), ground.fold != number)
+                lines = () if pulls is None else self._lines_of(pulls, beside)
+                there = with_lines(ground.solved.robot, lines)
+                columns |= ground.columns([TRANSMISSION], there) if lines else {}
+            curve = self.curves[draw].scaled(number)
             fit = search.plain.fit if curve is None else search.plain.fit.with_columns(curve)
-            mine = self.ground.fold == number
+            mine = ground.fold == number
             together = np.concatenate([np.zeros((len(mine), 0)), *columns.values()], axis=1)
-            held_out[mine] = fit.with_columns(together).held_out(number)[mine]
-        return self.ground.errors(held_out)
+            held_out[mine] = replace(fit.with_columns(together), fold=ground.fold).held_out(number)[mine]
+        return ground.errors(held_out)
 
     def _start(self, search: Choices) -> frozenset[str]:
-        """Return the better one of the geometric and the elastic model."""
+        """Return the better one of the geometric and the elastic model; the smaller one if it is hardly worse."""
         elastic = frozenset({COMPLIANCE})
-        return elastic if COMPLIANCE in search.names and search.gain(frozenset(), elastic).believed else frozenset()
+        if COMPLIANCE not in search.names or COMPLIANCE in self.reasons:
+            return frozenset()
+        return elastic if search.gain(frozenset(), elastic).clear(0.0) else frozenset()
+
+    def _offsets_harm(self, search: Choices) -> bool:
+        """Return whether joint zeros alone leave more than the geometric model, by more than chance."""
+        fit = self.ground.start((COMPLIANCE, "geometry"))
+        return gain(search.errors(frozenset()), self.ground.errors(fit.held_out()), self.folds).harms
 
     @staticmethod
     def _next_smaller(search: Choices, chosen: frozenset[str]) -> frozenset[str]:
         """Return a choice without the effect that it gains least by."""
-        return min((chosen - {name} for name in chosen), key=lambda one: _mean(search.errors(one)))
+        return min((without(chosen, name) for name in chosen), key=lambda one: _mean(search.errors(one)))
 
     def _selection(self, search: Choices, chosen: frozenset[str], confirmations: list[Confirmation]) -> Selection:
         rows = []
         for name in self.names:
             tried = None
             if name in search.names:
-                tried = search.gain(chosen - {name}, chosen | {name})
+                tried = search.gain(without(chosen, name), with_bases(chosen | {name}))
             reason = "" if name in chosen else self.reasons.get(name, "")
             if name == _IN_CURVE and CURVE in chosen:
                 tried, reason = None, "the curves contain it"
@@ -296,7 +343,8 @@ class _Choice:
         while now:
             now = self._next_smaller(search, now)
             smaller.append(model_with(tuple(now), self.names))
-        smaller.append(replace(named_model("offsets"), name=AUTO))
+        if not self._offsets_harm(search):
+            smaller.append(replace(named_model("offsets"), name=AUTO))
         elastic = _mean(search.errors(frozenset({COMPLIANCE}))) if COMPLIANCE in search.names else None
         return Selection(
             model_with(tuple(chosen), self.names),

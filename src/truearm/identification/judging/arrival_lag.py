@@ -59,11 +59,10 @@ def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
     None where too few readings are left, or where the order of measurement is not known.
     """
     data, problem = left_over.problem.data, left_over.problem
-    if data.number is None:
+    given = left_over.given
+    if data.number is None or given.number is None:
         return None
     here = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
-    given = left_over.given
-    assert given.number is not None
     H = here.by_joints * _last_moves(given, given.number)[left_over.chosen][left_over.configuration]
     free = left_over.freedom
     if free < 4 * H.shape[1]:

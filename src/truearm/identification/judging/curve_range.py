@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.effects.fourier import Fourier
 from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.notices import Notice
 
@@ -19,7 +20,7 @@ _GAP: Final = math.radians(20.0)
 
 
 def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
-    """Say which joints got no curve, where the others are known, and what expected errors are then worth.
+    """Say which joints got no curve, and where the others are known.
 
     Parameters
     ----------
@@ -55,12 +56,12 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
                 "note",
             )
         )
-    if not free.isdisjoint(name for names in effect.terms.values() for name in names):
+    if Fourier.name in fit.model.effects:
         found.append(
             Notice(
-                "curve-expected",
-                "With curves of the joints the interval of the expected error is rough: on twins it held 8 times of "
-                "31. Believe the held-out error, and a validation where the robot works.",
+                "curves-and-fourier",
+                "The model has curves of the joints and the effect fourier, whose one and two periods a turn curves "
+                "contain. The readings do not tell the two apart: leave fourier out.",
                 "note",
             )
         )
@@ -69,7 +70,8 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
             Notice(
                 "curve-range",
                 f"Curves of joints are known where these were measured: {'; '.join(partly)}. Outside they are what "
-                "was found there, continued. The expected error over the workspace is then often too small.",
+                "was found there, continued. The expected error over the workspace contains what that may be off by, "
+                "as far as other joints and ordinary encoders tell.",
                 "note",
             )
         )

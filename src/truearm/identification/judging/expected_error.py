@@ -352,8 +352,8 @@ def _student(freedom: float, chance: Array) -> Array:
 
 
 def uncertain_names(fit: Fit) -> tuple[str, ...]:
-    """Return the names of the parameters that have errors: those that were free, and those held as redundant."""
-    return (*fit.free.names, *(r.dropped for r in fit.redundancies))
+    """Return the names of the parameters that have errors: those that were free, and those held although uncertain."""
+    return (*fit.free.names, *fit.unfitted, *(r.dropped for r in fit.redundancies))
 
 
 def covariance_root(fit: Fit, covariance: Array, *, held: bool = True) -> Array:
@@ -366,13 +366,13 @@ def covariance_root(fit: Fit, covariance: Array, *, held: bool = True) -> Array:
     Parameters
     ----------
     covariance
-        Of the free parameters, ``(free, free)``.
+        Of the free parameters and the unfitted ones, ``(free, free)``.
     held
         Whether that of the held ones is added.
     """
     names = uncertain_names(fit)
     size = np.array([fit.start.parameters[name].prior for name in names])
-    count = len(fit.free.names)
+    count = len(fit.free.names) + len(fit.unfitted)
     whole = np.zeros((len(names), len(names)))
     whole[:count, :count] = covariance / np.outer(size[:count], size[:count])
     if fit.redundancies and held:

@@ -108,11 +108,22 @@ class FoundCurve:
     @cached_property
     def rms(self) -> float:
         """Root mean square about its mean in the measured ranges [rad]; in all that is shown if there are none."""
+        return float(np.std(self.at(self._looked_at)[0]))
+
+    @cached_property
+    def rms_deviation(self) -> float:
+        """Standard deviation of the root mean square [rad], by its derivatives."""
+        waves = curve_waves(self._looked_at, len(self.amounts) // 2)
+        waves -= waves.mean(axis=1, keepdims=True)
+        slope = waves @ (self.amounts @ waves) / (waves.shape[1] * max(self.rms, _NOTHING))
+        return math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
+
+    @cached_property
+    def _looked_at(self) -> Array:
         inside = np.zeros(len(self.angles), dtype=bool)
         for low, high in self.measured:
             inside |= (self.angles >= low) & (self.angles <= high)
-        values = self.at(self.angles[inside] if inside.any() else self.angles)[0]
-        return float(np.std(values))
+        return self.angles[inside] if inside.any() else self.angles
 
     @cached_property
     def strongest(self) -> tuple[Periods, ...]:
@@ -143,7 +154,8 @@ def found_curves(fit: Fit, training: Dataset) -> tuple[FoundCurve, ...]:
 
 
 def _curves(fit: Fit, training: Dataset) -> Iterator[FoundCurve]:
-    place = {name: i for i, name in enumerate(fit.free.names)}
+    place = {name: i for i, name in enumerate((*fit.free.names, *fit.unfitted))}
+    uncertain = fit.covariance_with_unfitted
     for number, joint in enumerate(fit.robot.joints, 1):
         names = curve_names(number)
         known = [i for i, name in enumerate(names) if name in place]
@@ -153,7 +165,7 @@ def _curves(fit: Fit, training: Dataset) -> Iterator[FoundCurve]:
         if not (np.abs(amounts) > _NOTHING).any():
             continue
         covariance, rows = np.zeros((2 * HIGHEST, 2 * HIGHEST)), [place[names[i]] for i in known]
-        covariance[np.ix_(known, known)] = fit.covariance[np.ix_(rows, rows)]
+        covariance[np.ix_(known, known)] = uncertain[np.ix_(rows, rows)]
         turn = 2.0 * math.pi
         shown = joint.limits
         places = training.joints[:, number - 1]

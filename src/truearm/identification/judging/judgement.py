@@ -9,6 +9,7 @@ from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.changes import notices_of_change
 from truearm.identification.judging.curve_range import check_curves
+from truearm.identification.judging.curves_of_loads import check_curves_of_loads
 from truearm.identification.judging.expected_error import ExpectedError, as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.large_remainder import check_remainder
@@ -117,6 +118,7 @@ def judge(
         *explained,
         *check_transmission(fit, training),
         *check_curves(fit, training),
+        *([] if doubted else check_curves_of_loads(left_over)),
         *_in_part(left_over),
     )
     steps = steps_after_fit(

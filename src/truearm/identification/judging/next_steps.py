@@ -339,6 +339,8 @@ def _end(left: LeftOver) -> NextStep:
     effects = (
         ", and no effect known here explains more of it."
         if can_explain(left)
+        else ", and cross-validation found no other joint effect that explains more of it."
+        if fit.model.tried
         else ". There are too few readings to tell whether joint effects would explain more of it."
     )
     better = "" if fit.declared else " If the instrument is better than that, say so in a column sigma."

@@ -31,7 +31,7 @@ from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
 from truearm.identification.start_values.frames import initial_frames, placed_errors
 from truearm.identification.start_values.from_readings import start_from_readings
-from truearm.identification.start_values.quick_distances import can_be_quick, quick_misfit
+from truearm.identification.start_values.quick_distances import quick_misfit
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, errors_of
@@ -158,9 +158,12 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
         *as_noted(robot, data, sign_slips),
         *as_noted(robot, data, order_slips),
     ):
-        if np.ptp(slip.data.joints, axis=0).max() < _LEAST_TRAVEL:
-            continue  # an arm that hardly moves fits any fixture
-        if can_be_quick(slip.data) and quick_misfit(robot, slip.data) > _PLAINLY_OFF * _PLACED_WITHIN_BY_FIXTURES:
+        travel, before = (np.ptp(one.joints, axis=0) for one in (slip.data, data))
+        less = travel < 0.5 * before
+        if min(travel.max(), travel[less].max(initial=0.0) if less.any() else np.inf) < _LEAST_TRAVEL:
+            continue  # an arm that hardly moves fits any fixture, and so does a joint that would hardly move
+        quick = quick_misfit(robot, slip.data)
+        if quick is not None and quick > _PLAINLY_OFF * _PLACED_WITHIN_BY_FIXTURES:
             continue
         mended = _misfit(robot, slip.data)
         if mended <= _PLACED_WITHIN_BY_FIXTURES and _LEAST_IMPROVEMENT * mended / _spread(slip.data) < size / _spread(

@@ -11,6 +11,8 @@ from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.off_configurations import Off, OffConfiguration
 from truearm.identification.judging.unmodelled import GEOMETRY, LOADS, PAYLOAD, Explanation
 from truearm.identification.solving.fit import Fit
+from truearm.modeling.effects.fourier import Fourier
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.shown import counted, listed
 
 #: Configurations named one by one.
@@ -102,5 +104,11 @@ def other_model(fit: Fit, found: Explanation, known: float) -> NextStep:
         return NextStep(
             "other-model", f"Use `model=elastic`: joints that give way explain {share} of what is left.", gain
         )
+    if found.cause == Fourier.name:
+        words = (
+            f"Add `effects={found.cause}`, or `effects={JointCurve.name}`, which contains it and is found from some "
+            f"100 configurations on, or let `model=auto` choose: it explains {share} of what is left."
+        )
+        return NextStep("other-model", words, gain)
     words = f"Add `effects={found.cause}`, or let `model=auto` choose: it explains {share} of what is left."
     return NextStep("other-model", words, gain)

@@ -27,7 +27,7 @@ FEWEST: Final = 20
 _PERIODS: Final = np.arange(FEWEST, 401)
 #: A periodic error is believed if chance would show one as strong in any joint less often than this.
 _LARGEST_CHANCE: Final = 1e-3
-_LEAST_CONFIGURATIONS: Final = 60  # configurations
+LEAST_CONFIGURATIONS: Final = 60  # configurations
 #: Largest standard deviation of an amplitude [rad] at which the readings see a gear; good ones err by less.
 _LARGEST_DEVIATION: Final = 5e-4
 #: Periods that a joint must pass through, or else a sine is the same as an offset or a gain.
@@ -110,7 +110,7 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
         The readings it is held against; fewer than 60 configurations say nothing.
     """
     robot = fit.robot
-    if data.configurations < _LEAST_CONFIGURATIONS or not data.has_position.any():
+    if data.configurations < LEAST_CONFIGURATIONS or not data.has_position.any():
         return ()
     at = robot.loaded(data.postures)
     count = len(robot.joints)
@@ -141,7 +141,7 @@ def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[Periodic
     fewest
         Periods in a turn that are looked for, at least.
     """
-    if len(pulls.joints) < _LEAST_CONFIGURATIONS:
+    if len(pulls.joints) < LEAST_CONFIGURATIONS:
         return ()
     q, pull, weight, total, free = pulls.joints, pulls.pull.copy(), pulls.weight, pulls.total, pulls.free
     open_joints = [

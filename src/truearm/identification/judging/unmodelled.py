@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -28,6 +27,8 @@ from truearm.identification.solving.problem import Problem
 from truearm.limits import limit
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
+from truearm.modeling.effects.fourier import Fourier
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.loads import has_weight, joint_loads
 from truearm.modeling.parameters import FreeParameters, Parameter
 from truearm.modeling.parts import Payload
@@ -240,7 +241,9 @@ def _candidates(
     robot = fit.robot
     freed = set(fit.free.names) | {r.dropped for r in fit.redundancies}
     own = [effect.name for effect in robot.effects if any(p.name in freed for p in effect.parameters)]
-    closed = (*own, *fit.model.tried)
+    closed = [*own, *fit.model.tried]
+    if JointCurve.name in (*own, *fit.model.effects):
+        closed += [JointCurve.name, Fourier.name]  # the curves contain it, and found what there is
     unloaded = not has_weight(robot) and problem.data.wrench is None
     names = open_effects(robot, closed, problem.data)
     if unloaded and "compliance" not in closed:
@@ -270,26 +273,24 @@ def _judged(rest: _Remainder, cause: str, columns: Array, mass: float, freedom: 
         Of a payload [kg].
     """
     r, k = rest.residual, columns.shape[1]
-    order = np.argsort(rest.fold, kind="stable")
-    edges = np.searchsorted(rest.fold[order], np.arange(_FOLDS + 1))
-    parts = [order[a:b] for a, b in pairwise(edges.tolist())]
-    pull = np.array([columns[part].T @ r[part] for part in parts])
-    inner = np.array([columns[part].T @ columns[part] for part in parts])
-    everything = inner.sum(axis=0)
+    everything, pull = columns.T @ columns, columns.T @ r
     ridge = np.eye(k) + 1e-9 * np.trace(everything) * np.eye(k)
-    values = np.linalg.solve(everything - inner + ridge, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
-    gains = np.array(
-        [2.0 * v @ g - v @ G @ v for v, g, G in zip(values, pull, inner, strict=True)]
-    )  # of squares, on each fold
+    found = np.linalg.solve(everything + ridge, np.column_stack([pull, columns.T]))
+    value, spread = found[:, 0], found[:, 1:]
+    left = r - columns @ value
+    # What a fold is off by, estimated from the others, follows from one solution for all (Allen 1974, "The relationship
+    # between variable selection and data augmentation and a method for prediction"): no system for each fold.
+    parts = [np.flatnonzero(rest.fold == fold) for fold in range(_FOLDS)]
+    unseen = [np.linalg.solve(np.eye(len(p)) - columns[p] @ spread[:, p], left[p]) for p in parts]
+    gains = np.array([float(r[p] @ r[p] - e @ e) for p, e in zip(parts, unseen, strict=True)])  # of squares
     total = float(r @ r)
     gain = float(gains.sum())
     error = math.sqrt(_FOLDS) * float(gains.std(ddof=1))
     remaining = math.sqrt(max(1.0 - gain / total, 0.0))
     if remaining > 1.0 - _LEAST_GAIN or gain < _LEAST_DEVIATIONS * error:
         return None
-    value = np.linalg.solve(everything + ridge, pull.sum(axis=0))
-    share = min(float(2.0 * value @ pull.sum(axis=0) - value @ everything @ value) / total, 1.0 - 1e-12)
-    rank = int(np.linalg.matrix_rank(everything + 1e-12 * np.eye(k), tol=1.0))
+    share = min(float(2.0 * value @ pull - value @ everything @ value) / total, 1.0 - 1e-12)
+    rank = int(np.linalg.matrix_rank(everything + 1e-12 * np.eye(k), tol=1.0, hermitian=True))
     if freedom <= rank + _LEAST_FREEDOM // 2:
         return None
     # F of two mean squares, times its numerator's freedom, as chi squared: the denominator has many degrees.

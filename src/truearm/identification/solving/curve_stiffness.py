@@ -98,26 +98,26 @@ def curve_variances(
     most
         Sum of the variances of a joint's coefficients that no curve has, :data:`LARGEST` of coefficients in SI units.
     """
-    of = _Equations(*_told_apart(moments), rows)
+    of = equations_of(moments, rows)
     group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
     band = np.unique(np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True)[
         1
     ].reshape(-1)
     climb = _Climb(group, band, least_noise)
-    state = climb.climbed(_Marginal(of, _start(of, joint, most), max(of.squares / rows, least_noise)))
+    state = climb.climbed(Marginal(of, _start(of, joint, most), max(of.squares / rows, least_noise)))
     gains: dict[int, float] = {}
     while state.variance.any():
         sizes = np.bincount(joint, state.variance)
         if sizes.max() > most:  # of a joint on whose axis the targets lie, any curve is as likely
             left = np.where(joint == int(sizes.argmax()), 0.0, state.variance)
-            state = climb.climbed(_Marginal(of, left, state.noise))
+            state = climb.climbed(Marginal(of, left, state.noise))
             continue
         gains = {i: state.likelihood - state.without(joint == i) for i in np.unique(joint[state.variance > 0]).tolist()}
         weakest = min(gains, key=lambda i: gains[i])
         if gains[weakest] >= _SIGNIFICANT:
             break
         left = np.where(joint == weakest, 0.0, state.variance)
-        state = climb.climbed(_Marginal(of, left, state.noise))
+        state = climb.climbed(Marginal(of, left, state.noise))
     moved = np.bincount(group, state.variance * of.size)
     order = np.argsort(moved)
     small = np.zeros(len(moved), dtype=bool)
@@ -149,6 +149,11 @@ def moments_without(moments: Array, others: int) -> Array:
     return np.asarray(moments[others:, others:] - shared.T @ shared)
 
 
+def equations_of(moments: Array, rows: float) -> Equations:
+    """Return the equations that products of :func:`moments_without` are of."""
+    return Equations(*_told_apart(moments), rows)
+
+
 def _told_apart(moments: Array) -> tuple[Array, Array, float]:
     """Return equations that curves take part in, their right side, and the sum of squares of all others.
 
@@ -161,7 +166,7 @@ def _told_apart(moments: Array) -> tuple[Array, Array, float]:
     return root[:, None] * axes.T, z, max(float(moments[-1, -1] - z @ z), 0.0)
 
 
-def _start(of: _Equations, joint: NDArray[np.intp], most: float) -> Array:
+def _start(of: Equations, joint: NDArray[np.intp], most: float) -> Array:
     """Return variances with which the curves of the joints would add as much to the residuals as there is noise."""
     found = np.zeros(len(joint))
     joints = np.unique(joint).tolist()
@@ -173,7 +178,7 @@ def _start(of: _Equations, joint: NDArray[np.intp], most: float) -> Array:
     return found
 
 
-class _Equations:
+class Equations:
     """What is left of the equations: derivatives by the coefficients, right side, and what no curve can explain."""
 
     def __init__(self, F: Array, z: Array, rest: float, rows: float) -> None:
@@ -182,13 +187,13 @@ class _Equations:
         self.size = np.diag(self.H).copy()
 
 
-class _Marginal:
+class Marginal:
     """The likelihood at some variances, with what its slopes need.
 
     All of it follows from a matrix of coefficients, or from one of equations where these are fewer.
     """
 
-    def __init__(self, of: _Equations, variance: Array, noise: float) -> None:
+    def __init__(self, of: Equations, variance: Array, noise: float) -> None:
         self.of, self.noise = of, noise
         self.variance = np.where(variance * of.size > _NOTHING * noise, variance, 0.0)
         used = self.variance > 0.0
@@ -201,27 +206,33 @@ class _Marginal:
             inverse = np.linalg.inv(M)
             self.found[used] = root * (inverse @ (root * b)) / noise
             self.known[used] = 1.0 - np.diag(inverse)
-            logs = 2.0 * float(np.log(np.diag(np.linalg.cholesky(M))).sum())
+            logs = _log_determinant(M)
         else:
             part = of.F[:, used]
             V = np.eye(len(part)) + (part * (v / noise)) @ part.T
             turned = np.linalg.solve(V, np.column_stack([part, of.z]))
             self.found[used] = v * (part.T @ turned[:, -1]) / noise
             self.known[used] = v * np.einsum("ij,ij->j", part, turned[:, :-1]) / noise
-            logs = 2.0 * float(np.log(np.diag(np.linalg.cholesky(V))).sum())
+            logs = _log_determinant(V)
         c = self.found[used]
         explained = float(b @ c)
         moved = of.F[:, used] @ c
         self.left = max(of.squares - 2.0 * explained + float(moved @ moved), 0.0)
         self.likelihood = -0.5 * (logs + of.rows * float(np.log(noise)) + max(of.squares - explained, 0.0) / noise)
 
-    def at(self, variance: Array, noise: float) -> _Marginal:
+    def at(self, variance: Array, noise: float) -> Marginal:
         """Return it at other variances."""
-        return _Marginal(self.of, variance, noise)
+        return Marginal(self.of, variance, noise)
 
     def without(self, coefficients: NDArray[np.bool_]) -> float:
         """Return the likelihood without some coefficients."""
         return self.at(np.where(coefficients, 0.0, self.variance), self.noise).likelihood
+
+
+def _log_determinant(matrix: Array) -> float:
+    """Return the logarithm of the determinant; infinite where rounding left the matrix indefinite."""
+    sign, logarithm = np.linalg.slogdet(matrix)
+    return float(logarithm) if sign > 0.0 else np.inf
 
 
 class _Climb:
@@ -241,14 +252,14 @@ class _Climb:
             (np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[self.of_group]
         )
 
-    def objective(self, state: _Marginal) -> float:
+    def objective(self, state: Marginal) -> float:
         """Return the likelihood with that of the variances."""
         v = np.bincount(self.group, state.variance) / self.sizes
         used = v > 0.0
         share = self.alike(v)[used] / v[used]
         return state.likelihood + 0.5 * _ALIKE * float(np.sum(np.log(share) - share))
 
-    def following(self, state: _Marginal) -> Array:
+    def following(self, state: Marginal) -> Array:
         """Return where the next step leads: logarithms of the variances of the groups, and of the noise."""
         v = np.bincount(self.group, state.variance) / self.sizes
         squares, known = np.bincount(self.group, state.found**2), np.bincount(self.group, state.known)
@@ -256,12 +267,12 @@ class _Climb:
         freedom = max(state.of.rows - float(state.known.sum()), 1e-3 * state.of.rows)
         return np.asarray(np.log(np.maximum(np.append(np.where(v > 0.0, new, 0.0), state.left / freedom), 1e-300)))
 
-    def at(self, state: _Marginal, place: Array) -> _Marginal:
+    def at(self, state: Marginal, place: Array) -> Marginal:
         """Return the state at such logarithms."""
         v = np.exp(place[:-1])[self.group]
         return state.at(np.where(state.variance > 0.0, v, 0.0), max(float(np.exp(place[-1])), self.least_noise))
 
-    def climbed(self, state: _Marginal) -> _Marginal:
+    def climbed(self, state: Marginal) -> Marginal:
         """Climb: two steps, and a third as far as they lead together (Varadhan and Roland 2008)."""
         here = np.log(np.maximum(np.append(np.bincount(self.group, state.variance) / self.sizes, state.noise), 1e-300))
         height = self.objective(state)

@@ -14,6 +14,7 @@ from truearm.identification.solving.arrivals import Arrivals
 from truearm.identification.solving.bootstrap import refit_draws
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.cluster_covariance import cluster_covariance
+from truearm.identification.solving.curves import parts_with_curves
 from truearm.identification.solving.losses import ABSOLUTE, Loss, pulls, scales_of_pulls
 from truearm.identification.solving.models import FRAMES, Model
 from truearm.identification.solving.problem import SETUP, Problem, Rows
@@ -95,7 +96,8 @@ class Fit:
         arrival may hang together. Outliers that lie to one side bias a robust fit, and the covariance does not contain
         that.
     covariance_parts
-        The covariance by its sources, and without what their variances are uncertain by.
+        The covariance by its sources, and without what their variances are uncertain by; of the free parameters and,
+        behind them, of the `unfitted` ones.
     redundancies
         Parameters held because the data cannot tell them apart, with the combination.
     at_bound
@@ -132,6 +134,8 @@ class Fit:
         Places that were known, and not found.
     bootstrap
         How many fits to configurations drawn anew the covariance follows from; 0 if from none.
+    unfitted
+        Coefficients of joint curves that are zero, and uncertain: the data could not tell them.
     """
 
     robot: Robot
@@ -156,6 +160,7 @@ class Fit:
     steps: int
     held: Held = NOTHING_HELD
     bootstrap: int = 0
+    unfitted: tuple[str, ...] = ()
 
     def parameter_status(self, name: str) -> ParameterStatus:
         """Return how much the value of a parameter is worth."""
@@ -169,6 +174,13 @@ class Fit:
             return "at-bound"
         informed = self.robot.parameters[name].informed
         return "uninformed" if informed is not None and informed < _UNINFORMED else "identified"
+
+    @property
+    def covariance_with_unfitted(self) -> Array:
+        """Covariance of the free parameters and, behind them, of the unfitted ones [SI]."""
+        if not self.unfitted:
+            return self.covariance
+        return np.asarray(np.sum([part.covariance for part in self.covariance_parts], axis=0))
 
     @property
     def correlations(self) -> Array:
@@ -292,6 +304,19 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         bounded = np.isfinite(evenly) & (evenly > 0.0)
         of_bounds = np.clip(1.0 - (deviation / np.where(bounded, evenly, 1.0)) ** 2, 0.0, 1.0)
         informed = np.where(bounded, np.minimum(informed, of_bounds), informed)
+    parts, unfitted = tuple(part.scaled(free.prior) for part in parts), tuple[str, ...]()
+    if solved.curves.variances:
+        known = dict(zip(free.names, x.tolist(), strict=True))
+        there = replace(
+            problem,
+            robot=problem.robot.with_values(known),
+            free=FreeParameters(tuple(replace(p, value=known[p.name]) for p in free.parameters)),
+        )
+        joints = np.zeros(count) if components is None or scattered else components.weighing.joints
+        alone = parts[0] if scattered or draws is not None else None
+        unfitted, parts = parts_with_curves(there, solved.curves, joints, solution.weight, at_bound, alone)
+        covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
+        deviation = np.sqrt(np.diag(covariance))
     identified = [
         replace(start.parameters[n], value=float(v))
         if bound
@@ -339,7 +364,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         status=status,
         free=free,
         covariance=covariance,
-        covariance_parts=tuple(part.scaled(free.prior) for part in parts),
+        covariance_parts=parts,
         redundancies=solved.redundancies,
         at_bound=tuple(n for n, bound in zip(free.names, at_bound, strict=True) if bound),
         unobservable=unobservable,
@@ -355,6 +380,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         steps=solution.steps,
         held=solved.held,
         bootstrap=0 if draws is None else len(draws),
+        unfitted=unfitted,
     )
 
 

@@ -220,21 +220,18 @@ def _triangle(here: Evaluated, w: Array | None) -> tuple[Array, Array]:
     w
         Weight of every row's square, ``(rows,)``; None for ones.
     """
-    triangle: Array | None = None
+    triangle: Array = np.zeros((0, len(here.vector) + 1))
     if here.problem.priors:
         prior, weight = here.problem.prior_rows(here.vector)
         triangle = np.column_stack([np.diag(weight), prior])
     for rows, part in parts_of(here):
         J, r = part.jacobian, part.residual
-        known = 0 if triangle is None else len(triangle)
-        stacked = np.empty((J.shape[1] + 1, len(J) + known))  # column by column, as QR takes it
+        stacked = np.empty((J.shape[1] + 1, len(J) + len(triangle)))  # column by column, as QR takes it
         stacked[:-1, : len(J)], stacked[-1, : len(J)] = J.T, r
         if w is not None:
             stacked[:, : len(J)] *= np.sqrt(w[rows])
-        if triangle is not None:
-            stacked[:, len(J) :] = triangle.T
+        stacked[:, len(J) :] = triangle.T
         triangle = np.asarray(np.linalg.qr(stacked.T, mode="r"), dtype=np.float64)
-    assert triangle is not None
     return triangle[:, :-1], triangle[:, -1]
 
 

@@ -27,9 +27,33 @@ _STEPS: Final = 40
 _PULL: Final = 1e-6
 
 
-def can_be_quick(data: Dataset) -> bool:
-    """Return whether readings are distances of targets from points nobody measured, and nothing else."""
-    return (
+def quick_misfit(robot: Robot, data: Dataset) -> float | None:
+    """Return the median size of what the distances are off by [m], where targets and points fit best.
+
+    Each target has points of its own, and what is known of the distances between them does not count: with it they are
+    off by more. None unless readings are distances of targets from points nobody measured, and nothing else.
+
+    Parameters
+    ----------
+    robot
+        Nominal; its base is the world, and its own targets do not count.
+    """
+    distance = _distances_alone(data)
+    if distance is None:
+        return None
+    p, R = robot.world_poses(data.postures)
+    off = []
+    for target in np.unique(data.target).tolist():
+        mine = np.flatnonzero(data.target == target)
+        _, of = np.unique(data.against[mine], return_inverse=True)
+        where = data.configuration[mine]
+        off.append(_off_by(p[where], R[where], of, distance[mine]))
+    return float(np.median(np.abs(np.concatenate(off))))
+
+
+def _distances_alone(data: Dataset) -> Array | None:
+    """Return the distances if readings are distances of targets from points nobody measured, and nothing else."""
+    if (
         data.fixture is not None
         and data.distance is not None
         and data.height is None
@@ -37,31 +61,9 @@ def can_be_quick(data: Dataset) -> bool:
         and not data.has_position.any()
         and (data.setup is None or not data.setup.has_position.any())
         and bool((np.isfinite(data.distance) & (data.against >= 0)).all())
-    )
-
-
-def quick_misfit(robot: Robot, data: Dataset) -> float:
-    """Return the median size of what the distances are off by [m], where targets and points fit best.
-
-    Each target has points of its own, and what is known of the distances between them does not count: with it they are
-    off by more.
-
-    Parameters
-    ----------
-    robot
-        Nominal; its base is the world, and its own targets do not count.
-    data
-        For which :func:`can_be_quick` holds.
-    """
-    assert data.distance is not None
-    p, R = robot.world_poses(data.postures)
-    off = []
-    for target in np.unique(data.target).tolist():
-        mine = np.flatnonzero(data.target == target)
-        _, of = np.unique(data.against[mine], return_inverse=True)
-        where = data.configuration[mine]
-        off.append(_off_by(p[where], R[where], of, data.distance[mine]))
-    return float(np.median(np.abs(np.concatenate(off))))
+    ):
+        return data.distance
+    return None
 
 
 def _off_by(p: Array, R: Array, of: NDArray[np.intp], d: Array) -> Array:

@@ -24,7 +24,7 @@ from truearm.modeling.postures import Postures
 #: Periods in a turn of the term that errs most often.
 HIGHEST: Final = 60
 #: Standard deviation of each sine and cosine [rad] until data say better.
-_PRIOR: Final = 1e-4
+PRIOR: Final = 1e-4
 #: Configurations that are computed at once, so that a hundred thousand of them fill no memory.
 _AT_ONCE: Final = 4096
 
@@ -40,7 +40,7 @@ class JointCurve(LinearEffect):
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Sine and cosine of every period of each turning joint."""
-        return tuple(self.parameter(name, "rad", _PRIOR) for names in self.terms.values() for name in names)
+        return tuple(self.parameter(name, "rad", PRIOR) for names in self.terms.values() for name in names)
 
     @cached_property
     def terms(self) -> Mapping[int, tuple[str, ...]]:

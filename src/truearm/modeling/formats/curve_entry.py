@@ -13,11 +13,14 @@ from truearm.modeling.effects.joint_curve import HIGHEST, JointCurve, curve_name
 from truearm.modeling.formats.entries import STRICT
 from truearm.modeling.parameters import Parameter
 from truearm.shown import counted
-from truearm.units import as_number, sized_si, written
+from truearm.units import as_number, from_si, sized_si, written
 
 #: What may be left out where it is zero, or not known, for all terms of a joint.
 _OPTIONAL: Final = ("nominal", "deviation", "informed")
 _COLUMNS: Final = ("nominal", "value", "prior", "deviation", "informed")
+
+#: No coefficient is larger [rad]: five times what a fit expects of all of a joint together.
+_LARGEST: Final = math.radians(30.0)
 
 Numbers = Annotated[str, StringConstraints(strict=True)]
 
@@ -89,7 +92,8 @@ def curve_parameters(
     Raises
     ------
     InputError
-        If there is no such joint or term, one stands twice, or a list has other numbers than it should.
+        If there is no such joint or term, one stands twice, a list has other numbers than it should, or one of them is
+        larger than any curve.
     """
     found: dict[str, Parameter] = {}
     for place, entry in enumerate(entries, 1):
@@ -127,9 +131,9 @@ def curve_parameters(
         }
         for number, name in enumerate(names):
             stated = {
-                column: values[number]
+                column: _share(values[number], f"{here}.{column}")
                 if column == "informed"
-                else sized_si(values[number], angle, f"{here}.{column}", deviation=column in _POSITIVE)
+                else coefficient_si(values[number], angle, f"{here}.{column}", deviation=column in _POSITIVE)
                 for column, values in columns.items()
             }
             found[name] = Parameter(
@@ -143,6 +147,32 @@ def curve_parameters(
                 informed=stated.get("informed"),
             )
     return found
+
+
+def coefficient_si(value: float, unit: str, where: str, *, deviation: bool) -> float:
+    """Return a coefficient of a curve, or its prior or `deviation`, in radians.
+
+    Raises
+    ------
+    InputError
+        If it is larger than any curve of a joint.
+    """
+    size = sized_si(value, unit, where, deviation=deviation)
+    if abs(size) > _LARGEST:
+        raise InputError(
+            "the number is too large for a curve of a joint",
+            where=where,
+            came=f"{value:g} {unit}",
+            allowed=f"{from_si(_LARGEST, unit):.4g} {unit} or less",
+            cure="Correct the number, or its unit.",
+        )
+    return size
+
+
+def _share(value: float, where: str) -> float:
+    if not 0.0 <= value <= 1.0:
+        raise InputError("a share is meant here", where=where, came=f"{value:g}", allowed="0 to 1")
+    return value
 
 
 _POSITIVE: Final = ("prior", "deviation")

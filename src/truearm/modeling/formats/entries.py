@@ -26,6 +26,7 @@ STRICT: Final = ConfigDict(extra="forbid", frozen=True)
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False, strict=True)]
 Triple = tuple[Number, Number, Number]
 
 

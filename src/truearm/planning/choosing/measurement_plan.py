@@ -17,7 +17,6 @@ from truearm.identification.start_values.frames import initial_frames
 from truearm.identification.start_values.from_readings import unanchored, with_fixtures_of
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
-from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.exchange import FIRST, most_informative, most_informative_number
@@ -27,7 +26,7 @@ from truearm.planning.choosing.prediction import Prediction, There, model_error,
 from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
 from truearm.planning.constraints.constraints import Constraints, allowed
 from truearm.simulation.devices import Device, in_view_of
-from truearm.simulation.truths import DEFAULT_TOOL
+from truearm.simulation.truths import carrying_targets
 
 #: How far before a configuration each joint stops, to come to it moving forward [rad; m for sliding joints].
 APPROACH: Final = {"revolute": np.deg2rad(2.0), "prismatic": 5e-3}
@@ -99,13 +98,9 @@ def with_targets(robot: Robot, data: Dataset | None = None) -> Robot:
     The tool is the robot file's first, or three reflectors 150 mm apart. Where the robot stands is then not known, and
     it does not matter to what its readings tell.
     """
-    if robot.targets:
-        return robot
-    if data is not None and data.has_position.any():
+    if not robot.targets and data is not None and data.has_position.any():
         return initial_frames(robot, data)
-    tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
-    carrying = robot.with_payload(Payload(tool.mass, tool.cog)) if robot.payload == NO_PAYLOAD else robot
-    return carrying.with_frames(robot.base, tool.targets)
+    return carrying_targets(robot)
 
 
 def random_candidates(robot: Robot, count: int, rng: np.random.Generator) -> Postures:

@@ -40,10 +40,8 @@ from truearm.modeling.chain import Array
 LEAST_CYCLES: Final = 5
 #: What may lie beyond either end.
 TAIL: Final = 0.025
-#: The same for RP, whose covariance is estimated: 95 % of the simulated quotients would hold 93 % to 95 %.
-_TAIL_RP: Final = 0.015
 #: Campaigns simulated for RP.
-_CAMPAIGNS: Final = 2000
+_CAMPAIGNS: Final = 8000
 #: The standard error of RP is at least this share of a Gaussian's: cycles on a circle have none.
 _LEAST_ERROR: Final = 0.4
 
@@ -129,7 +127,7 @@ def repeatability_interval(points: Array) -> Interval | None:
         return None
     true, found, errors = _gaussian_campaigns(centred, n)
     quotient = np.sort((found - true) / errors)
-    low, high = np.quantile(quotient, (_TAIL_RP, 1.0 - _TAIL_RP))
+    low, high = np.quantile(quotient, (TAIL, 1.0 - TAIL))
     own = max(float(error), _LEAST_ERROR * float(np.median(errors)))
     return math.exp(float(value) - float(high) * own), math.exp(float(value) - float(low) * own)
 

@@ -23,6 +23,10 @@ _TESTED: Final = 80
 _HALVINGS: Final = 20
 _HALVINGS_FACTOR: Final = 60
 
+#: What may lie below the lower end of a largest difference: places that seem apart by scatter make it too high, so that
+#: it would be missed twice as often.
+_TAIL_BELOW: Final = 0.5 * TAIL
+
 Statistic = Callable[[Array], Array]
 
 
@@ -51,6 +55,7 @@ def norm_interval(mean: Array, covariance: Array, cycles: int, known: Array) -> 
     variances, axes = np.linalg.eigh(covariance / cycles + known)
     if not variances[-1] > 0:
         return None
+    axes = axes * np.where(mean @ axes < 0, -1.0, 1.0)  # so that no frame draws another noise
     noise = barycentre_scatter(axes.T @ covariance @ axes, cycles, axes.T @ known @ axes, 0)
     squares = (noise**2).sum(axis=1)
     norm = float(np.linalg.norm(mean))
@@ -124,9 +129,9 @@ def largest_interval(statistic: Statistic, found: Array, noise: Array, other: Ar
 
     at_zero = share_below(0.0)
     upper = _where(share_below, TAIL * max(at_zero, 1.0 / _DRAWS), value, value + scale)
-    if at_zero <= 1.0 - TAIL:
+    if at_zero <= 1.0 - _TAIL_BELOW:
         return 0.0, upper
-    return _where(share_below, 1.0 - TAIL, max(0.0, value - scale), value), upper
+    return _where(share_below, 1.0 - _TAIL_BELOW, max(0.0, value - scale), value), upper
 
 
 def _where(falling: Callable[[float], float], level: float, low: float, high: float) -> float:
@@ -182,9 +187,9 @@ def _chi_square(shares: Array, freedom: int) -> Array:
 
 
 def _root(covariance: Array) -> Array:
-    """Return a square root of a covariance, which may be singular, ``(d, d)``."""
+    """Return the symmetric square root of a covariance, which may be singular, ``(d, d)``."""
     variances, axes = np.linalg.eigh(covariance)
-    return np.asarray(axes * np.sqrt(np.maximum(variances, 0.0)))
+    return np.asarray((axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T)
 
 
 def largest_difference(places: Sequence[Array], pairs: Sequence[tuple[int, int]]) -> tuple[float, Interval | None]:

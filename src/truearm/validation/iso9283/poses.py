@@ -39,6 +39,7 @@ from truearm.validation.iso9283.values import Component, Conditions, Instrument,
 #: Robots that are exchanged.
 ROBOTS: Final = 5
 _NOTHING: Final = math.nan
+_LENGTHS: Final[tuple[Component, ...]] = ("position", *AXES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +289,7 @@ def _distances(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
         common = (where, n, test.cycles, under)
         if n == 0:
             for id in ("AD", "RD"):
-                yield from (valued(id, part, *common, _NOTHING, "length") for part in ("position", *AXES))
+                yield from (valued(id, part, *common, _NOTHING, "length") for part in _LENGTHS)
                 yield from (valued(id, angle, *common, _NOTHING, "angle") for angle in ANGLES)
             continue
         a, b = both

@@ -16,7 +16,8 @@ from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.fixtures import Fixture
 from truearm.modeling.formats.balancer_entry import check_anchors
 from truearm.modeling.formats.controller_entry import STATED
-from truearm.modeling.formats.curve_entry import curve_parameters
+from truearm.modeling.formats.curve_entry import coefficient_si, curve_parameters
+from truearm.modeling.formats.robot_file.correlations import factor_from
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
@@ -207,6 +208,9 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
             raise InputError(
                 "the unit differs from the file's", where=f"{where}, {place}", came=entry.unit, allowed=unit
             )
+        if plain.group == JointCurve.name:
+            for key in ("nominal", "value", "prior"):
+                coefficient_si(getattr(entry, key), unit, f"{where}, {place}.{key}", deviation=key == "prior")
         parameters.append(
             Parameter(
                 name,
@@ -255,14 +259,6 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
             allowed=f"{', '.join(HELD)}, or parameters of targets",
             cure=cure,
         )
-    if len(entry.correlations) != len(entry.deviations):
-        raise InputError(
-            "one row belongs here for each of the deviations",
-            where=f"{where}, proof.correlations",
-            came=counted(len(entry.correlations), "row"),
-            allowed=str(len(entry.deviations)),
-            cure=cure,
-        )
     return Proof(
         status=entry.status,
         errors=tuple(Notice(error.code, error.message, "error") for error in entry.errors),
@@ -270,10 +266,7 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
         joint_error=tuple(to_si(value, u) for value, u in zip(entry.joint_error, joints, strict=False)),
         names=tuple(entry.deviations),
         deviations=tuple(to_si(v, shown[robot.parameters[n].unit]) for n, v in entry.deviations.items()),
-        factor=tuple(
-            _row(row, number, f"{where}, proof.correlations[{number}]", cure)
-            for number, row in enumerate(entry.correlations, 1)
-        ),
+        factor=factor_from(entry.correlations, len(entry.deviations), f"{where}, proof.correlations", cure),
         lower_bound=entry.lower_bound,
         warnings=tuple(Notice(warning.code, warning.message, "note") for warning in entry.warnings),
         held=tuple(entry.held),
@@ -300,20 +293,6 @@ def _position(text: str, robot: Robot, where: str, cure: str) -> tuple[float, ..
         )
     units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
     return tuple(to_si(value, unit) for value, unit in zip(known, units, strict=True))
-
-
-def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:
-    numbers = [as_number(word) for word in text.split()]
-    known = tuple(number for number in numbers if number is not None and abs(number) <= 1.0)
-    if len(known) != count or len(numbers) != count:
-        raise InputError(
-            "numbers from -1 to 1 belong here, one more than in the row before",
-            where=where,
-            came=text,
-            allowed=counted(count, "number"),
-            cure=cure,
-        )
-    return known
 
 
 #: Entries of a joint in every convention.

@@ -14,7 +14,17 @@ from truearm.modeling.fixtures import FixtureKind
 from truearm.modeling.formats.balancer_entry import BalancerEntry
 from truearm.modeling.formats.controller_entry import ControllerEntry
 from truearm.modeling.formats.curve_entry import CurveEntry
-from truearm.modeling.formats.entries import STRICT, Name, NotNegative, Number, Place, Positive, Quaternion, Triple
+from truearm.modeling.formats.entries import (
+    STRICT,
+    Name,
+    NotNegative,
+    Number,
+    Place,
+    Positive,
+    Quaternion,
+    Share,
+    Triple,
+)
 from truearm.modeling.parts import GRAVITY, POINT_MASS, Inertia
 from truearm.printable import is_one_line
 
@@ -148,7 +158,7 @@ class ParameterEntry(_Entry):
     prior: Positive
     unit: str
     deviation: NotNegative | None = None
-    informed: Number | None = None
+    informed: Share | None = None
 
 
 class PriorsEntry(_Entry):
@@ -180,7 +190,9 @@ class ProofEntry(_Entry):
     held: list[TargetName] = []
     loads: list[tuple[Number, Number]] = []
     deviations: dict[str, NotNegative] = {}
-    correlations: list[Annotated[str, StringConstraints(strict=True)]] = []
+    correlations: (
+        list[Annotated[str, StringConstraints(strict=True)]] | Annotated[str, StringConstraints(strict=True)]
+    ) = []
     measured: list[Annotated[str, StringConstraints(strict=True)]] = []
     sha256: Annotated[str, StringConstraints(strict=True, pattern="^[0-9a-f]{64}$")]
 

@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from typing import Final
 
+from truearm.modeling.formats.robot_file.correlations import digits_of
 from truearm.modeling.formats.robot_file.writing import file_content
 from truearm.modeling.parameters import PLACES
 from truearm.modeling.proof import Proof
@@ -44,5 +45,8 @@ def _digest(robot: Robot) -> str:
     controller = {name: entry for name, entry in content.pop("controller", {}).items() if name != "kinematics"}
     content |= {"controller": controller} if controller else {}
     content["parameters"] = {name: entry["value"] for name, entry in content.get("parameters", {}).items()}
-    content["proof"] = {name: entry for name, entry in content.get("proof", {}).items() if name != "sha256"}
+    proof = {name: entry for name, entry in content.get("proof", {}).items() if name != "sha256"}
+    if robot.proof is not None and "correlations" in proof:  # in digits, whichever way they are written
+        proof["correlations"] = digits_of(robot.proof.factor)
+    content["proof"] = proof
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -13,6 +13,7 @@ from truearm.modeling.formats.balancer_entry import balancer_entry
 from truearm.modeling.formats.controller_entry import controller_entry
 from truearm.modeling.formats.curve_entry import curve_entries
 from truearm.modeling.formats.entries import NAME, place_entry
+from truearm.modeling.formats.robot_file.correlations import correlations_text
 from truearm.modeling.formats.robot_file.schema import SCHEMA
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
@@ -273,7 +274,8 @@ def _proof(
                 for name, deviation in zip(proof.names, proof.deviations, strict=True)
             }
         )
-        made["correlations"] = [text(" ".join(f"{v:.7g}" for v in row)) for row in proof.factor]
+        found = correlations_text(proof.factor)
+        made["correlations"] = text(found) if isinstance(found, str) else [text(row) for row in found]
         if proof.measured:
             made["measured"] = [
                 text(" ".join(position_text(v, u) for v, u in zip(row, units, strict=True))) for row in proof.measured

@@ -1,0 +1,78 @@
+"""Curves of joints that stand in for joints that give way, and beside other effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from truearm.identification.judging.curve_range import check_curves
+from truearm.identification.judging.curves_of_loads import check_curves_of_loads, share_of_loads
+from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.step_words import other_model
+from truearm.identification.judging.unmodelled import Explanation
+from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.models import named_model
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.parts import LinkMass, Payload
+from truearm.modeling.robot import Robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
+from truearm.simulation.twin_joint import JointTruth
+
+CURVES = named_model("geometric").also(["joint-curve"])
+
+
+@cache
+def arm() -> Robot:
+    masses = (LinkMass(2, 8.0, (0.2, 0.0, 0.0)), LinkMass(3, 6.0, (0.0, 0.0, 0.2)))
+    return replace(load_robot("li3"), masses=masses, payload=Payload(3.0, (0.02, 0.01, 0.05)))
+
+
+@cache
+def fitted(truth: str, model: str = "") -> tuple[Dataset, Fit]:
+    """Return readings of an arm that bends, or whose gears err, and a fit with curves."""
+    rng = np.random.default_rng(2)
+    gear = ((1, 3e-4, 0.3), (5, 2e-4, 1.0))
+    joint = JointTruth(compliance=2e-5) if truth == "bends" else JointTruth(gear=gear)
+    twin = replace(truth_twin(arm(), "random", rng), joints={2: joint, 3: joint})
+    data = measure(twin, arm().random_configurations(60, rng), 2e-5, rng)
+    return data, identify(arm(), data, CURVES.also([model]) if model else CURVES)
+
+
+def test_curves_that_loads_explain_are_told() -> None:
+    data, fit = fitted("bends")
+    (notice,) = check_curves_of_loads(LeftOver.of(fit, data))
+    assert (notice.code, notice.level) == ("curves-of-loads", "warning")
+    assert "`effects=compliance`" in notice.message
+
+
+@pytest.mark.parametrize(("truth", "model"), [("gears", ""), ("bends", "compliance")])
+def test_curves_of_gears_and_those_beside_compliance_are_not(truth: str, model: str) -> None:
+    data, fit = fitted(truth, model)
+    assert check_curves_of_loads(LeftOver.of(fit, data)) == []
+
+
+def test_nothing_is_told_where_nothing_loads_the_joints_or_there_is_no_curve() -> None:
+    data, fit = fitted("bends")
+    weightless = replace(fit, robot=replace(fit.robot, masses=(), payload=Payload()))
+    assert share_of_loads(LeftOver.of(weightless, data)) == 0.0
+    assert share_of_loads(LeftOver.of(identify(arm(), data, named_model("geometric")), data)) == 0.0
+
+
+def test_curves_beside_the_periods_they_contain_are_told() -> None:
+    data, fit = fitted("gears")
+    assert not any(notice.code == "curves-and-fourier" for notice in check_curves(fit, data))
+    data, fit = fitted("gears", "fourier")
+    notice = next(notice for notice in check_curves(fit, data) if notice.code == "curves-and-fourier")
+    assert notice.level == "note"
+
+
+def test_who_is_advised_to_use_two_periods_is_told_of_curves() -> None:
+    _, fit = fitted("gears")
+    step = other_model(fit, Explanation("fourier", 0.5, 0.0, 0.0), 1e-4)
+    assert step.code == "other-model"
+    assert "`effects=fourier`, or `effects=joint-curve`, which contains it" in step.message

@@ -1,0 +1,58 @@
+"""Files of how the instrument was tied to the robot's base."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from truearm.errors import InputError
+from truearm.validation.iso9283.alignment import best_fit, read_alignment
+
+FILE = {
+    "truearm": "truearm-alignment/1",
+    "units": "{length: mm, angle: deg}",
+    "kind": "base-features",
+    "position": "[1500, -310, 12]",
+    "quaternion": "[0, 0, 0, 1]",
+    "sigma": "0.03",
+    "sigma_rot": "0.002",
+}
+
+
+def written(folder: Path, **changes: str) -> Path:
+    path = folder / "tie.yaml"
+    path.write_text("".join(f"{key}: {value}\n" for key, value in (FILE | changes).items()), encoding="utf-8")
+    return path
+
+
+def test_a_tie_is_read(tmp_path: Path) -> None:
+    tie = read_alignment(written(tmp_path))
+    assert tie.in_base(np.array([[1.0, 0, 0]])) == pytest.approx(np.array([[0.5, -0.31, 0.012]]))
+    assert tie.kind == "base-features"
+    assert (tie.sigma, tie.sigma_rot) == pytest.approx((3e-5, math.radians(0.002)))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("quaternion", "[1, 1, 0, 0]", "does not have length 1"),
+        ("sigma", "0", "too small"),
+        ("sigma_rot", "-1", "too small"),
+        ("kind", "best-fit", "kind"),
+        ("units", "{length: in, angle: deg}", "length"),
+        ("position", "[1, 2]", "position"),
+    ],
+)
+def test_a_tie_that_cannot_be_used_is_refused(tmp_path: Path, key: str, value: str, text: str) -> None:
+    with pytest.raises(InputError, match=text) as refused:
+        read_alignment(written(tmp_path, **{key: value}))
+    assert "tie.yaml" in str(refused.value)
+
+
+def test_poses_on_a_line_have_no_best_fit() -> None:
+    line = np.arange(5.0)[:, None] * np.ones(3)
+    with pytest.raises(InputError, match="do not lie on a line"):
+        best_fit(line, line)

@@ -1,0 +1,312 @@
+"""Criteria of poses against closed forms, their invariances, and every refusal."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+import pytest
+
+from truearm.errors import InputError
+from truearm.library import load_robot
+from truearm.measurement.performance.records import AttainedPoses, Names, Pushes
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import Transform, rotation_from_vector
+from truearm.planning.iso9283.planned import PerformancePlan, PlannedPose, PlannedTest
+from truearm.planning.poses.iso9283 import Cube
+from truearm.validation.iso9283.alignment import Alignment
+from truearm.validation.iso9283.compliance import GRAVITY, evaluate_pushes
+from truearm.validation.iso9283.drift import groups_of
+from truearm.validation.iso9283.intervals import repeatability
+from truearm.validation.iso9283.inverted_tests import norm_interval
+from truearm.validation.iso9283.pose_rows import best_fit_of, cycles_of
+from truearm.validation.iso9283.poses import evaluate
+from truearm.validation.iso9283.values import Instrument, Value
+
+CUBE = Cube((0.5, 0.0, 0.5), 0.4)
+POINTS = CUBE.plane("C1-C2-C7-C8").measuring_points
+NAMES = ("P1", "P2", "P3", "P4", "P5")
+TIE = Alignment("base-features", Transform(), 1e-5, 1e-5)
+TRACKER = Instrument(1e-6, 1e-6)
+
+
+def plan(*tests: PlannedTest) -> PerformancePlan:
+    poses = {name: PlannedPose(name, point, np.eye(3), np.zeros(6)) for name, point in zip(NAMES, POINTS, strict=True)}
+    return PerformancePlan(load_robot("irb120"), None, CUBE, "C1-C2-C7-C8", poses, {}, {}, tests, 3.0, 0.5)
+
+
+def rows(
+    test: str, pose: list[str], cycle: list[int], position: Array, rotation: Array | None = None, **more: list[str]
+) -> AttainedPoses:
+    n = len(pose)
+    texts = {name: Names.of(more.get(name, [""] * n)) for name in ("robot", "approach")}
+    return AttainedPoses(
+        criterion=Names.of([test] * n),
+        pose=Names.of(pose),
+        cycle=np.array(cycle, dtype=np.intp),
+        velocity=np.ones(n),
+        load=np.ones(n),
+        time=np.full(n, np.nan),
+        position=position,
+        rotation=rotation,
+        line=np.arange(2, n + 2),
+        source="poses.csv",
+        **texts,
+    )
+
+
+def found(values: tuple[Value, ...], id: str, component: str = "position", where: str | None = None) -> Value:
+    return next(v for v in values if v.id == id and v.component == component and where in (None, v.where))
+
+
+def campaign(seed: int = 0, n: int = 30) -> tuple[PerformancePlan, AttainedPoses]:
+    """All five poses, a millimetre off, with scatter and orientations."""
+    rng = np.random.default_rng(seed)
+    pose = [name for name in NAMES for _ in range(n)]
+    position = np.repeat(POINTS, n, axis=0) + [1e-3, 0, 0] + 1e-4 * rng.standard_normal((5 * n, 3))
+    rotation = rotation_from_vector([1e-3, -2e-3, 3e-3] + 1e-4 * rng.standard_normal((5 * n, 3)))
+    return plan(PlannedTest("AP", NAMES, 30)), rows("AP", pose, [*range(1, n + 1)] * 5, position, rotation)
+
+
+def test_poses_on_a_circle_have_the_radius_as_repeatability() -> None:
+    angle = 2 * np.pi * np.arange(30) / 30
+    points = POINTS[0] + 2e-4 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + [0, 0, 5e-4]
+    made = evaluate(
+        plan(PlannedTest("AP", ("P1",), 30)), rows("AP", ["P1"] * 30, [*range(1, 31)], points), TIE, TRACKER
+    )
+    assert found(made.values, "RP").value == pytest.approx(2e-4, rel=1e-9)
+    assert found(made.values, "AP").value == pytest.approx(5e-4, rel=1e-9)
+    assert found(made.values, "AP", "a").status == "not-measured"
+    assert made.clouds[0].rp == found(made.values, "RP").value
+
+
+def test_repeatability_of_printed_numbers() -> None:
+    # Barycentre 0; distances 3, 3, 4, 4, 0: mean 2.8, S^2 = (2 0.04 + 2 1.44 + 7.84) / 4 = 2.7.
+    points = np.array([[3.0, 0, 0], [-3, 0, 0], [0, 4, 0], [0, -4, 0], [0, 0, 0]])
+    assert float(repeatability(points)) == pytest.approx(2.8 + 3 * math.sqrt(2.7), abs=1e-12)
+
+
+def test_expected_repeatability_of_a_gaussian() -> None:
+    # About the barycentre, distances are Maxwell's with n - 1 over n of the variance. S^2 is unbiased but for the
+    # correlation of what lies about a common barycentre.
+    n, trials = 30, 10_000
+    points = np.random.default_rng(1).standard_normal((trials, n, 3))
+    length = np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2)
+    assert length.mean() == pytest.approx(math.sqrt(8 / math.pi * (n - 1) / n), rel=2e-3)
+    # Var l - Cov(l, l') with correlation -1 / (n - 1) of coordinates: Cov is about 2 r^2 (4 / 3 pi) of the variance.
+    variance = (n - 1) / n * (3 - 8 / math.pi)
+    covariance = (n - 1) / n * 8 / (3 * math.pi) / 2 / (n - 1) ** 2
+    assert length.var(axis=1, ddof=1).mean() == pytest.approx(variance - covariance, rel=6e-3)
+
+
+def test_angles_are_means_and_three_deviations() -> None:
+    task, read = campaign()
+    values = evaluate(task, read, TIE, TRACKER).values
+    vectors = cycles_of(task, read, TIE)[2].angles
+    assert vectors is not None
+    for k, (angle, true) in enumerate(zip("abc", (1e-3, -2e-3, 3e-3), strict=True)):
+        accuracy, spread = (found(values, id, angle, "P3") for id in ("AP", "RP"))
+        assert accuracy.value == pytest.approx(true, abs=1e-4)
+        assert accuracy.interval is not None
+        assert accuracy.interval[0] < true < accuracy.interval[1]
+        assert spread.value == pytest.approx(3 * np.std(vectors[:, k], ddof=1), rel=1e-12)
+
+
+def test_neither_order_nor_frame_of_the_instrument_matters() -> None:
+    task, read = campaign()
+    plain = evaluate(task, read, TIE, TRACKER).values
+    rng = np.random.default_rng(3)
+    order = rng.permutation(len(read.cycle))
+    assert read.rotation is not None
+    shuffled = rows(
+        "AP", [read.pose.names[c] for c in read.pose.code[order]], read.cycle[order].tolist(), read.position[order],
+        read.rotation[order],
+    )  # fmt: skip
+    R, p = rotation_from_vector(np.array([0.3, -1.2, 0.8])), np.array([2.0, -1.0, 0.4])
+    elsewhere = dataclasses.replace(read, position=(read.position - p) @ R, rotation=R.T @ read.rotation)
+    tie = dataclasses.replace(TIE, T_base_instrument=Transform.from_matrix(R, p))
+    for other in (evaluate(task, shuffled, TIE, TRACKER), evaluate(task, elsewhere, tie, TRACKER)):
+        for one, two in zip(plain, other.values, strict=True):
+            assert (one.id, one.component, one.where) == (two.id, two.component, two.where)
+            assert one.value == pytest.approx(two.value, rel=1e-7, abs=1e-12)
+            assert one.interval == pytest.approx(two.interval, rel=1e-4, abs=1e-9)
+
+
+def test_the_tie_widens_pose_accuracy_with_its_lever() -> None:
+    task, read = campaign()
+    coarse = dataclasses.replace(TIE, sigma=1e-4, sigma_rot=1e-4)
+    narrow, wide = (found(evaluate(task, read, tie, TRACKER).values, "AP").interval for tie in (TIE, coarse))
+    assert narrow is not None
+    assert wide is not None
+    assert wide[1] - wide[0] > 2.5 * (narrow[1] - narrow[0])
+    lever = coarse.covariance_at(np.array([2.0, 0, 0]))
+    assert np.diag(lever) == pytest.approx([1e-8, 1e-8 + 4e-8, 1e-8 + 4e-8])
+
+
+def test_best_fit_hides_a_common_error_and_says_so() -> None:
+    task, read = campaign()
+    tie = best_fit_of(task, read)
+    assert not tie.is_standard
+    assert TIE.is_standard
+    assert found(evaluate(task, read, tie, TRACKER).values, "AP").value < 1e-4
+    with pytest.raises(InputError, match="three poses or more"):
+        best_fit_of(task, rows("AP", ["P1", "P2"], [1, 1], POINTS[:2]))
+
+
+def test_variation_between_approaches() -> None:
+    rng = np.random.default_rng(5)
+    offsets = {"x": [0, 0, 0], "y": [3e-4, 0, 0], "z": [0, 4e-4, 0]}
+    names = [name for name in offsets for _ in range(30)]
+    points = POINTS[0] + np.array([offsets[name] for name in names]) + 1e-5 * rng.standard_normal((90, 3))
+    task = plan(PlannedTest("vAP", ("P1",), 30, approaches=("x", "y", "z")))
+    value = found(
+        evaluate(task, rows("vAP", ["P1"] * 90, [*range(1, 31)] * 3, points, approach=names), TIE, TRACKER).values,
+        "vAP",
+    )
+    assert value.value == pytest.approx(5e-4, abs=1e-5)
+    assert value.interval is not None
+    assert value.interval[0] < 5e-4 < value.interval[1]
+    assert value.status == "measured"
+
+
+def test_distances_by_cycles_and_axes() -> None:
+    wave = 1e-4 * np.cos(2 * np.pi * np.arange(30) / 30)
+    way = (POINTS[3] - POINTS[1]) / np.linalg.norm(POINTS[3] - POINTS[1])
+    ends = np.concatenate([np.tile(POINTS[1], (30, 1)), POINTS[3] + (2e-4 + wave)[:, None] * way])
+    task = plan(PlannedTest("AD", ("P2", "P4"), 30))
+    values = evaluate(task, rows("AD", ["P2"] * 30 + ["P4"] * 30, [*range(1, 31)] * 2, ends), TIE, TRACKER).values
+    assert found(values, "AD").value == pytest.approx(2e-4)
+    assert found(values, "AD").where == "P2-P4"
+    assert found(values, "RD").value == pytest.approx(3 * wave.std(ddof=1))
+    parts = [found(values, "AD", axis).value for axis in "xyz"]
+    assert parts == pytest.approx(2e-4 * np.abs(way), abs=1e-12)
+
+
+def test_exchanged_robots() -> None:
+    rng = np.random.default_rng(6)
+    robots = [f"r{k}" for k in range(5) for _ in range(60)]
+    pose = ([*["P1"] * 30, *["P2"] * 30]) * 5
+    away = np.array(
+        [[1e-4 * int(name[1]) * (2 if at == "P2" else 1), 0, 0] for name, at in zip(robots, pose, strict=True)]
+    )
+    points = np.array([POINTS[NAMES.index(name)] for name in pose]) + away + 1e-6 * rng.standard_normal((300, 3))
+    task = plan(PlannedTest("E", ("P1", "P2"), 30))
+    values = evaluate(task, rows("E", pose, [*range(1, 31)] * 10, points, robot=robots), TIE, TRACKER).values
+    assert [found(values, "E", where=where).value for where in ("P1", "P2", "all poses")] == pytest.approx(
+        [4e-4, 8e-4, 8e-4], abs=2e-6
+    )
+    assert {value.status for value in values} == {"measured"}
+    few = evaluate(task, rows("E", pose[:120], [*range(1, 31)] * 4, points[:120], robot=robots[:120]), TIE, TRACKER)
+    assert {value.status for value in few.values} == {"too-few-cycles"}
+
+
+def test_drift_by_groups_of_cycles() -> None:
+    rng = np.random.default_rng(7)
+    change = np.array([0, 1e-4, 3e-4, 2e-4])
+    points = POINTS[0] + [1e-3, 0, 0] + 1e-6 * rng.standard_normal((40, 3)) + np.repeat(change, 10)[:, None] * [1, 0, 0]
+    task, read = plan(PlannedTest("dAP", ("P1",), 10)), rows("dAP", ["P1"] * 40, [*range(1, 11)] * 4, points)
+    made = evaluate(task, read, TIE, TRACKER)
+    assert found(made.values, "dAP").value == pytest.approx(3e-4, abs=2e-6)
+    interval = found(made.values, "dAP").interval
+    assert interval is not None
+    assert interval[0] < 3e-4 < interval[1]
+    assert made.drift[0].ap - made.drift[0].ap[0] == pytest.approx(change, abs=2e-6)
+    assert found(made.values, "dRP").value < 1e-5
+    times = 10.0 * np.arange(40) + np.repeat([0, 3600, 7200, 9000], 10)
+    on = dataclasses.replace(read, cycle=np.arange(1, 41), time=times)
+    assert [len(group) for group in groups_of(cycles_of(task, on, TIE)[0])] == [10, 10, 10, 10]
+
+
+def test_statuses() -> None:
+    task, read = campaign(n=4)
+    values = evaluate(task, read, TIE, TRACKER).values
+    few = found(values, "AP")
+    assert (few.status, few.interval, few.cycles) == ("too-few-cycles", None, 4)
+    assert few.least is not None
+    assert few.largest is not None
+    assert few.least < few.value < few.largest
+    task, read = campaign()
+    values = evaluate(task, read, TIE, Instrument(3e-4, 1e-6)).values
+    assert (found(values, "AP").status, found(values, "RP").status) == ("instrument-too-coarse",) * 2
+    assert found(values, "AP", "c").status == "measured"
+    whole = plan(*(PlannedTest(id, ("P1", "P2"), 10) for id in ("AP", "vAP", "AD", "dAP", "E")))
+    rest = [v for v in evaluate(whole, rows("AP", ["P1"], [1], POINTS[:1]), TIE, TRACKER).values if v.where != "P1"]
+    assert {v.id for v in rest if v.status == "not-measured"} >= {"AP", "RP", "AD", "RD", "E", "dAP", "dRP", "vAP"}
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda r: dataclasses.replace(r, criterion=Names.of(["RP"])), "RP is evaluated from the rows of AP"),
+        (lambda r: dataclasses.replace(r, criterion=Names.of(["dRP"])), "dRP is evaluated from the rows of dAP"),
+        (lambda r: dataclasses.replace(r, criterion=Names.of(["AT"])), "AT is not evaluated from poses"),
+        (lambda r: dataclasses.replace(r, criterion=Names.of(["AQ"])), "the criterion is not known"),
+        (lambda r: dataclasses.replace(r, criterion=Names.of(["AD"])), "the plan does not have this test"),
+        (lambda r: dataclasses.replace(r, pose=Names.of(["P9"])), "does not have this pose in the test AP"),
+        (lambda r: dataclasses.replace(r, position=r.position + 0.3), "1 pose outside the cube, the first 100 mm"),
+        (lambda r: dataclasses.replace(r, criterion=Names.of(["vAP"])), "the approach is missing"),
+        (
+            lambda r: dataclasses.replace(r, criterion=Names.of(["vAP"]), approach=Names.of(["w"])),
+            "the plan does not have this approach",
+        ),
+        (lambda r: dataclasses.replace(r, criterion=Names.of(["E"])), "robots that are exchanged need names"),
+    ],
+)
+def test_rows_that_do_not_fit_the_plan_are_refused(change: Callable[[AttainedPoses], AttainedPoses], text: str) -> None:
+    task = plan(
+        PlannedTest("AP", NAMES, 30), PlannedTest("vAP", NAMES, 30, approaches=("x", "y")), PlannedTest("E", NAMES, 30),
+        PlannedTest("dAP", ("P1",), 10),
+    )  # fmt: skip
+    with pytest.raises(InputError, match=text) as refused:
+        evaluate(task, change(rows("AP", ["P1"], [1], POINTS[:1] + 0.0)), TIE, TRACKER)
+    assert "poses.csv, line 2" in str(refused.value)
+
+
+def test_a_cycle_with_two_approaches_in_a_test_without_them_is_refused() -> None:
+    read = rows("AP", ["P1"] * 2, [1, 1], POINTS[[0, 0]], approach=["x", "y"])
+    with pytest.raises(InputError, match="lines 2 and 3: cycle 1 appears twice"):
+        evaluate(plan(PlannedTest("AP", NAMES, 30)), read, TIE, TRACKER)
+
+
+def pushes(stiffness: float = 5e5, most: float = 3.0 * GRAVITY) -> Pushes:
+    """A linear spring, which begins at 0.1 mm, seen from an instrument that is turned."""
+    keys = [*product((s + a for a in "xyz" for s in "+-"), (1, 2, 3), range(11))]
+    force = np.array([most * step / 10 for _, _, step in keys])
+    way = np.array([np.eye(3)["xyz".index(d[1])] * (1 if d[0] == "+" else -1) for d, _, _ in keys])
+    position = POINTS[0] + 1e-4 * way + way * (force / stiffness)[:, None]
+    cycle = np.array([c for _, c, _ in keys], dtype=np.intp)
+    return Pushes(Names.of([d for d, _, _ in keys]), force, cycle, position, np.arange(2, 200), "forces.csv")
+
+
+def test_compliance_of_a_linear_spring() -> None:
+    task = plan(PlannedTest("compliance", ("P1",), 3))
+    values, lines = evaluate_pushes(task, pushes(), TIE, TRACKER)
+    assert [value.where for value in values] == ["+x", "-x", "+y", "-y", "+z", "-z"]
+    for value in values:
+        assert (value.value, value.least, value.largest) == pytest.approx((2e-6,) * 3, rel=1e-9)
+        assert (value.status, value.interval, value.cycles) == ("measured", None, 3)
+    assert len(lines) == 18
+    assert lines[0].displacement == pytest.approx(lines[0].force * 2e-6, abs=1e-12)
+
+
+def test_pushes_that_cannot_be_used_are_refused() -> None:
+    task = plan(PlannedTest("compliance", ("P1",), 3, approaches=("+x",)))
+    with pytest.raises(InputError, match="does not have this direction"):
+        evaluate_pushes(task, pushes(), TIE, TRACKER)
+    task = plan(PlannedTest("compliance", ("P1",), 3))
+    with pytest.raises(InputError, match="above the weight of the rated load"):
+        evaluate_pushes(task, pushes(most=40.0), TIE, TRACKER)
+    with pytest.raises(InputError, match="one force alone"):
+        evaluate_pushes(task, pushes(most=0.0), TIE, TRACKER)
+    with pytest.raises(InputError, match="no test of compliance"):
+        evaluate_pushes(plan(), pushes(), TIE, TRACKER)
+
+
+def test_a_perfect_robot_is_seldom_called_inaccurate() -> None:
+    rng = np.random.default_rng(11)
+    points = rng.standard_normal((300, 30, 3)) * [3, 1, 0.3]
+    intervals = [norm_interval(p.mean(axis=0), np.cov(p.T), 30, np.zeros((3, 3))) for p in points]
+    assert np.mean([one is not None and one[0] == 0.0 for one in intervals]) > 0.95

@@ -12,6 +12,7 @@ from tests.performance_plan import small_plan
 
 from truearm.compensation.cell import Cell, read_tools
 from truearm.compensation.iso9283.programs import measuring_programs
+from truearm.compensation.iso9283.routes import Routes
 from truearm.compensation.path_program import BY_NAME
 from truearm.compensation.program_correction import commanded
 from truearm.compensation.programs.motion_program import (
@@ -75,11 +76,11 @@ def meant(name: str, program: MotionProgram) -> list[tuple[str, int | None, int]
 def check_target(found: Program, index: int, program: MotionProgram, row: int) -> None:
     target = found.targets[index]
     form, values = target.form, np.array(target.values)
-    assert program.poses is not None
     if form.kind == "joints":
         assert values * form.angle == pytest.approx(program.joints[row], abs=1e-6)
         return
     assert form.orientation is not None
+    assert program.poses is not None
     assert values[:3] * form.length == pytest.approx(program.poses[row, :3, 3], abs=6e-7)
     numbers = values[None, 3:] * (1.0 if form.orientation.count == 4 else form.angle)
     assert form.orientation.matrices(numbers)[0] == pytest.approx(program.poses[row, :3, :3], abs=2e-6)
@@ -282,6 +283,18 @@ def test_what_cannot_be_gone_is_refused_with_the_move() -> None:
     )
     with pytest.raises(InputError, match="this path has one orientation, and another is needed"):
         measuring_programs(kept, 1.0, "abc")
+
+
+def test_only_straight_moves_need_the_frames_of_the_controller() -> None:
+    puma = load_robot("puma560")
+    plan = small_plan(["AP"], cycles={"AP": 1})
+    joints = np.radians([0.0, -45.0, 20.0, 0.0, 30.0, 0.0])
+    poses = {name: replace(pose, joints=joints) for name, pose in plan.poses.items()}
+    (program,) = measuring_programs(replace(plan, robot=puma, poses=poses), 1.0, "abc").slow
+    assert program.poses is None
+    assert len(read_again("val3", program).moves) == 7
+    with pytest.raises(InputError, match="it is not known where the controller of puma560 has its frames"):
+        Routes(puma, None, joints).of("AT-reorientation", small_plan(["AT-reorientation"]).paths["line"])
 
 
 def test_robots_that_have_no_such_programs_are_refused() -> None:

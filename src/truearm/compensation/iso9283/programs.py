@@ -76,7 +76,8 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> Measur
     Raises
     ------
     InputError
-        If the robot is calibrated or has more than six joints, a pose that the tests need is not in the plan, or a
+        If the robot is calibrated or has more than six joints, it is not known where its controller has its frames and
+        a test has straight moves, a pose that the tests need is not in the plan, or a
         move cannot be made: with the move.
     """
     robot = plan.robot
@@ -150,7 +151,10 @@ class _Programs:
         steps.run()
         joints = np.array(steps.targets)
         robot = self.plan.robot
-        position, rotation = robot.forward(joints, frame="controller")
+        poses = None
+        if any(isinstance(step, StraightMove | CircleMove) for step in steps.steps):
+            position, rotation = robot.forward(joints, frame="controller")
+            poses = homogeneous(rotation, position)
         rule = self.rule
         branches = None if rule is None else tuple(rule.numbers(robot.forward_kinematics(joints)).tolist())
         shown = robot.controller.from_model(joints)
@@ -162,7 +166,7 @@ class _Programs:
                 robot.name,
                 shown,
                 sliding,
-                homogeneous(rotation, position),
+                poses,
                 branches,
                 self._notes(test, share, load),
                 tuple(steps.steps),

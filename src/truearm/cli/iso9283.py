@@ -42,6 +42,21 @@ def plan(
     ahead: Annotated[str, typer.Option(metavar="+x|-x|+y|-y", help="Where the largest cube is searched.")] = "+x",
     nearest: Annotated[float, typer.Option(metavar="MM", help="How far ahead the largest cube begins.")] = 0.0,
     floor: Annotated[float, typer.Option(metavar="MM", help="How high the largest cube begins.")] = 0.0,
+    program: Annotated[
+        str | None,
+        typer.Option(
+            metavar="rapid|krl|fanuc|urscript|inform|val3",
+            help="Write measuring programs in this language.",
+            show_default=False,
+        ),
+    ] = None,
+    dwell: Annotated[float, typer.Option(metavar="S", help="How long they stand where it is measured.")] = 2.0,
+    slow_run: Annotated[
+        Path | None,
+        typer.Option(
+            "--slow-run", metavar="FILE", help="slow-run.yaml, completed: writes the faster ones.", show_default=False
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Plan the tests: poses and paths in the cube, cycles, velocities, loads, and a sheet for the operator."""
@@ -64,6 +79,9 @@ def plan(
         ahead=ahead,  # type: ignore[arg-type]
         nearest=sized_si(nearest, "mm", parameter="nearest"),
         floor=sized_si(floor, "mm", parameter="floor"),
+        program=program,
+        dwell=dwell,
+        slow_run=slow_run,
         out=out,
         command=command_line(),
     )
@@ -71,7 +89,7 @@ def plan(
         print_json(found.summary())
     else:
         print_record(found)
-        print_line(f"Written to {out}: {', '.join(found.contents())}")
+        print_line(f"Written to {out}: {', '.join(found.files())}")
     end_on_error(found.warnings)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
@@ -13,12 +14,14 @@ from truearm.jobs.arguments import (
     command_argument,
     files_of,
     folder_beside,
+    folder_for,
     length_argument,
     lengths_argument,
     numbers_argument,
     python_call,
     robot_argument,
 )
+from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, written_programs
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
@@ -53,6 +56,9 @@ def iso9283_plan(
     ahead: Direction = "+x",
     nearest: float = 0.0,
     floor: float = 0.0,
+    program: str | None = None,
+    dwell: float = 2.0,
+    slow_run: str | Path | None = None,
     out: str | Path | None = None,
     command: str | None = None,
 ) -> Iso9283Plan:
@@ -84,6 +90,13 @@ def iso9283_plan(
         How long the drift is watched.
     ahead, nearest, floor
         Where the largest cube is searched, as for :func:`truearm.poses`.
+    program
+        Language of measuring programs: ``rapid``, ``krl``, ``fanuc``, ``urscript``, ``inform`` or ``val3``; None writes
+        none.
+    dwell
+        How long the robot stands in them where it is measured [s].
+    slow_run
+        Record of the completed slow run (schema ``truearm-slow-run/1``); None writes programs at 10 % alone.
     out
         Folder for ``plan.yaml``, ``robot.yaml`` and ``sheet.html``; None writes nothing.
     command
@@ -93,7 +106,8 @@ def iso9283_plan(
     ------
     InputError
         If there is no such criterion, plane or target, the arm has fewer than six joints, or it cannot come to all
-        poses and along all paths of the cube.
+        poses and along all paths of the cube; for programs if it has more joints, is calibrated, or cannot make a
+        move; if the slow run was of another plan, or is not completed.
     """
     tests = _tests(criteria)
     choice_argument(plane, "plane", dict.fromkeys(PLANES))
@@ -104,8 +118,17 @@ def iso9283_plan(
     shares = _shares(velocities, "velocities", above_zero=True)
     carried = _shares(loads, "loads", above_zero=False)
     given_cube = None if isinstance(cube, str) and cube == AUTO else path_argument(cube, "cube")
-    inputs = files_of(robot, given_cube)
-    folder = None if out is None else folder_beside(PLAN_FILES, PLAN, out, robot, given_cube)
+    language = None if program is None else choice_argument(program, "program", PROGRAM_LANGUAGES)
+    stands = _dwell(dwell)
+    record = None if slow_run is None else path_argument(slow_run, "slow_run")
+    if record is not None and language is None:
+        raise InputError(
+            "a slow run allows faster programs, and none are asked for",
+            parameter="slow_run",
+            cure="State `program`, or leave it out.",
+        )
+    inputs = files_of(robot, given_cube, record)
+    folder = None if out is None else folder_beside(PLAN_FILES, PLAN, out, robot, given_cube, record)
     call = command_argument(command) or python_call(
         "iso9283_plan",
         robot,
@@ -123,6 +146,9 @@ def iso9283_plan(
         ahead=ahead,
         nearest=nearest,
         floor=floor,
+        program=program,
+        dwell=dwell,
+        slow_run=slow_run,
     )
     arm = robot_argument(robot)
     if target is not None and tip is not None:
@@ -166,8 +192,12 @@ def iso9283_plan(
             nearest=near,
             floor=low,
         )
-    found = Iso9283Plan(plan, call, tuple(warnings), inputs)
+    programs = None if language is None else written_programs(plan, language, stands, record, warnings)
+    found = Iso9283Plan(plan, call, tuple(warnings), inputs, programs)
     if folder is not None:
+        if programs is not None:
+            folder_for(tuple(found.contents()), folder, robot, given_cube, record, ours=True)
+            refuse_losing_slow_run(folder, record)
         found.save(folder)
     return found
 
@@ -203,6 +233,18 @@ def _positive(value: object, parameter: str, allowed: str) -> float:
     if number <= 0.0:
         raise InputError("this is above 0", parameter=parameter, came=number, allowed=allowed)
     return number
+
+
+def _dwell(value: object) -> float:
+    seconds = _positive(value, "dwell", f"a time above 0, up to {LONGEST_WAIT:g} s")
+    if seconds > LONGEST_WAIT:
+        raise InputError(
+            "controllers wait no longer at once",
+            parameter="dwell",
+            came=f"{seconds:g} s",
+            allowed=f"up to {LONGEST_WAIT:g} s",
+        )
+    return seconds
 
 
 def _shares(values: object, parameter: str, *, above_zero: bool) -> tuple[float, ...]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from truearm.compensation.iso9283.slow_run import SLOW_RUN
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.notices import Notice
 from truearm.planning.iso9283.criteria import TESTS
@@ -18,6 +20,31 @@ from truearm.writing import output_folder, write_files
 #: What the operator takes along.
 SHEET: Final = "sheet.html"
 PLAN_FILES: Final = (PLAN, ROBOT, SHEET)
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenPrograms:
+    """Measuring programs of a plan.
+
+    Attributes
+    ----------
+    language
+        Its name.
+    files
+        Texts by their names in the plan's folder.
+    record
+        Text of the record of the slow run, still to be done; None where one was given.
+    count
+        How many programs they are.
+    share
+        Velocity of the slow run, in that of the robot; that of single tests may be lower.
+    """
+
+    language: str
+    files: Mapping[str, str]
+    record: str | None
+    count: int
+    share: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,12 +61,15 @@ class Iso9283Plan(Record):
         What to know about it.
     inputs
         The files that were read: none of them is overwritten.
+    programs
+        Measuring programs; None where they were not asked for.
     """
 
     plan: PerformancePlan
     command: str
     warnings: tuple[Notice, ...] = ()
     inputs: tuple[Path, ...] = ()
+    programs: WrittenPrograms | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return the plan as JSON holds it: lengths in mm, velocities and loads in percent of the rated ones."""
@@ -61,6 +91,7 @@ class Iso9283Plan(Record):
                 }
                 for test in plan.tests
             ],
+            **({} if self.programs is None else {"programs": _of_programs(self.programs)}),
             "warnings": notice_summaries(self.warnings),
         }
 
@@ -83,13 +114,34 @@ class Iso9283Plan(Record):
         ]
         wide = [max(len(row[k]) for row in rows) for k in range(3)]
         table = ["  ".join([*(row[k].ljust(wide[k]) for k in range(3)), row[3]]).rstrip() for row in rows]
-        return [*self.answer, *table, *notice_lines(self.warnings)]
+        return [*self.answer, *table, *self._program_lines(), *notice_lines(self.warnings)]
+
+    def _program_lines(self) -> list[str]:
+        programs = self.programs
+        if programs is None:
+            return []
+        written = f"{counted(programs.count, 'measuring program')} in {programs.language}"
+        if programs.record is None:
+            return [f"{written}, at every velocity."]
+        return [
+            f"{written}, at up to {100 * programs.share:g} % of the velocity. The faster ones are written when "
+            f"{SLOW_RUN} says that the slow run is completed."
+        ]
 
     def contents(self) -> dict[str, str]:
         """Return the texts of all files by their names."""
         from truearm.reporting.iso9283_sheet import iso9283_sheet
 
-        return {PLAN: plan_text(self.plan), ROBOT: robot_text(self.plan.robot), SHEET: iso9283_sheet(self)}
+        found = {PLAN: plan_text(self.plan), ROBOT: robot_text(self.plan.robot), SHEET: iso9283_sheet(self)}
+        if self.programs is not None:
+            found |= self.programs.files
+            if self.programs.record is not None:
+                found[SLOW_RUN] = self.programs.record
+        return found
+
+    def files(self) -> list[str]:
+        """Return the names of all files; all programs as the folder that they are in."""
+        return list(dict.fromkeys(name.partition("/")[0] for name in self.contents()))
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write all files into a folder; return them."""
@@ -97,6 +149,15 @@ class Iso9283Plan(Record):
         out = output_folder(folder, contents, self.inputs, "folder")
         write_files(out, contents, self.command)
         return tuple(out / name for name in contents)
+
+
+def _of_programs(programs: WrittenPrograms) -> dict[str, Any]:
+    return {
+        "language": programs.language,
+        "slow_percent": round(100.0 * programs.share, 6),
+        "slow_run_completed": programs.record is None,
+        "files": list(programs.files),
+    }
 
 
 def how_often(test: PlannedTest) -> str:

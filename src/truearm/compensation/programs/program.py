@@ -19,6 +19,7 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.transform import Transform
 
 if TYPE_CHECKING:
+    from truearm.compensation.programs.motion_program import MotionProgram
     from truearm.compensation.programs.new_program import NewProgram
 
 MoveKind = Literal["joint", "linear", "circular"]
@@ -345,6 +346,8 @@ class Language:
         Split moves; None if the language's programs cannot be split.
     new
         Write a program from scratch: texts of its files by their names.
+    motion
+        The same for a program with stops, waits and circles.
     together
         Whether files that are given together are one program and share names; else each is one for itself.
     companions
@@ -360,6 +363,7 @@ class Language:
     read: Callable[[Sequence[Source]], Program]
     split: Callable[[Program, Sequence[Split]], SplitEdits] | None = None
     new: Callable[[NewProgram], Mapping[str, str]] | None = None
+    motion: Callable[[MotionProgram], Mapping[str, str]] | None = None
     together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
     calibration: MakersCalibration | None = None

@@ -96,3 +96,21 @@ class Way:
             for a, b in zip(self.corners[:-1], self.corners[1:], strict=True)
         ]
         return np.concatenate([*pieces, [self.length]])
+
+
+def weave_corners(path: PlannedPath) -> tuple[Array, float]:
+    """Return the corners of a weave ``(k, 3)`` [m], and how much longer its way is than the line in the middle.
+
+    It runs in straight lines from side to side, its first and last stretch from and to the middle.
+    """
+    way = path.points[-1] - path.points[0]
+    length = float(np.linalg.norm(way))
+    along = way / length
+    aside = np.cross(path.normal, along)
+    half = path.wavelength / 2
+    count = int(length / half + 1e-9)
+    middle = (np.arange(count) + 0.5) * half
+    sides = np.where(np.arange(count) % 2 == 0, 1.0, -1.0) * path.stroke / 2
+    corners = path.points[0] + middle[:, None] * along + sides[:, None] * aside
+    end = path.points[0] + count * half * along
+    return np.concatenate([path.points[:1], corners, end[None]]), float(np.hypot(half, path.stroke) / half)

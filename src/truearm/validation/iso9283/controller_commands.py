@@ -7,9 +7,8 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PlannedPath
-from truearm.planning.iso9283.way import TURNS
+from truearm.planning.iso9283.way import TURNS, weave_corners
 from truearm.simulation.moving.interpolator import Commands, Pace, along_circle, along_lines
 
 #: Radius about a corner in which a rectangle is left where corners are judged [m], and that of a weave in strokes.
@@ -52,7 +51,7 @@ def path_commands(path: PlannedPath, pace: Pace, step: float, *, reoriented: boo
         return along_circle(path.points[0], path.points[1], path.normal, path.rotation, pace, step)
     points = path.points
     if path.kind == "weave":
-        points, longer = _weave(path)
+        points, longer = weave_corners(path)
         pace = Pace(pace.velocity * longer, pace.acceleration, pace.zone, pace.turning, pace.turning_acceleration)
     rotations = np.broadcast_to(path.rotation, (len(points), 3, 3))
     if reoriented:
@@ -66,18 +65,3 @@ def path_commands(path: PlannedPath, pace: Pace, step: float, *, reoriented: boo
         points = points[0] + share * (points[-1] - points[0])
         rotations = np.stack([path.rotation if k % 2 == 0 else path.other for k in range(TURNS + 1)])
     return along_lines(points, rotations, pace, step)
-
-
-def _weave(path: PlannedPath) -> tuple[Array, float]:
-    """Return the corners of a weave ``(k, 3)``, and how much longer its way is than the line in the middle."""
-    way = path.points[-1] - path.points[0]
-    length = float(np.linalg.norm(way))
-    along = way / length
-    aside = np.cross(path.normal, along)
-    half = path.wavelength / 2
-    count = int(length / half + 1e-9)
-    middle = (np.arange(count) + 0.5) * half
-    sides = np.where(np.arange(count) % 2 == 0, 1.0, -1.0) * path.stroke / 2
-    corners = path.points[0] + middle[:, None] * along + sides[:, None] * aside
-    end = path.points[0] + count * half * along
-    return np.concatenate([path.points[:1], corners, end[None]]), float(np.hypot(half, path.stroke) / half)

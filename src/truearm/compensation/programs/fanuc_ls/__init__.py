@@ -28,6 +28,7 @@ from typing import Final
 from truearm.compensation.programs.fanuc_ls.configuration import configuration
 from truearm.compensation.programs.fanuc_ls.forms import JOINTS, POSE
 from truearm.compensation.programs.fanuc_ls.instructions import Instructions
+from truearm.compensation.programs.fanuc_ls.measuring import motion_program
 from truearm.compensation.programs.fanuc_ls.new import new_program
 from truearm.compensation.programs.fanuc_ls.split import split_moves
 from truearm.compensation.programs.fanuc_ls.text import LsFile, Position, is_one
@@ -173,5 +174,6 @@ FANUC_LS: Final = Language(
     read,
     split_moves,
     new_program,
+    motion_program,
     calibration=MakersCalibration("FANUC", "robot calibration (mechanism error parameters)"),
 )

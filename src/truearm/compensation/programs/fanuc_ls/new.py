@@ -6,6 +6,7 @@ import math
 
 from truearm.compensation.programs.fanuc_ls.forms import JOINTS, POSE
 from truearm.compensation.programs.new_program import NewProgram
+from truearm.compensation.programs.new_targets import NewTargets
 
 
 def new_program(program: NewProgram) -> dict[str, str]:
@@ -28,7 +29,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
             numbers = program.pose(row, POSE)
             parts = [f"{n} = {v} mm" for n, v in zip("XYZ", numbers[:3], strict=True)]
             parts += [f"{n} = {v} deg" for n, v in zip("WPR", numbers[3:], strict=True)]
-            head = f"UF : 0, UT : 0,\t\tCONFIG : '{_config(program, row)}',"
+            head = f"UF : 0, UT : 0,\t\tCONFIG : '{config(program, row)}',"
         rows = [",\t".join(parts[k : k + 3]) for k in range(0, len(parts), 3)]
         body = ",\n\t".join(rows)
         positions.append(f"P[{row + 1}]{{\n   GP1:\n\t{head}\n\t{body}\n}};")
@@ -38,7 +39,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
     return {f"{name}.ls": "\n".join([*head_lines, *numbered, "/POS", *positions, "/END", ""])}
 
 
-def _config(program: NewProgram, row: int) -> str:
+def config(program: NewTargets, row: int) -> str:
     """Return the CONFIG of a pose: the sign of joint 5, the side of the elbow and of the wrist, and turns."""
     shoulder, elbow, _ = program.words(row)
     flip = "N" if program.joints[row, 4] < 0.0 else "F"

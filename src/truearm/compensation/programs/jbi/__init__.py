@@ -22,6 +22,7 @@ from typing import Final
 
 from truearm.compensation.programs.jbi.forms import ANGLES, POSE, PULSES
 from truearm.compensation.programs.jbi.job import JOB, Job, Key, Position, jobs_of
+from truearm.compensation.programs.jbi.measuring import motion_program
 from truearm.compensation.programs.jbi.new import new_program
 from truearm.compensation.programs.jbi.split import split_moves
 from truearm.compensation.programs.jbi.steps import KINDS, NOWHERE, Step, Steps, arcs_of, steps_of
@@ -208,5 +209,6 @@ JBI: Final = Language(
     read,
     split_moves,
     new_program,
+    motion_program,
     calibration=MakersCalibration("Yaskawa", "absolute accuracy"),
 )

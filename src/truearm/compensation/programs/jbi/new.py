@@ -6,9 +6,10 @@ import math
 
 from truearm.compensation.programs.jbi.forms import ANGLES, POSE
 from truearm.compensation.programs.new_program import NewProgram
+from truearm.compensation.programs.new_targets import NewTargets
 
 #: The controller writes its own when it loads the job.
-_DATE = "2000/01/01 00:00"
+DATE = "2000/01/01 00:00"
 
 
 def new_program(program: NewProgram) -> dict[str, str]:
@@ -25,7 +26,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
             now, numbers = "///POSTYPE ANGLE\n///ANGLE", program.axes(row, ANGLES)
             steps.append(f"MOVJ C{row:05d} VJ=10.00{' PL=1' if program.blend(row) else ' PL=0'}")
         else:
-            now, numbers = f"///POSTYPE ROBOT\n///RECTAN\n///RCONF {_rconf(program, row)}", program.pose(row, POSE)
+            now, numbers = f"///POSTYPE ROBOT\n///RECTAN\n///RCONF {rconf(program, row)}", program.pose(row, POSE)
             speed = max(program.speed(row) * 1e3, 0.1)
             steps.append(f"MOVL C{row:05d} V={speed:.1f}{' PL=1' if program.blend(row) else ' PL=0'}")
         if now != state:
@@ -35,7 +36,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
     comments = [f"'{line[:32]}" for line in program.comments]
     lines += [
         "//INST",
-        f"///DATE {_DATE}",
+        f"///DATE {DATE}",
         "///ATTR SC,RW",
         "///GROUP1 RB1",
         "NOP",
@@ -47,7 +48,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
     return {f"{name}.JBI": "\n".join(lines)}
 
 
-def _rconf(program: NewProgram, row: int) -> str:
+def rconf(program: NewTargets, row: int) -> str:
     """Return the posture of a pose: no-flip, lower arm, rear, and R, T and S beyond 180 deg."""
     shoulder, elbow, _ = program.words(row)
     turned, last, first = (program.joints[row, joint] for joint in (3, 5, 0))

@@ -34,6 +34,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from truearm.compensation.programs.krl.measuring import motion_program
 from truearm.compensation.programs.krl.new import new_program
 from truearm.compensation.programs.krl.reading import read
 from truearm.compensation.programs.krl.split import split_moves
@@ -60,6 +61,7 @@ KRL: Final = Language(
     read=read,
     split=split_moves,
     new=new_program,
+    motion=motion_program,
     together=True,
     companions=((".src", ".dat"), (".sub", ".dat"), (".dat", ".src")),
     calibration=MakersCalibration("KUKA", "the positionally accurate robot model ($ABS_ACCUR)"),

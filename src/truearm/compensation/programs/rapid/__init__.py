@@ -22,6 +22,7 @@ from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language, MakersCalibration, Program, Source
+from truearm.compensation.programs.rapid.measuring import motion_program
 from truearm.compensation.programs.rapid.monitoring import with_postures_left_free
 from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
 from truearm.compensation.programs.rapid.new import new_program
@@ -49,6 +50,7 @@ RAPID: Final = Language(
     read=_read,
     split=split_moves,
     new=new_program,
+    motion=motion_program,
     together=True,
     calibration=MakersCalibration("ABB", "Absolute Accuracy"),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from truearm.compensation.programs.new_program import NewProgram
+from truearm.compensation.programs.new_targets import NewTargets
 from truearm.compensation.programs.rapid.data import JOINTTARGET, ROBTARGET
 
 _NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -20,7 +21,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
             continue
         pose = program.pose(row, ROBTARGET)
         quarters = [math.floor(program.joints[row, joint] / (math.pi / 2)) for joint in (0, 3, 5)]
-        turns = ",".join(str(number) for number in [*quarters, _posture(program, row)])
+        turns = ",".join(str(number) for number in [*quarters, posture(program, row)])
         place, turned = ",".join(pose[:3]), ",".join(pose[3:])
         lines.append(f"  CONST robtarget p{row + 1}:=[[{place}],[{turned}],[{turns}],{_NO_AXES}];")
     lines += ["", f"  PROC {program.name}_main()", "    ConfL \\Off;"]
@@ -35,7 +36,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
     return {f"{program.name}.mod": "\n".join([*lines, "    ConfL \\On;", "  ENDPROC", "ENDMODULE", ""])}
 
 
-def _posture(program: NewProgram, row: int) -> int:
+def posture(program: NewTargets, row: int) -> int:
     """Return cfx of a pose; 0 where the arm's postures have no names."""
     if program.branches is None:
         return 0

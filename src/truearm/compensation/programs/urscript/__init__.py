@@ -33,6 +33,7 @@ from typing import Final
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Language, MakersCalibration, MoveKind, Program, Source
+from truearm.compensation.programs.urscript.measuring import motion_program
 from truearm.compensation.programs.urscript.new import new_program
 from truearm.compensation.programs.urscript.program import Going, made_program
 from truearm.compensation.programs.urscript.script import Call, Script
@@ -196,5 +197,6 @@ URSCRIPT: Final = Language(
     _read,
     split_moves,
     new_program,
+    motion_program,
     calibration=MakersCalibration("Universal Robots", "the kinematic calibration of the factory", always=True),
 )

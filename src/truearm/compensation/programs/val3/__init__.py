@@ -35,6 +35,7 @@ from truearm.compensation.programs.program import (
 from truearm.compensation.programs.val3.code import Routine, Words, routines_of
 from truearm.compensation.programs.val3.data import NUMBERS, Element, Variable, variables_of
 from truearm.compensation.programs.val3.frames import father_of, name_of, transforms
+from truearm.compensation.programs.val3.measuring import motion_program
 from truearm.compensation.programs.val3.new import new_program
 from truearm.errors import InputError
 from truearm.modeling.orientations import MOVING_XYZ_ANGLES
@@ -335,4 +336,6 @@ def _configuration(words: tuple[str, ...]) -> Configuration:
     )
 
 
-VAL3: Final = Language("VAL3", (".dtx", ".pgx", ".pjx"), ("Stäubli",), is_one, read, new=new_program, together=True)
+VAL3: Final = Language(
+    "VAL3", (".dtx", ".pgx", ".pjx"), ("Stäubli",), is_one, read, new=new_program, motion=motion_program, together=True
+)

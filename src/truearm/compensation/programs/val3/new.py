@@ -9,15 +9,15 @@ from truearm.compensation.programs.new_program import NewProgram
 from truearm.compensation.programs.program import Form
 from truearm.modeling.orientations import MOVING_XYZ_ANGLES
 
-_JOINT: Final = Form("jointRx", "joints", angle=radians(1.0))
-_POINT: Final = Form("pointRx", "pose", angle=radians(1.0), orientation=MOVING_XYZ_ANGLES)
+JOINT: Final = Form("jointRx", "joints", angle=radians(1.0))
+POINT: Final = Form("pointRx", "pose", angle=radians(1.0), orientation=MOVING_XYZ_ANGLES)
 
 _DATA = 'xmlns="http://www.staubli.com/robotics/VAL3/Data/2"'
 _CODE = 'xmlns="http://www.staubli.com/robotics/VAL3/Program/2"'
 _PROJECT = 'xmlns="http://www.staubli.com/robotics/VAL3/Project/3"'
-_NAMES = ("x", "y", "z", "rx", "ry", "rz")
+NAMES = ("x", "y", "z", "rx", "ry", "rz")
 #: On its way the arm stays in the posture in which it began.
-_SAME = 'shoulder="ssame" elbow="esame" wrist="wsame" fatherId="world[0]"'
+SAME = 'shoulder="ssame" elbow="esame" wrist="wsame" fatherId="world[0]"'
 _MOTION = '<Value key="0" accel="100" vel="10" decel="100" blend="joint" leave="1" reach="1" />'
 _HEAD = '<?xml version="1.0" encoding="utf-8"?>'
 
@@ -30,15 +30,13 @@ def new_program(program: NewProgram) -> dict[str, str]:
     name, count = program.name, len(program)
     straight = program.poses is not None
     by_joints = range(1 if straight else count)
-    joints = [_element(k, zip("123456", program.axes(k, _JOINT), strict=False), "j") for k in by_joints]
-    data = [_variable("jPath", "jointRx", joints), _variable("mPath", "mdesc", [_MOTION])]
+    joints = [element(k, zip("123456", program.axes(k, JOINT), strict=False), "j") for k in by_joints]
+    data = [variable("jPath", "jointRx", joints), variable("mPath", "mdesc", [_MOTION])]
     steps = [f"  // {line}" for line in program.comments]
     steps += ["  movej(jPath[0],flange,mPath)", "  waitEndMove()"]
     if straight:
-        points = [
-            _element(k - 1, zip(_NAMES, program.pose(k, _POINT), strict=True), "", _SAME) for k in range(1, count)
-        ]
-        data.append(_variable("pPath", "pointRx", points))
+        points = [element(k - 1, zip(NAMES, program.pose(k, POINT), strict=True), "", SAME) for k in range(1, count)]
+        data.append(variable("pPath", "pointRx", points))
     said = ""
     for row in range(1, count):
         if not straight:
@@ -49,6 +47,11 @@ def new_program(program: NewProgram) -> dict[str, str]:
             steps.append(f"  mPath.tvel={speed}")
             said = speed
         steps.append(f"  movel(pPath[{row - 1}],flange,mPath)")
+    return application(name, data, steps)
+
+
+def application(name: str, data: list[str], steps: list[str]) -> dict[str, str]:
+    """Return the files of an application: its data, its program, which waits at its end, and its project."""
     code = "\n".join(["begin", *steps, "  waitEndMove()", "end"])
     files = {
         f"{name}.dtx": [f"<Database {_DATA}>", "<Datas>", *data, "</Datas>", "</Database>"],
@@ -71,11 +74,13 @@ def new_program(program: NewProgram) -> dict[str, str]:
     return {f"{name}/{file}": "\n".join([_HEAD, *lines, ""]) for file, lines in files.items()}
 
 
-def _element(key: int, numbers: zip[tuple[str, str]], before: str, more: str = "") -> str:
+def element(key: int, numbers: zip[tuple[str, str]], before: str, more: str = "") -> str:
+    """Return an element of a variable: its numbers by their names, with letters before each, and other attributes."""
     values = " ".join(f'{before}{name}="{value}"' for name, value in numbers)
     return f'<Value key="{key}" {values}{" " + more if more else ""} />'
 
 
-def _variable(name: str, kind: str, values: list[str]) -> str:
+def variable(name: str, kind: str, values: list[str]) -> str:
+    """Return a variable with its elements."""
     rows = "\n".join(values)
     return f'<Data name="{name}" access="public" type="{kind}" size="{len(values)}">\n{rows}\n</Data>'

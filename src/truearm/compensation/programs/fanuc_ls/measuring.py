@@ -1,0 +1,67 @@
+"""FANUC TP programs in ASCII with stops, waits and circles.
+
+Source: FANUC, operator's manual of the controllers R-30iA and R-30iB, program instructions: J, L and C with FINE and
+CNT, and WAIT. The second position of a circle stands on a line of its own.
+"""
+
+from __future__ import annotations
+
+from truearm.compensation.programs.fanuc_ls.forms import JOINTS, POSE
+from truearm.compensation.programs.fanuc_ls.new import config
+from truearm.compensation.programs.motion_program import (
+    CircleMove,
+    JointMove,
+    MotionProgram,
+    Remark,
+    StraightMove,
+    TargetKind,
+    Wait,
+    number,
+    percent,
+)
+
+
+def motion_program(program: MotionProgram) -> dict[str, str]:
+    """Return an ``.ls`` file: where the robot does not stop it goes on with CNT100, as the controller rounds it off."""
+    name = program.name.upper()
+    numbers = {place: count for count, place in enumerate(program.places(), 1)}
+    steps = [f"  !{line}    ;" for line in program.comments]
+    steps += ["  UFRAME_NUM=0    ;", "  UTOOL_NUM=0    ;"]
+    for step, near in program.zoned():
+        end = "CNT100" if near else "FINE"
+        match step:
+            case JointMove():
+                steps.append(f"J P[{numbers['joints', step.target]}] {percent(step.share)}% FINE    ;")
+            case StraightMove():
+                steps.append(f"L P[{numbers['pose', step.target]}] {_speed(step.speed)} {end}    ;")
+            case CircleMove():
+                last = f"    :  P[{numbers['pose', step.target]}] {_speed(step.speed)} {end}    ;"
+                steps.append(f"C P[{numbers['pose', step.via]}]    \n{last}")
+            case Wait():
+                steps.append(f"  WAIT{step.seconds:7.2f}(sec)    ;")
+            case Remark():
+                steps.append(f"  !{step.text}    ;")
+    numbered = [f"{line:4}:{text}" for line, text in enumerate(steps, 1)]
+    head = [f"/PROG  {name}", "/ATTR", f"LINE_COUNT\t= {len(numbered)};", "DEFAULT_GROUP\t= 1,*,*,*,*;", "/MN"]
+    positions = [_position(program, kind, row, count) for (kind, row), count in numbers.items()]
+    return {f"{name}.ls": "\n".join([*head, *numbered, "/POS", *positions, "/END", ""])}
+
+
+def _speed(speed: float) -> str:
+    return f"{number(max(speed * 1e3, 0.1), 1)}mm/sec"
+
+
+def _position(program: MotionProgram, kind: TargetKind, row: int, count: int) -> str:
+    if kind == "joints":
+        axes = program.axes(row, JOINTS, least=0)
+        units = ["mm" if slides else "deg" for slides in program.sliding]
+        parts = [f"J{axis}= {v} {unit}" for axis, (v, unit) in enumerate(zip(axes, units, strict=True), 1)]
+        head = "UF : 0, UT : 0,"
+    else:
+        numbers = program.pose(row, POSE)
+        parts = [f"{axis} = {v} mm" for axis, v in zip("XYZ", numbers[:3], strict=True)]
+        parts += [f"{axis} = {v} deg" for axis, v in zip("WPR", numbers[3:], strict=True)]
+        head = f"UF : 0, UT : 0,\t\tCONFIG : '{config(program, row)}',"
+    rows = [",\t".join(parts[k : k + 3]) for k in range(0, len(parts), 3)]
+    body = ",\n\t".join(rows)
+    return f"P[{count}]{{\n   GP1:\n\t{head}\n\t{body}\n}};"

@@ -1,0 +1,71 @@
+"""Yaskawa jobs with stops, waits and circles.
+
+Source: Yaskawa, INFORM language manuals of the controllers DX100 and DX200: MOVJ, MOVL, MOVC, TIMER, and the tags VJ,
+V, PL and FPT. The first MOVC of a row is reached on a line: it stands where the arc begins.
+"""
+
+from __future__ import annotations
+
+from truearm.compensation.programs.jbi.forms import ANGLES, POSE
+from truearm.compensation.programs.jbi.new import DATE, rconf
+from truearm.compensation.programs.motion_program import (
+    CircleMove,
+    JointMove,
+    MotionProgram,
+    Remark,
+    StraightMove,
+    Wait,
+    number,
+    percent,
+)
+
+
+def motion_program(program: MotionProgram) -> dict[str, str]:
+    """Return a job: every move has a position of its own, and where the robot does not stop, no position level."""
+    name = program.name.upper()
+    steps: list[str] = []
+    positions: list[str] = []
+    state, count = "", 0
+
+    def position(kind: str, row: int) -> str:
+        nonlocal state, count
+        if kind == "joints":
+            now, numbers = "///POSTYPE ANGLE\n///ANGLE", program.axes(row, ANGLES)
+        else:
+            now, numbers = f"///POSTYPE ROBOT\n///RECTAN\n///RCONF {rconf(program, row)}", program.pose(row, POSE)
+        if now != state:
+            positions.append(now)
+            state = now
+        label, count = f"C{count:05d}", count + 1
+        positions.append(f"{label}={','.join(numbers)}")
+        return label
+
+    arc = False
+    for step, near in program.zoned():
+        end = "" if near else " PL=0"
+        match step:
+            case JointMove():
+                steps.append(f"MOVJ {position('joints', step.target)} VJ={percent(step.share)}.00{end}")
+            case StraightMove():
+                steps.append(f"MOVL {position('pose', step.target)} V={_speed(step.speed)}{end}")
+            case CircleMove():
+                speed = f"V={_speed(step.speed)}"
+                if arc:
+                    steps[-1] += " FPT"
+                else:
+                    steps.append(f"MOVC {position('pose', step.start)} {speed}")
+                steps.append(f"MOVC {position('pose', step.via)} {speed}")
+                steps.append(f"MOVC {position('pose', step.target)} {speed}{end}")
+            case Wait():
+                steps.append(f"TIMER T={number(step.seconds, 2)}")
+            case Remark():
+                steps.append(f"'{step.text}")
+        arc = isinstance(step, CircleMove)
+    lines = ["/JOB", f"//NAME {name}", "//POS", f"///NPOS {count},0,0,0,0,0", "///TOOL 0", *positions]
+    lines += ["//INST", f"///DATE {DATE}", "///ATTR SC,RW", "///GROUP1 RB1", "NOP"]
+    lines += [*(f"'{line}" for line in program.comments), *steps, "END", ""]
+    return {f"{name}.JBI": "\n".join(lines)}
+
+
+def _speed(speed: float) -> str:
+    return f"{max(speed * 1e3, 0.1):.1f}"

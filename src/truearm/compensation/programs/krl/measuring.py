@@ -1,0 +1,59 @@
+"""KRL programs with stops, waits and circles.
+
+Source: KUKA System Software 8, operating and programming instructions for system integrators: PTP, LIN, CIRC, WAIT SEC,
+``$VEL_AXIS``, ``$VEL``, ``$APO``, ``$ORI_TYPE``, ``$CIRC_TYPE``. ``BAS(#INITMOV,0)`` gives accelerations their usual
+values. WAIT stops the advance run, so that the robot stands before it.
+"""
+
+from __future__ import annotations
+
+from truearm.compensation.programs.krl.aggregates import JOINTS, POSE
+from truearm.compensation.programs.motion_program import (
+    CircleMove,
+    JointMove,
+    MotionProgram,
+    Remark,
+    StraightMove,
+    Wait,
+    number,
+    percent,
+)
+
+_NAMES = ("X", "Y", "Z", "A", "B", "C")
+
+
+def motion_program(program: MotionProgram) -> dict[str, str]:
+    """Return a ``.src`` file: joint motions have their share ($VEL_AXIS), others their speed ($VEL.CP)."""
+    lines = [f"DEF {program.name} ( )", *(f"  ; {line}" for line in program.comments)]
+    lines += ["  BAS (#INITMOV,0)", "  $TOOL = {X 0,Y 0,Z 0,A 0,B 0,C 0}", "  $BASE = {X 0,Y 0,Z 0,A 0,B 0,C 0}"]
+    lines += ["  $ORI_TYPE = #VAR", "  $CIRC_TYPE = #BASE", "  $ADVANCE = 3"]
+    said: dict[str, str] = {}
+
+    def say(name: str, value: str, axes: int = 0) -> None:
+        if said.get(name) != value:
+            said[name] = value
+            lines.extend([f"  {name}[{axis}] = {value}" for axis in range(1, axes + 1)] or [f"  {name} = {value}"])
+
+    def pose(row: int) -> str:
+        numbers = zip(_NAMES, program.pose(row, POSE), strict=True)
+        return "{" + ",".join(f"{name} {value}" for name, value in numbers) + "}"
+
+    for step, near in program.zoned():
+        match step:
+            case JointMove():
+                say("$VEL_AXIS", str(percent(step.share)), axes=6)
+                axes = ",".join(f"A{axis} {value}" for axis, value in enumerate(program.axes(step.target, JOINTS), 1))
+                lines.append(f"  PTP {{{axes}}}")
+            case StraightMove() | CircleMove():
+                say("$VEL.CP", f"{step.speed:.4f}")
+                if near:
+                    say("$APO.CDIS", number(near * 1e3, 3))
+                way = f"LIN {pose(step.target)}"
+                if isinstance(step, CircleMove):
+                    way = f"CIRC {pose(step.via)},{pose(step.target)}"
+                lines.append(f"  {way}{' C_DIS' if near else ''}")
+            case Wait():
+                lines.append(f"  WAIT SEC {number(step.seconds, 3)}")
+            case Remark():
+                lines.append(f"  ; {step.text}")
+    return {f"{program.name}.src": "\n".join([*lines, "END", ""])}

@@ -1,0 +1,164 @@
+"""A new program with stops, waits, circles and speeds, for every robot language to write down.
+
+Steps refer to targets by their number, so that a pose that is gone to thirty times stands in the program once where
+the language allows it. Speeds of straight moves and circles are those of the tip; a joint motion has a share of the
+joints' speed, or, in languages that say no share, a speed of the tip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from truearm.compensation.programs.new_targets import NewTargets, ascii_only
+
+#: What a target is written as.
+TargetKind = Literal["joints", "pose"]
+#: Comments of FANUC's and Yaskawa's controllers have no more characters.
+LONGEST_COMMENT: Final = 32
+#: FANUC's controllers wait no longer at once [s].
+LONGEST_WAIT: Final = 300.0
+
+
+@dataclass(frozen=True, slots=True)
+class JointMove:
+    """All joints go evenly to a target, and stop there.
+
+    Attributes
+    ----------
+    target
+        Number of the target, from 0: its joint positions.
+    share
+        Of the fastest that the joints go, 0 to 1.
+    speed
+        Of the tip, for languages that say the speed of joint motions by it [m/s].
+    """
+
+    target: int
+    share: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class StraightMove:
+    """The tip goes in a straight line.
+
+    Attributes
+    ----------
+    target
+        Number of the target, from 0: its pose.
+    speed
+        Of the tip [m/s].
+    zone
+        How near the target the next move may begin [m]; 0 for a stop.
+    """
+
+    target: int
+    speed: float
+    zone: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class CircleMove:
+    """The tip goes along an arc through a target to another; as :class:`StraightMove` else.
+
+    Attributes
+    ----------
+    start, via, target
+        Numbers of the targets, from 0, where the arc begins, which it passes, and where it ends: their poses.
+    speed, zone
+        Of the tip [m/s], and how near the end the next move may begin [m].
+    """
+
+    start: int
+    via: int
+    target: int
+    speed: float
+    zone: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """The robot stands still.
+
+    Attributes
+    ----------
+    seconds
+        How long [s].
+    """
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """A comment in the program.
+
+    Attributes
+    ----------
+    text
+        In ASCII, of :data:`LONGEST_COMMENT` characters at most.
+    """
+
+    text: str
+
+
+ProgramStep = JointMove | StraightMove | CircleMove | Wait | Remark
+
+
+@dataclass(frozen=True, eq=False)
+class MotionProgram(NewTargets):
+    """Targets, and what the robot does one after the other.
+
+    Attributes
+    ----------
+    notes
+        What a person should know who opens the program.
+    steps
+        In their order.
+    """
+
+    notes: tuple[str, ...]
+    steps: tuple[ProgramStep, ...]
+
+    @property
+    def comments(self) -> tuple[str, ...]:
+        """The notes, as every language may have them."""
+        return tuple(ascii_only(note)[:LONGEST_COMMENT] for note in self.notes)
+
+    def places(self) -> list[tuple[TargetKind, int]]:
+        """Return which targets are used, and as what, in the order in which they are first gone to."""
+        found: dict[tuple[TargetKind, int], None] = {}
+        for step in self.steps:
+            if isinstance(step, JointMove):
+                found["joints", step.target] = None
+            elif isinstance(step, CircleMove):
+                found["pose", step.via] = None
+                found["pose", step.target] = None
+            elif isinstance(step, StraightMove):
+                found["pose", step.target] = None
+        return list(found)
+
+    def zoned(self) -> Iterator[tuple[ProgramStep, float]]:
+        """Yield every step with its zone [m]; 0 before a wait, a joint motion and the end, where the robot stops."""
+        ahead = [step for step in self.steps if not isinstance(step, Remark)][1:]
+        following = iter([*ahead, None])
+        for step in self.steps:
+            if isinstance(step, Remark):
+                yield step, 0.0
+                continue
+            goes_on = isinstance(next(following), StraightMove | CircleMove)
+            own = step.zone if isinstance(step, StraightMove | CircleMove) else 0.0
+            yield step, own if goes_on else 0.0
+
+
+def number(value: float, decimals: int) -> str:
+    """Return a number with so many decimals at most, without zeros at its end."""
+    text = f"{value:.{decimals}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def percent(share: float) -> int:
+    """Return a share in whole percent, 1 at least."""
+    return max(1, round(100.0 * share))

@@ -1,0 +1,87 @@
+"""Measuring programs of tests by ISO 9283 in a robot's language, and the record of their slow run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from truearm.compensation.iso9283.programs import measuring_programs
+from truearm.compensation.iso9283.slow_run import SLOW_RUN, check_slow_run, slow_run_text
+from truearm.compensation.path_program import BY_NAME
+from truearm.compensation.programs.motion_program import MotionProgram
+from truearm.compensation.programs.program import Language
+from truearm.errors import InputError, refusals_of
+from truearm.files import exists, read_bytes
+from truearm.manifest import hash_of, sets_in
+from truearm.notices import Notice
+from truearm.planning.iso9283.plan_file import plan_text
+from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.results.iso9283_plan import WrittenPrograms
+
+#: What each language is called; FANUC's has a short name as well.
+PROGRAM_LANGUAGES: Final[Mapping[str, Language]] = {**BY_NAME, "fanuc": BY_NAME["fanuc-ls"]}
+#: Where programs are, in the folder of the plan.
+_FOLDER: Final = "programs"
+#: Characters of the plan's hash by which programs name it.
+_MARK: Final = 12
+#: What stands for the share of the joints' speed in languages that do not say it.
+_JOINT_SPEEDS: Final = {
+    "RAPID": "joint motions have the share of the rated velocity, of the tip",
+    "URScript": "100 % of the joints' speed is taken for 120 deg/s",
+}
+
+
+def written_programs(
+    plan: PerformancePlan, language: Language, dwell: float, slow_run: Path | None, warnings: list[Notice]
+) -> WrittenPrograms:
+    """Return the programs of a plan as texts: the slow ones, and the faster ones where the slow run is recorded.
+
+    What is to be said of them is added to `warnings`.
+    """
+    text = plan_text(plan)
+    with refusals_of("program"):
+        found = measuring_programs(plan, dwell, hash_of(text.encode())[:_MARK])
+        slow = _texts(found.slow, language)
+        faster = {} if slow_run is None else _texts(found.faster, language)
+    record = None
+    if slow_run is None:
+        record = slow_run_text(text, slow)
+    else:
+        with refusals_of("slow_run"):
+            check_slow_run(slow_run, text, slow)
+    robot = plan.robot
+    if robot.maker and not language.runs_on(robot.maker):
+        warnings.append(
+            Notice("maker", f"{robot.name} is of {robot.maker}, and programs were written in {language.name}.")
+        )
+    if language.name in _JOINT_SPEEDS:
+        warnings.append(
+            Notice(
+                "joint-speed-assumed",
+                f"{language.name} says no share of the joints' speed: {_JOINT_SPEEDS[language.name]}.",
+                "note",
+            )
+        )
+    count = len(found.slow) + (0 if slow_run is None else len(found.faster))
+    return WrittenPrograms(language.name, {**slow, **faster}, record, count, found.share)
+
+
+def _texts(programs: Sequence[MotionProgram], language: Language) -> dict[str, str]:
+    assert language.motion is not None
+    return {f"{_FOLDER}/{name}": text for one in programs for name, text in language.motion(one).items()}
+
+
+def refuse_losing_slow_run(folder: Path, slow_run: Path | None) -> None:
+    """Refuse a folder in which somebody has recorded a slow run, unless that is what was given."""
+    path = folder / SLOW_RUN
+    if slow_run is not None or not exists(path):
+        return
+    written = {one.files[SLOW_RUN] for one in sets_in(folder) if SLOW_RUN in one.files}
+    if hash_of(read_bytes(path)) not in written:
+        raise InputError(
+            "somebody has filled in this record of a slow run, and it would be lost",
+            parameter="out",
+            where=str(path),
+            cure="Give it as `slow_run`, or choose another folder.",
+        )

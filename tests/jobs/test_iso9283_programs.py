@@ -1,0 +1,122 @@
+"""Measuring programs that the job writes: slow ones first, faster ones after a slow run is recorded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import truearm
+from truearm.compensation.iso9283.slow_run import SLOW_RUN
+from truearm.errors import InputError
+from truearm.notices import Notice
+from truearm.results.iso9283_plan import Iso9283Plan
+
+CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
+
+
+@pytest.fixture(scope="module")
+def cube(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("cube") / "cube.yaml"
+    file.write_text(CUBE)
+    return file
+
+
+def planned(cube: Path, **more: Any) -> Iso9283Plan:
+    given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [1.0, 0.1], "velocity": 0.5, "load": 3.0}
+    return truearm.iso9283_plan("irb120", **(given | more))
+
+
+def filled(path: Path, **entries: str) -> None:
+    lines = path.read_text().splitlines()
+    known = {"completed": "yes", "by": "A. Operator", "date": "2026-11-23", **entries}
+    path.write_text(
+        "\n".join(f"{key}: {known[key]}" if (key := line.partition(":")[0]) in known else line for line in lines) + "\n"
+    )
+
+
+def test_faster_programs_are_written_once_the_slow_run_is_recorded(cube: Path, tmp_path: Path) -> None:
+    first = planned(cube, program="rapid", out=tmp_path)
+    assert first.programs is not None
+    assert [*first.programs.files] == ["programs/AV_10.mod"]
+    assert "1 measuring program in RAPID, at up to 10 % of the velocity. The faster ones" in "\n".join(first.lines())
+    assert first.summary()["programs"] == {
+        "language": "RAPID",
+        "slow_percent": 10.0,
+        "slow_run_completed": False,
+        "files": ["programs/AV_10.mod"],
+    }
+    assert first.files() == ["plan.yaml", "robot.yaml", "sheet.html", "programs", SLOW_RUN]
+    record = tmp_path / SLOW_RUN
+    assert "completed: no" in record.read_text()
+    planned(cube, program="rapid", out=tmp_path)  # as long as nobody has filled it in it is written again
+    filled(record)
+    said = record.read_text()
+    both = planned(cube, program="rapid", slow_run=record, out=tmp_path)
+    assert both.programs is not None
+    assert sorted(path.name for path in (tmp_path / "programs").iterdir()) == ["AV_10.mod", "AV_100.mod"]
+    assert "2 measuring programs in RAPID, at every velocity." in both.lines()
+    assert record.read_text() == said
+    assert "[500,500,5000,1000]" in (tmp_path / "programs" / "AV_100.mod").read_text()
+    with pytest.raises(InputError, match="somebody has filled in this record of a slow run, and it would be lost"):
+        planned(cube, program="rapid", out=tmp_path)
+    assert record.read_text() == said
+
+
+@pytest.mark.parametrize(
+    ("entries", "more", "message"),
+    [
+        ({"completed": "no"}, {}, "the slow run is not completed, so no faster programs are written; got 'no'"),
+        ({"by": "''"}, {}, "does not say by whom and when"),
+        ({"date": "''"}, {}, "does not say by whom and when"),
+        ({}, {"velocities": [1.0, 0.5, 0.1]}, "the slow run was of another plan"),
+        ({}, {"dwell": 3.0}, "the slow run was of other programs"),
+        ({}, {"program": "krl"}, "the slow run was of other programs"),
+        ({"completed": "perhaps"}, {}, "completed"),
+    ],
+)
+def test_a_slow_run_that_says_too_little_or_something_else_is_refused(
+    entries: dict[str, str], more: dict[str, Any], message: str, cube: Path, tmp_path: Path
+) -> None:
+    planned(cube, program="rapid", out=tmp_path)
+    filled(tmp_path / SLOW_RUN, **entries)
+    with pytest.raises(InputError, match=message):
+        planned(cube, slow_run=tmp_path / SLOW_RUN, out=tmp_path, **({"program": "rapid"} | more))
+    assert [path.name for path in (tmp_path / "programs").iterdir()] == ["AV_10.mod"]
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"program": "basic"}, "program"),
+        ({"dwell": 0.0}, "this is above 0"),
+        ({"dwell": 301.0}, "controllers wait no longer at once; got '?301 s"),
+        ({"slow_run": "x.yaml"}, "a slow run allows faster programs, and none are asked for"),
+    ],
+)
+def test_arguments_that_mean_nothing_are_refused(more: dict[str, Any], message: str, cube: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        planned(cube, **more)
+
+
+def test_a_language_of_another_maker_and_speeds_that_it_does_not_say_are_told(cube: Path) -> None:
+    def notices(language: str) -> list[Notice]:
+        return [one for one in planned(cube, program=language).warnings if one.code in ("maker", "joint-speed-assumed")]
+
+    (speed,) = notices("rapid")
+    assert (speed.code, speed.level) == ("joint-speed-assumed", "note")
+    assert "joint motions have the share of the rated velocity, of the tip" in speed.message
+    maker, speed = notices("urscript")
+    assert (maker.code, maker.level, speed.code) == ("maker", "warning", "joint-speed-assumed")
+    assert "programs were written in URScript." in maker.message
+    assert [one.code for one in notices("fanuc")] == ["maker"]
+
+
+def test_a_folder_takes_other_tests_and_all_of_them_again(cube: Path, tmp_path: Path) -> None:
+    for criteria in (["av", "ap"], ["av"], ["av", "ap"]):
+        planned(cube, program="krl", criteria=criteria, out=tmp_path)
+    assert sorted(path.name for path in (tmp_path / "programs").iterdir()) == ["AP_10.src", "AV_10.src"]
+    (tmp_path / "programs" / "AD_10.src").write_text("of somebody else")
+    with pytest.raises(InputError, match="was not written here by truearm, and is not overwritten"):
+        planned(cube, program="krl", criteria=["ad"], out=tmp_path)

@@ -135,8 +135,8 @@ def main() -> None:
         OUT.write_text(json.dumps(record, indent=1) + "\n")
         sys.stdout.write(
             f"{case}: interval holds {held} of {count}, true above it {above}; stated by true {np.median(ratios):.2f} "
-            f"({min(ratios):.2f} to {max(ratios):.2f}); band holds {bands[0]:.2f} where measured, {bands[1]:.2f} in all"
-            "\n"
+            f"({min(ratios):.2f} to {max(ratios):.2f}); "
+            f"band holds {bands[0]:.2f} where measured, {bands[1]:.2f} in all\n"
         )
         sys.stdout.flush()
 

@@ -55,6 +55,7 @@ def test_its_size_is_that_where_it_was_measured() -> None:
     assert curve({4: 10.0}, np.linspace(-180, 180, 90)).rms == pytest.approx(
         math.radians(0.01) / math.sqrt(2), rel=1e-3
     )
+    assert curve({4: 10.0}, np.linspace(-180, 180, 90)).rms_deviation == pytest.approx(1e-5 / math.sqrt(2), rel=0.01)
     short = curve({1: 10.0}, np.linspace(-10, 10, 30))  # nearly a straight line of 3.5 mdeg
     assert math.degrees(short.rms) == pytest.approx(0.010 * math.radians(10) / math.sqrt(3), rel=0.02)
 
@@ -63,14 +64,14 @@ def test_the_strongest_periods_are_told_with_their_neighbours() -> None:
     found = curve({1: 3.0, 19: 5.0, 20: 6.0, 21: 5.5, 22: 4.5, 50: 1.0, 58: 0.1}, np.linspace(-180, 180, 90))
     assert [one.range for one in found.strongest] == ["19 to 22", "1", "50"]
     assert math.degrees(found.strongest[0].amplitude) == pytest.approx(1e-3 * math.sqrt(25 + 36 + 30.25 + 20.25))
-    assert curve_lines([found]) == ["Joint 2: curve of 0.0078 deg rms, strongest at 19 to 22 periods a turn"]
+    assert curve_lines([found]) == ["Joint 2: curve of 0.0078 +- 0.0004 deg rms, strongest at 19 to 22 periods a turn"]
     several = curve({1: 10.0, 28: 6.0, 58: 5.0, 40: 2.0}, np.linspace(-180, 180, 90))
-    assert curve_lines([several])[0].endswith("0.0091 deg rms, strongest at 1, 28 and 58 periods a turn")
+    assert curve_lines([several])[0].endswith("0.0091 +- 0.0004 deg rms, strongest at 1, 28 and 58 periods a turn")
     assert curve_lines([curve({1: 1.414214}, np.linspace(-180, 180, 90))]) == [
-        "Joint 2: curve of 0.0010 deg rms, strongest at 1 period a turn"
+        "Joint 2: curve of 0.0010 +- 0.0004 deg rms, strongest at 1 period a turn"
     ]
     (summary,) = curves_summary([found])
-    assert list(summary) == ["joint", "rms_mdeg", "strongest", "measured_deg"]
+    assert list(summary) == ["joint", "rms_mdeg", "rms_deviation_mdeg", "strongest", "measured_deg"]
     assert summary["strongest"][1] == {"periods": [1, 1], "amplitude_mdeg": pytest.approx(3.0)}
     assert summary["measured_deg"] == [[-180.0, 180.0]]
 

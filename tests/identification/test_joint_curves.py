@@ -241,6 +241,18 @@ def test_the_expected_error_holds_where_a_joint_was_measured_through_a_sixth_of_
     assert all(fit.robot.values[name] == 0.0 for name in zero)
 
 
+def test_the_same_data_are_not_counted_twice(fitted: tuple[Twin, Dataset, Fit]) -> None:
+    _, data, once = fitted
+    twice = identify(once.robot, data, CURVED)
+    assert twice.free.names == once.free.names
+    assert_allclose(np.diag(twice.covariance), np.diag(once.covariance), rtol=0.1)
+    curves = [name for name in once.free.names if name.startswith("curve_")]
+    before, after = (np.array([fit.robot.values[name] for name in curves]) for fit in (once, twice))
+    assert_allclose(after, before, atol=2e-7)
+    kept = identify(once.robot, data, GEOMETRIC)  # without the effect the curves stay
+    assert [kept.robot.values[name] for name in curves] == before.tolist()
+
+
 def test_without_errors_of_gears_there_are_no_curves() -> None:
     twin = truth_twin(load_robot("irb120"), "random", np.random.default_rng(2))
     data = campaign(twin, 40, 31)
@@ -261,9 +273,10 @@ def test_a_joint_that_hardly_turned_has_no_curve() -> None:
     joints[:, 2] = 0.1 + 0.003 * rng.normal(size=120)
     gears = {number: JointTruth(gear=((5, 3e-4, 0.3),)) for number in (1, 2)}
     data = measure(replace(truth_twin(arm, "random", rng), joints=gears), joints, NOISE, rng)
-    notices = check_curves(identify(arm, data, CURVED), data)
-    message = next(notice.message for notice in notices if notice.code == "curve-left-out")
+    fit = identify(arm, data, CURVED)
+    message = next(notice.message for notice in check_curves(fit, data) if notice.code == "curve-left-out")
     assert f"{arm.joints[2].name} (1 deg) turned" in message
+    assert {"curve_sin1_3", "curve_cos1_3"} <= set(fit.unfitted)  # the others have some
 
 
 def test_under_another_payload_curves_do_no_harm() -> None:

@@ -15,6 +15,7 @@ def curves_summary(curves: Sequence[FoundCurve]) -> list[dict[str, Any]]:
         {
             "joint": curve.number,
             "rms_mdeg": mdeg(curve.rms),
+            "rms_deviation_mdeg": mdeg(curve.rms_deviation),
             "strongest": [
                 {"periods": [one.lowest, one.highest], "amplitude_mdeg": mdeg(one.amplitude)} for one in curve.strongest
             ],
@@ -32,7 +33,8 @@ def curve_lines(curves: Sequence[FoundCurve]) -> list[str]:
         *others, last = [one.range for one in strong]
         periods = f"{', '.join(others)} and {last}" if others else last
         lines.append(
-            f"Joint {curve.number}: curve of {math.degrees(curve.rms):#.2g} deg rms, strongest at {periods} "
+            f"Joint {curve.number}: curve of {math.degrees(curve.rms):#.2g} +- "
+            f"{math.degrees(curve.rms_deviation):.1g} deg rms, strongest at {periods} "
             f"{'period' if periods == '1' else 'periods'} a turn"
         )
     return lines

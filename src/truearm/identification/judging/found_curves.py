@@ -108,11 +108,22 @@ class FoundCurve:
     @cached_property
     def rms(self) -> float:
         """Root mean square about its mean in the measured ranges [rad]; in all that is shown if there are none."""
+        return float(np.std(self.at(self._looked_at)[0]))
+
+    @cached_property
+    def rms_deviation(self) -> float:
+        """Standard deviation of the root mean square [rad], by its derivatives."""
+        waves = curve_waves(self._looked_at, len(self.amounts) // 2)
+        waves -= waves.mean(axis=1, keepdims=True)
+        slope = waves @ (self.amounts @ waves) / (waves.shape[1] * max(self.rms, _NOTHING))
+        return math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
+
+    @cached_property
+    def _looked_at(self) -> Array:
         inside = np.zeros(len(self.angles), dtype=bool)
         for low, high in self.measured:
             inside |= (self.angles >= low) & (self.angles <= high)
-        values = self.at(self.angles[inside] if inside.any() else self.angles)[0]
-        return float(np.std(values))
+        return self.angles[inside] if inside.any() else self.angles
 
     @cached_property
     def strongest(self) -> tuple[Periods, ...]:

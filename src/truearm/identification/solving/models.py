@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from truearm.errors import InputError, did_you_mean
+from truearm.modeling.effects.joint_curve import PRIOR, JointCurve
 from truearm.modeling.parameters import SCALE_GROUP, FreeParameters, Group
 from truearm.modeling.robot import Robot
 
@@ -43,9 +44,17 @@ class Model:
         return replace(self, summary=f"{self.summary}; also {', '.join(added)}", effects=(*self.effects, *added))
 
     def prepared(self, robot: Robot) -> Robot:
-        """Return the robot with the model's effects, every parameter starting anew from its current value."""
+        """Return the robot with the model's effects, every parameter starting anew from its current value.
+
+        Curves of joints that are free start from zero: what is expected of them is found from the data, and those
+        that the robot has were found from data too, perhaps from the same.
+        """
         known = robot.with_effects(self.effects)
-        return known.with_parameters(p.restarted(p.value) for p in known.known.values())
+        anew = JointCurve.name if JointCurve.name in self.effects else None
+        return known.with_parameters(
+            replace(p.restarted(0.0), prior=PRIOR) if p.group == anew else p.restarted(p.value)
+            for p in known.known.values()
+        )
 
     def free(self, robot: Robot) -> FreeParameters:
         """Return the free parameters of a robot, base first, targets and fixtures last."""

@@ -216,6 +216,10 @@ def moved_by_a_millimetre(data: Dataset) -> Dataset:
     return replace(data, position=data.position + late(data) * [1e-3, 0.0, 0.0])
 
 
+#: One object for all who are held against it, so that it is calibrated once.
+SHUFFLED: Final = one_after_the_other(without_sigma, shuffled)
+
+
 #: The lies of data, each under the name that a metrologist would give it.
 LIES: Final[dict[str, Lie]] = {
     # units
@@ -331,7 +335,7 @@ LIES: Final[dict[str, Lie]] = {
         "warning",
         "instrument or a base that moved",
         0,
-        one_after_the_other(without_sigma, shuffled),
+        SHUFFLED,
     ),
     "another-robot-and-no-sigma": Lie(
         one_after_the_other(two_robots, without_sigma, shuffled),
@@ -340,7 +344,7 @@ LIES: Final[dict[str, Lie]] = {
         "warning",
         "another robot",
         0,
-        one_after_the_other(without_sigma, shuffled),
+        SHUFFLED,
     ),
     "probe-bent": Lie(
         with_positions(lambda p, data: p + late(data) * (data.target == 1)[:, None] * [0.0, 0.0, 3e-3]),

@@ -59,7 +59,7 @@ def refused(path: Path) -> InputError:
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "train": ({"train": -5}, "must leave some held out"),
-    "hold": ({"hold": ["bases"]}, "Give its places in a file with 'frames'."),
+    "hold": ({"hold": ["base"]}, "Give its places in a file with 'frames'."),
     "zones": ({"zones": 100}, "out of range"),
     "seed": ({"seed": -1}, "out of range"),
     "bootstrap": ({"bootstrap": 1}, "out of range"),

@@ -25,7 +25,7 @@ from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.errors import InputError
 from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import FRAMES
+from truearm.identification.solving.models import FRAMES, named_model
 from truearm.identification.solving.redundancy import gauge_freedoms
 from truearm.jobs.calibrate import calibrate
 from truearm.jobs.load_robot import load_robot
@@ -38,6 +38,8 @@ from truearm.modeling.robot import Robot
 from truearm.results.calibration import Calibration
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
+
+GEOMETRIC = named_model("geometric")
 
 
 @cache
@@ -56,9 +58,17 @@ def apart(one: Robot, other: Robot, target: str | None = None) -> float:
     return float(np.abs(one.world_poses(q, target)[0] - other.world_poses(q, target)[0]).max())
 
 
+#: What was calibrated with what held: several tests read the same calibration.
+_HELD: dict[object, Calibration] = {}
+
+
 def held(hold: list[str], folder: Path, robot: str = "irb120", **more: Any) -> Calibration:
-    twin, data = exact(robot)
-    return calibrate(robot, data, hold=hold, frames=frames_of(twin.robot, folder / "frames.yaml"), **more)
+    key = (robot, *hold, *more.items())
+    if key not in _HELD:
+        twin, data = exact(robot)
+        frames = frames_of(twin.robot, folder / "frames.yaml")
+        _HELD[key] = calibrate(robot, data, hold=hold, frames=frames, **more)
+    return _HELD[key]
 
 
 @pytest.mark.parametrize(("robot", "redundancy"), [("irb120", "prior"), ("irb120", "drop"), ("katana450", "prior")])
@@ -69,7 +79,7 @@ def test_with_true_frames_the_flange_is_where_it_is(robot: str, redundancy: str,
     assert found.warnings == () or {n.code for n in found.warnings} <= {"redundant", "parallel-axes"}
     assert all(apart(found.robot, twin, target.name) < 1e-9 for target in twin.targets)
     assert apart(found.robot, twin) < 1e-9
-    free = calibrate(robot, exact(robot)[1], redundancy=redundancy)  # type: ignore[arg-type]
+    free = identify(library_robot(robot), exact(robot)[1], GEOMETRIC, redundancy=redundancy)  # type: ignore[arg-type]
     assert all(apart(free.robot, twin, target.name) < 1e-9 for target in twin.targets)
     assert apart(free.robot, twin) > 1e-4  # shifts of base and flange are arbitrary there
 
@@ -90,9 +100,9 @@ def test_what_is_held_stays_and_the_rest_is_found(hold: list[str], tmp_path: Pat
 
 
 def test_the_height_of_the_base_is_no_longer_redundant_with_the_first_joint(tmp_path: Path) -> None:
-    free = calibrate("irb120", exact()[1], redundancy="drop")
+    free = identify(library_robot("irb120"), exact()[1], GEOMETRIC, redundancy="drop")
     absolute = held(["base", "targets"], tmp_path, redundancy="drop")
-    dropped, still = ({r.dropped for r in one.fit.redundancies} for one in (free, absolute))
+    dropped, still = ({r.dropped for r in fit.redundancies} for fit in (free, absolute.fit))
     gauge = {name for name in dropped if name.rsplit("_", 1)[-1] in ("1", "6")}
     assert gauge
     assert not still & gauge
@@ -154,7 +164,7 @@ def test_no_base_and_no_flange_is_assumed_in_programs_where_they_were_held(tmp_p
     reached = np.linalg.inv(twin.base.matrix) @ matrices(twin, one.joints[rows]) @ tool
     np.testing.assert_allclose(reached, one.tips[rows], atol=1e-7)
     assert one.moved[rows].mean() > 1e-4
-    free = calibrate("irb120", exact()[1])
+    free = identify(library_robot("irb120"), exact()[1], GEOMETRIC)
     other = corrected_programs(free.robot, [plate()], EMPTY_CELL, choice=Choice(taught=frozenset()))
     assert (other.frames.tools, other.frames.frames) == ("assumed", "assumed")
     assert not np.allclose(other.frames.base, np.eye(4), atol=1e-6)

@@ -38,7 +38,7 @@ def test_the_device() -> None:
 
 
 def test_the_irb120() -> None:
-    study = irb120_hexapod.study(1, silent, unseen=40, coarser=4)
+    study = irb120_hexapod.study(1, silent, unseen=40, coarser=6)
     assert {row.verdict for row in study.tables[0].rows if row.published is not None} == {"by construction"}
     session = medians(study, 2)
     # A turn about axis 6 moves what is far from it, and the flange not at all.

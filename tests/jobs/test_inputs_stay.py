@@ -113,7 +113,11 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "poses": EXAMPLES["load_data"](folder)["data"],
         "device": None,
     },
-    "iso9283_plan": lambda folder: {"robot": _robot(folder)},
+    "iso9283_plan": lambda folder: {
+        "robot": _robot(folder),
+        "slow_run": _written(folder / "slow.yaml", "{}"),
+        "program": "rapid",
+    },
     "iso9283_evaluate": lambda folder: {"compare": _written(folder / "other.json", "{}")},
     "iso9283_simulate": lambda folder: {
         "robot": _robot(folder),

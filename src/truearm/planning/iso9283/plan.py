@@ -17,6 +17,7 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
+from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_from_vector
 from truearm.planning.iso9283.criteria import TESTS
@@ -255,8 +256,14 @@ class _Layout:
             points += list(way.position(distance))
             turned += list(way.rotation(distance))
         position, rotation = np.array(points), np.array(turned)
-        for seed in self._postures():
-            found = inverse(self.robot, position, rotation, target=self.target, seed=seed)
+        first = slice(0, len(self.names) + len(self.begin))  # far fewer than those of the paths, and farther out
+        for seed, branch in self._postures():
+            poses = inverse(self.robot, position[first], rotation[first], target=self.target, seed=seed, branch=branch)
+            lost = [name for name, status in zip(names, poses.status, strict=False) if not status.usable]
+            if lost:
+                self.missed = lost[0]
+                continue
+            found = inverse(self.robot, position, rotation, target=self.target, seed=seed, branch=branch)
             usable = np.array([status.usable for status in found.status])
             if not usable.all():
                 self.missed = names[int(np.flatnonzero(~usable)[0])]
@@ -272,13 +279,21 @@ class _Layout:
             self.missed = f"{far[0]} without a change of posture"
         return False
 
-    def _postures(self) -> list[Array]:
-        """Return joint positions that bring the tip to P1, to start from."""
-        first = inverse(self.robot, self.places["P1"][None], self.rotation[None], target=self.target)
+    def _postures(self) -> list[tuple[Array, str | None]]:
+        """Return joint positions that bring the tip to P1, to start from, each with its branch where it has a name."""
+        at, turned = self.places["P1"][None], self.rotation[None]
+        first = inverse(self.robot, at, turned, target=self.target)
         if not first.status[0].usable:
             self.missed = "P1"
             return []
-        return [first.joints[0]]
+        if branch_rule(self.robot) is None:
+            return [(first.joints[0], None)]
+        postures: list[tuple[Array, str | None]] = []
+        for name in BRANCHES:
+            there = inverse(self.robot, at, turned, target=self.target, branch=name)
+            if there.status[0].usable:
+                postures.append((there.joints[0], name))
+        return sorted(postures, key=lambda one: float(np.abs(one[0] - first.joints[0]).max()))
 
     def poses(self) -> Mapping[str, PlannedPose]:
         """Return the poses with their joint positions."""

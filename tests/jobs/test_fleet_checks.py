@@ -59,7 +59,10 @@ def refused(path: Path) -> InputError:
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "train": ({"train": -5}, "must leave some held out"),
-    "hold": ({"hold": ["bases"]}, "Give its places in a file with 'frames'."),
+    "hold": ({"hold": ["bases"]}, "nothing of this name to hold; got 'bases'; allowed: base"),
+    "hold without frames": ({"hold": ["base"]}, "Give its places in a file with 'frames'."),
+    "base_changes": ({"base_changes": [1, 2]}, "nothing was measured before the first configuration"),
+    "base_changes in a short part": ({"base_changes": [4]}, "too few training configurations"),
     "zones": ({"zones": 100}, "out of range"),
     "seed": ({"seed": -1}, "out of range"),
     "bootstrap": ({"bootstrap": 1}, "out of range"),
@@ -76,11 +79,11 @@ def test_an_option_that_no_robot_can_be_calibrated_with_is_refused_where_it_stan
     folder = own(measured, tmp_path)
     shutil.rmtree(folder / "out")
     told = refused(manifest(folder, [{**ROBOTS[0]}], wrong))
-    assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{option}")
+    assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{[*wrong][0]}")
     assert words in str(told)
     assert not (folder / "out").exists()
     told = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "options": wrong}]))
-    assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{option}"
+    assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{[*wrong][0]}"
 
 
 def test_an_option_that_one_robot_of_several_cannot_be_calibrated_with_is_its_own_failure(

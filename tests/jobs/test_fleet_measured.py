@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ import pytest
 import truearm
 from truearm.errors import InputError
 from truearm.fleets.entries import RobotEntry
+from truearm.fleets.rows import Accuracy
 from truearm.jobs import fleet_robots
 from truearm.jobs.fleet_robots import calibrated_robot
 from truearm.results.calibration import RESULT_FILES
@@ -112,6 +115,15 @@ def test_a_robot_of_which_the_calibration_breaks_is_a_row(measured: Path, monkey
     row = calibrated_robot(RobotEntry("one", "irb120", measured / "a.csv", of="4711", date="2026-01-01")).row
     assert (row.status, row.of, row.date) == ("failed", "4711", "2026-01-01")
     assert row.message == "the calibration failed (ArithmeticError: singular)"
+
+
+def test_a_robot_whose_figures_are_not_finite_is_a_row(
+    measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = fleet_robots._row
+    monkeypatch.setattr(fleet_robots, "_row", lambda *given: replace(row(*given), held_out=Accuracy(math.nan, 1, 1, 3)))
+    done = calibrated_robot(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15}), tmp_path)
+    assert (done.row.status, done.written, "not finite" in done.row.message) == ("failed", (), True)
 
 
 def test_a_folder_that_cannot_be_written_is_no_fault_of_the_robot(measured: Path, tmp_path: Path) -> None:

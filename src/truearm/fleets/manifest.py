@@ -147,6 +147,12 @@ class Manifest:
             return [self.experiment.name(number) for number in self.numbers(part)]
         return [self.robots[number].name for number in self.numbers(part)]
 
+    def said(self, part: int) -> list[tuple[str, str | None, str | None]]:
+        """Return name, machine and date of the robots in a part, as its rows repeat them."""
+        if self.experiment is not None:
+            return [(name, None, None) for name in self.names(part)]
+        return [(one.name, one.of, one.date) for one in (self.robots[number] for number in self.numbers(part))]
+
 
 def read_manifest(path: Path) -> Manifest:
     """Read a manifest, and look whether the files that it names are there.

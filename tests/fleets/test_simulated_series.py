@@ -122,8 +122,9 @@ def test_what_is_on_disk_is_not_computed_twice(tmp_path: Path) -> None:
         if words.startswith("part 2 of 3"):
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as caught:
         truearm.fleet(file, out=out, workers=1, progress=stop)
+    assert str(caught.value) == "Stopped: 2 of 3 parts are on disk; run it again to go on."
     assert len([*out.rglob("*.jsonl")]) == 2
     assert not (out / "fleet.json").exists()
     with ThreadPoolExecutor(1) as inner:
@@ -268,7 +269,7 @@ class Exchanging(Executor):
         (lambda work, task: None, "an object of type NoneType came back"),
         (lambda work, task: replace(work(task), text=None), "an object of type Finished came back"),
         (lambda work, task: replace(work(task), text="foo"), "a result of another part"),
-        (lambda work, task: work(replace(task, numbers=(4,))), "a result of another part"),
+        (lambda work, task: work(replace(task, numbers=(7, 8))), "a result of another part"),
         (lambda work, task: replace(work(task), text=work(task).text.replace("mean_mm", "mm")), "or a changed one"),
     ],
     ids=["a text", "nothing", "no text", "another text", "another part", "changed"],
@@ -312,9 +313,9 @@ def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
     plan = tmp_path / "plan.csv"
     truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, out=plan)
 
-    def late(asked: ExperimentEntry) -> Experiment:
+    def late(asked: ExperimentEntry, where: str) -> Experiment:
         plan.write_text(plan.read_text() + "\n")
-        return experiment(asked)
+        return experiment(asked, where)
 
     monkeypatch.setattr("truearm.jobs.fleet.experiment", late)
     file = manifest(tmp_path, configurations="plan.csv")
@@ -415,6 +416,9 @@ def test_a_calibration_that_does_not_settle_is_a_row(tmp_path: Path, monkeypatch
         ({"robot": "irb12"}, "irb12"),
         ({"robot": "missing.yaml"}, "no such file"),
         ({"configurations": "missing.csv"}, "no such file"),
+        ({"configurations": 0}, "experiment.configurations: a number of configurations or a file"),
+        ({"configurations": 2.5}, "got 2.5; allowed: 1 or more, or a file"),
+        ({"configurations": True}, "got true; allowed"),
         ({"count": 0}, "too small"),
         ({"count": 2_000_000}, "too many robots"),
         ({"held_out": 100_000}, "out of range"),
@@ -433,6 +437,7 @@ def test_what_cannot_be_meant_is_refused_and_nothing_written(
     told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
     assert what in str(told)
     assert told.parameter == "manifest"
+    assert str(told.where).startswith(f"{file}, experiment")
     assert not (tmp_path / "out").exists()
 
 

@@ -79,11 +79,11 @@ def test_an_option_that_no_robot_can_be_calibrated_with_is_refused_where_it_stan
     folder = own(measured, tmp_path)
     shutil.rmtree(folder / "out")
     told = refused(manifest(folder, [{**ROBOTS[0]}], wrong))
-    assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{[*wrong][0]}")
+    assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{next(iter(wrong))}")
     assert words in str(told)
     assert not (folder / "out").exists()
     told = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "options": wrong}]))
-    assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{[*wrong][0]}"
+    assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{next(iter(wrong))}"
 
 
 def test_an_option_that_one_robot_of_several_cannot_be_calibrated_with_is_its_own_failure(

@@ -87,6 +87,30 @@ def test_a_robot_whose_result_ends_with_an_error_is_named(measured: Path, tmp_pa
     found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
     told = {notice.code: notice.message for notice in found.warnings}
     assert told["robots-in-error"].startswith("The result of 1 robot (one) should not be used")
+    assert ("no-result" in told, found.lines()[0]) == (
+        True,
+        "1 robot: 0 usable, 1 whose result ends with an error, 0 not calibrated.",
+    )
+
+
+def test_what_cannot_be_used_is_told_first_and_figures_say_of_how_many_they_are(measured: Path, tmp_path: Path) -> None:
+    lines = (measured / "a.csv").read_text("utf-8").splitlines()
+    (tmp_path / "metres.csv").write_text("\n".join([lines[0].replace("[mm]", "[m]"), *lines[1:]]) + "\n", "utf-8")
+    robots = [
+        {"name": name, "robot": "irb120", "data": str(file)}
+        for name, file in (("wrong", "metres.csv"), ("right", measured / "b.csv"), ("empty", measured / "empty.csv"))
+    ]
+    (tmp_path / "fleet.yaml").write_text(json.dumps({"truearm": "truearm-fleet/1", "robots": robots}), "utf-8")
+    found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
+    text = found.lines()
+    said = "1 usable, 1 whose result ends with an error, 1 not calibrated."
+    assert text[0] == f"3 robots: {said}"
+    assert [line.partition(":")[0] for line in text[1:3]] == [
+        "Nominal robots, mean error of 1 robot",
+        "Calibrated robots, mean error of 1 robot",
+    ]
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert f"3 robots, {said}" in page
 
 
 def test_a_row_holds_the_arm_alone_with_its_covariance(measured: Path) -> None:

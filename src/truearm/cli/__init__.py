@@ -124,7 +124,9 @@ def main() -> None:
         _end(f"{error.filename or 'output'}: {error.strerror or error}.")
     except UnicodeError as error:
         _end(f"a text cannot be written ({error}).")
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        if stop.args:
+            _end(f"{stop}", 130)
         sys.exit(130)
     except MemoryError:
         _end("there is not enough memory for this. Take less data at a time, or a larger computer.")
@@ -165,12 +167,12 @@ def _refuse_unprintable(words: Sequence[str]) -> None:
             )
 
 
-def _end(message: str) -> NoReturn:
+def _end(message: str, code: int = 2) -> NoReturn:
     try:
         print(printable(f"truearm: {message}"), file=sys.stderr, flush=True)  # noqa: T201
     except OSError:  # a pipe that nobody reads, a full disk: the exit code is all that is left
         _drop(sys.stderr)
-    sys.exit(2)
+    sys.exit(code)
 
 
 def _end_of_pipe() -> NoReturn:

@@ -132,8 +132,8 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
     Raises
     ------
     InputError
-        Naming file and entry, or file, line and column: for two robots of one name or with the same readings, a file that is not there, columns
-        and options that are not known, and a date that is none.
+        Naming file and entry, or file, line and column: for two robots of one name or with the same readings, a file
+        that is not there, columns and options that are not known, and a date that is none.
     """
     folder, hashes = manifest.parent.absolute(), dict[str, str]()  # workers may stand elsewhere
     if isinstance(said, str):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, NotRequired
 
-from pydantic import ConfigDict, Field, TypeAdapter
-from typing_extensions import NotRequired, TypedDict
+from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter
+from typing_extensions import TypedDict
 
 from truearm.units import SHOWN_AS
 
@@ -17,7 +17,15 @@ Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST)]
 NotNegative = Annotated[float, Field(ge=0.0, le=_LARGEST)]
 Positive = Annotated[float, Field(gt=0.0, le=_LARGEST)]
 Name = Annotated[str, Field(min_length=1)]
-Unit = Literal[tuple(SHOWN_AS)]  # type: ignore[valid-type]
+
+
+def _unit(text: str) -> str:
+    if text not in SHOWN_AS:
+        raise ValueError("there is no such unit")
+    return text
+
+
+Unit = Annotated[str, AfterValidator(_unit)]
 
 
 class _Accuracy(TypedDict):

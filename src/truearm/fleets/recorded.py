@@ -1,7 +1,8 @@
 """The parts of a fleet on disk: written once, never computed twice, and read robot by robot.
 
-``record.json`` says what is asked; ``parts/``, which a run locks, holds a file for each part that is done: a line of JSON with what its
-robots share, one for each robot, and one with the hash of those before. A file is there as a whole or not at all.
+``record.json`` says what is asked; ``parts/``, which a run locks, holds a file for each part that is done: a line of
+JSON with what its robots share, one for each robot, and one with the hash of those before. A file is there as a whole
+or not at all.
 """
 
 from __future__ import annotations
@@ -173,7 +174,8 @@ class Recorded:
     def alone(self) -> Iterator[Known]:
         """Let no other run work in the folder, and return what is done there; the lock ends with the process.
 
-        What is asked is written down where nothing stands there yet. Where entries of the manifest have been mended, the parts that they are in are removed.
+        What is asked is written down where nothing stands there yet. Where entries of the manifest have been mended, the
+        parts that they are in are removed.
 
         Raises
         ------
@@ -188,9 +190,10 @@ class Recorded:
                 f"the folder cannot be made ({reason_of(error)})", parameter="out", where=str(self.folder / PARTS)
             ) from error
         with self._locked():
-            known, removed = self._recorded(), ()
+            known = self._recorded()
+            removed: tuple[str, ...] = ()
             if known is None or known.get("digest") != self.manifest.digest:
-                removed = () if known is None else self._remove_mended()
+                removed = self._remove_mended() if known is not None else ()
                 self._write_record()
             found = self.known()
             yield Known(found.done, (*removed, *found.again))
@@ -198,7 +201,7 @@ class Recorded:
     def _remove_mended(self) -> tuple[str, ...]:
         """Remove the parts with robots whose entries or files are others than they were computed from."""
         removed = []
-        for part in self._on_disk():
+        for part in self.on_disk():
             head = self._head(self._content(part), part)
             if head.get("key") != self._key(part):
                 self.file(part).unlink()
@@ -249,7 +252,7 @@ class Recorded:
             Naming a part that somebody has changed.
         """
         done, again = set[int](), list[str]()
-        for part in self._on_disk():
+        for part in self.on_disk():
             head = self._checked(part)[0]
             gone = [name for name in head["written"] if not exists(self.folder / name)]
             if head["changed"]:
@@ -279,7 +282,7 @@ class Recorded:
             same = known is not None and known.get("digest") == self.manifest.digest
             return self.manifest.parts - (len(self.known().done) if same else 0)
 
-    def _on_disk(self) -> list[int]:
+    def on_disk(self) -> list[int]:
         """Return which parts have a file, in their order."""
         names = {path.name for path in (self.folder / PARTS).glob("*/*.jsonl")}
         return [part for part in range(self.manifest.parts) if self.file(part).name in names]
@@ -319,7 +322,7 @@ class Recorded:
         InputError
             Naming the part that somebody has changed.
         """
-        for part in self._on_disk():
+        for part in self.on_disk():
             yield from self._rows(part)
 
     def _rows(self, part: int) -> list[Row]:

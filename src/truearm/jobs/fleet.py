@@ -71,7 +71,9 @@ def fleet(
     Raises
     ------
     InputError
-        If the manifest, a file that it names, the folder or the scheduler cannot be used.
+        If the manifest, a file that it names, the folder, the executor or the scheduler cannot be used.
+    KeyboardInterrupt
+        Where somebody stops it, with how many parts are on disk.
     """
     progress_argument(progress)
     path = path_argument(manifest, "manifest")
@@ -100,11 +102,16 @@ def fleet(
         with refusals_of("manifest"):
             check_options(asked)
     chosen = _workers(count, address, insecure, executor, missing) if missing else ThisProcess()
-    with with_workers(chosen), recorded.alone() as known:
-        run = _computed(recorded, known, make, chosen, progress)
-        progress("reading the parts")
-        found = Fleet(recorded, run, call)
-        found.write()
+    try:
+        with with_workers(chosen), recorded.alone() as known:
+            run = _computed(recorded, known, make, chosen, progress)
+            progress("reading the parts")
+            found = Fleet(recorded, run, call)
+            found.write()
+    except KeyboardInterrupt as stop:
+        done = len(recorded.on_disk())
+        words = f"Stopped: {done} of {counted(asked.parts, 'part')} {'is' if done == 1 else 'are'} on disk"
+        raise KeyboardInterrupt(f"{words}; run it again to go on.") from stop
     return found
 
 
@@ -127,7 +134,7 @@ def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
         robots = asked.robots
         return lambda part: Task(part, __version__, robots=tuple(robots[n] for n in asked.numbers(part)), folder=folder)
     with noted_reads() as noted:
-        made = pickle.dumps(experiment(asked.experiment))
+        made = pickle.dumps(experiment(asked.experiment, f"{asked.file}, experiment"))
     for name, known in asked.hashes.items():
         if {*noted.get((asked.file.parent / name).absolute(), ())} - {known}:
             raise InputError("this file changed while it was read", where=name, cure="Run this again.")

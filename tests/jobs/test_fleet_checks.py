@@ -239,3 +239,21 @@ def test_a_file_that_is_read_from_the_folder_of_a_robot_is_refused(measured: Pat
 def test_each_robot_knows_the_files_that_are_read_for_it(measured: Path) -> None:
     one = read_manifest(manifest(measured, ROBOTS)).robots[0]
     assert [*one.hashes] == [measured / "1.csv"]
+
+
+def test_where_ctrl_c_stops_a_fleet_the_command_says_how_many_parts_are_on_disk(
+    measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = own(measured, tmp_path)
+    (folder / "out" / "parts" / "0000" / "0000002.jsonl").unlink()
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("truearm.jobs.fleet._computed", stop)
+    path = manifest(folder, ROBOTS)
+    monkeypatch.setattr("sys.argv", ["truearm", "fleet", str(path), "--out", str(folder / "out"), "--workers", "1"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "Stopped: 1 of 2 parts are on disk; run it again to go on.\n"

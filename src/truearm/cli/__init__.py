@@ -118,15 +118,14 @@ def main() -> None:
     except SystemExit as stop:
         if isinstance(stop.__context__, BrokenPipeError):  # Typer has its own exit code for it
             _end_of_pipe()
+        _say_of_stop(stop)
         raise
     except OSError as error:
         _drop(sys.stdout)
         _end(f"{error.filename or 'output'}: {error.strerror or error}.")
     except UnicodeError as error:
         _end(f"a text cannot be written ({error}).")
-    except KeyboardInterrupt as stop:
-        if stop.args:
-            _end(f"{stop}", 130)
+    except KeyboardInterrupt:
         sys.exit(130)
     except MemoryError:
         _end("there is not enough memory for this. Take less data at a time, or a larger computer.")
@@ -167,12 +166,25 @@ def _refuse_unprintable(words: Sequence[str]) -> None:
             )
 
 
-def _end(message: str, code: int = 2) -> NoReturn:
+def _say_of_stop(stop: SystemExit) -> None:
+    """Print what a job says where it was stopped by Ctrl-C, of which Typer keeps the exit code alone."""
+    cause: BaseException | None = stop
+    while cause is not None and not isinstance(cause, KeyboardInterrupt):
+        cause = cause.__context__
+    if cause is not None and cause.args:
+        _print_error(f"{cause}")
+
+
+def _end(message: str) -> NoReturn:
+    _print_error(f"truearm: {message}")
+    sys.exit(2)
+
+
+def _print_error(message: str) -> None:
     try:
-        print(printable(f"truearm: {message}"), file=sys.stderr, flush=True)  # noqa: T201
+        print(printable(message), file=sys.stderr, flush=True)  # noqa: T201
     except OSError:  # a pipe that nobody reads, a full disk: the exit code is all that is left
         _drop(sys.stderr)
-    sys.exit(code)
 
 
 def _end_of_pipe() -> NoReturn:

@@ -174,8 +174,8 @@ class Recorded:
     def alone(self) -> Iterator[Known]:
         """Let no other run work in the folder, and return what is done there; the lock ends with the process.
 
-        What is asked is written down where nothing stands there yet. Where entries of the manifest have been mended, the
-        parts that they are in are removed.
+        What is asked is written down where nothing stands there yet. Where entries of the manifest have been mended,
+        the parts that they are in are removed.
 
         Raises
         ------

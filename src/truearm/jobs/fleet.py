@@ -110,8 +110,8 @@ def fleet(
             found.write()
     except KeyboardInterrupt as stop:
         done = len(recorded.on_disk())
-        words = f"Stopped: {done} of {counted(asked.parts, 'part')} {'is' if done == 1 else 'are'} on disk"
-        raise KeyboardInterrupt(f"{words}; run it again to go on.") from stop
+        words = f"{done} of {counted(asked.parts, 'part')} {'are' if asked.parts > 1 else 'is'} on disk"
+        raise KeyboardInterrupt(f"Stopped: {words}; run it again to go on.") from stop
     return found
 
 

@@ -46,12 +46,32 @@ def test_schedulers_here_or_by_tls_are_reached(came: str, full: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "came", ["", "8786", "localhost", "http://localhost:1", "tcp://:8786", "tcp://[::1:8786", "a:b"]
+    "came",
+    [
+        "",
+        "8786",
+        "localhost",
+        "http://localhost:1",
+        "tcp://:8786",
+        "tcp://[::1:8786",
+        "a:b",
+        "tcp:// :1",
+        "tcp://a b:1",
+    ],
 )
 def test_what_is_no_address_is_refused(came: str) -> None:
     with pytest.raises(InputError, match="no address of a scheduler") as caught:
         checked_address(came, insecure=True)
     assert caught.value.parameter == "scheduler"
+
+
+@pytest.mark.parametrize(
+    "came", ["tcp://me:secret@10.0.0.1:8786", "me:secret@localhost:1", "tls://secret@h:1", "secret@"]
+)
+def test_a_password_in_an_address_is_refused_and_not_told(came: str) -> None:
+    with pytest.raises(InputError, match="no address of a scheduler") as caught:
+        checked_address(came, insecure=True)
+    assert "secret" not in str(caught.value)
 
 
 @pytest.mark.parametrize("came", ["tcp://cell.example:8786", "10.0.0.1:8786", "localhost.example:1"])

@@ -86,7 +86,7 @@ REFUSED = {
     "readings of two campaigns": (
         HEADER + "one,ur5,a.csv,4711,2026-01-01,,,\ntwo,ur5,a.csv,4711,2026-07-01,,,\n",
         "line 3, column data",
-        "the same readings stand for two campaigns of one machine",
+        "the same readings stand for two campaigns of",
     ),
     "a header alone": (HEADER, "robots.csv", "no rows"),
 }
@@ -134,12 +134,22 @@ def test_a_missing_table_and_no_robots_are_refused(folder: Path) -> None:
         robots_of([], {}, folder / "fleet.yaml")
 
 
-def test_a_copy_of_readings_is_no_second_campaign_and_another_machine_may_have_them(folder: Path) -> None:
+@pytest.mark.parametrize(
+    ("of", "who"),
+    [
+        ("4711", "two campaigns of 4711, one and two"),
+        ("4712", "two robots, one and two"),
+        ("", "two robots, one and two"),
+    ],
+)
+@pytest.mark.parametrize("data", ["a.csv", "copy.csv"])
+def test_the_same_readings_are_neither_two_robots_nor_two_campaigns(of: str, who: str, data: str, folder: Path) -> None:
     (folder / "copy.csv").write_bytes((folder / "a.csv").read_bytes())
-    rows = "one,ur5,a.csv,4711,2026-01-01,,,\ntwo,ur5,copy.csv,{of},2026-07-01,,,\n"
-    with pytest.raises(InputError, match=r"line 3, column data: the same readings"):
-        read_manifest(table(folder, HEADER + rows.format(of="4711")))
-    assert len(read_manifest(table(folder, HEADER + rows.format(of="4712"))).robots) == 2
+    rows = f"one,ur5,a.csv,4711,2026-01-01,,,\ntwo,ur5,{data},{of},2026-07-01,,,\n"
+    with pytest.raises(InputError, match=r"line 3, column data: the same readings stand for") as refusal:
+        read_manifest(table(folder, HEADER + rows))
+    assert who in refusal.value.what
+    assert "List them once, or give the right file." in str(refusal.value.cure)
 
 
 @pytest.mark.parametrize("written", ["0123", "1_000", "0x7b", "+12"])

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import re
 import shutil
+import time
 from collections.abc import Callable
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from threading import Barrier
 from typing import Any
 
 import numpy as np
@@ -119,8 +122,9 @@ def test_what_is_on_disk_is_not_computed_twice(tmp_path: Path) -> None:
         if words.startswith("part 2 of 3"):
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as caught:
         truearm.fleet(file, out=out, workers=1, progress=stop)
+    assert str(caught.value) == "Stopped: 2 of 3 parts are on disk; run it again to go on."
     assert len([*out.rglob("*.jsonl")]) == 2
     assert not (out / "fleet.json").exists()
     with ThreadPoolExecutor(1) as inner:
@@ -184,7 +188,7 @@ def test_folders_of_others_are_refused(tmp_path: Path) -> None:
         (out / name).write_text(made)
         assert refused(lambda out=out: truearm.fleet(file, out=out, workers=1)).where is not None  # type: ignore[misc]
         assert (out / name).read_text() == made
-    (tmp_path / "out" / "parts").mkdir(parents=True)
+    (tmp_path / "out" / "parts" / "mine").mkdir(parents=True)
     assert "whose it is" in str(refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1)))
 
 
@@ -198,6 +202,18 @@ DAMAGES: dict[str, Callable[[str], str]] = {
     "a huge figure": lambda text: re.sub(r'"mean_mm":[0-9.]+', '"mean_mm":1e308', text, count=1),
     "a list for a figure": lambda text: re.sub(r'"mean_mm":[0-9.]+', '"mean_mm":[]', text, count=1),
     "an unknown unit": lambda text: text.replace('"rad"', '"ft"', 1),
+    "a robot beside it": lambda text: text.replace('"robot-3"', '"robot-9"'),
+    "files elsewhere": lambda text: text.replace('"written": []', '"written": ["../../x"]'),
+    "a number for files": lambda text: text.replace('"written": []', '"written": 3'),
+    "robots that changed": lambda text: text.replace('"changed": []', '"changed": ["robot-1"]'),
+    "a number for names": lambda text: text.replace('"changed": []', '"changed": 3'),
+    "another number": lambda text: text.replace('"part": 2', '"part": 1'),
+    "a negative deviation": lambda text: re.sub(r'"deviation":\[[0-9.]+', '"deviation":[-1', text, count=1),
+    "an infinite value": lambda text: re.sub(r'"value":\[[-0-9.e]+', '"value":[1e999', text, count=1),
+    "no values": lambda text: re.sub(r'"value":\[[^]]*\],', "", text, count=1),
+    "a text for a time": lambda text: re.sub(r'"seconds":[0-9.e-]+', '"seconds":"1"', text, count=1),
+    "another status": lambda text: text.replace('"calibrated"', '"fine"', 1),
+    "an entry more": lambda text: text.replace('"status"', '"more":1,"status"', 1),
     "a list for a robot": lambda text: "[]\n".join(text.splitlines(keepends=True)[:1]) + "[]\n",
 }
 
@@ -214,6 +230,56 @@ def test_a_part_that_is_not_as_it_was_written_is_named(
     monkeypatch.setattr("truearm.jobs.fleet._computed", lambda *given: begun.append(given))
     told = refused(lambda: truearm.fleet(file, out=out, workers=1))
     assert (told.where, told.parameter, begun) == (str(part), "out", [])
+
+
+#: Only the hash tells of these.
+HASH_ALONE = ("a robot less", "no hash", "another figure")
+
+
+@pytest.mark.parametrize("damage", [name for name in DAMAGES if name not in HASH_ALONE])
+def test_a_changed_part_with_the_hash_of_its_changes_is_named_too(tmp_path: Path, damage: str, finished: Path) -> None:
+    file, out = manifest(tmp_path), tmp_path / "out"
+    shutil.copytree(finished, out)
+    part = out / "parts" / "0000" / "0000002.jsonl"
+    before = "".join(part.read_text().splitlines(keepends=True)[:-1])
+    text = DAMAGES[damage](before)
+    assert text != before
+    hashed = hashlib.sha256(text.encode()).hexdigest()
+    part.write_text(text + json.dumps({"sha256": hashed}) + "\n")
+    told = refused(lambda: truearm.fleet(file, out=out, workers=1))
+    assert (told.what, told.where) == ("this part of the fleet is not as it was written", str(part))
+
+
+class Exchanging(Executor):
+    """Returns something else than it was asked for."""
+
+    def __init__(self, wrong: Callable[[Any, Any], object]) -> None:
+        self.wrong = wrong
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
+        future: Future[Any] = Future()
+        future.set_result(self.wrong(fn, args[0]))
+        return future
+
+
+@pytest.mark.parametrize(
+    ("wrong", "came"),
+    [
+        (lambda work, task: "foo", "an object of type str came back"),
+        (lambda work, task: None, "an object of type NoneType came back"),
+        (lambda work, task: replace(work(task), text=None), "an object of type Finished came back"),
+        (lambda work, task: replace(work(task), text="foo"), "a result of another part"),
+        (lambda work, task: work(replace(task, numbers=(7, 8))), "a result of another part"),
+        (lambda work, task: replace(work(task), text=work(task).text.replace("mean_mm", "mm")), "or a changed one"),
+    ],
+    ids=["a text", "nothing", "no text", "another text", "another part", "changed"],
+)
+def test_what_an_executor_must_not_return_is_refused_and_not_written(
+    tmp_path: Path, wrong: Callable[[Any, Any], object], came: str
+) -> None:
+    told = refused(lambda: truearm.fleet(manifest(tmp_path), out=tmp_path / "out", executor=Exchanging(wrong)))
+    assert (told.parameter, came in str(told.came)) == ("executor", True)
+    assert [*(tmp_path / "out").rglob("*.jsonl")] == []
 
 
 def test_a_part_that_was_removed_is_computed_again(tmp_path: Path, finished: Path) -> None:
@@ -247,9 +313,9 @@ def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
     plan = tmp_path / "plan.csv"
     truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, out=plan)
 
-    def late(asked: ExperimentEntry) -> Experiment:
+    def late(asked: ExperimentEntry, where: str) -> Experiment:
         plan.write_text(plan.read_text() + "\n")
-        return experiment(asked)
+        return experiment(asked, where)
 
     monkeypatch.setattr("truearm.jobs.fleet.experiment", late)
     file = manifest(tmp_path, configurations="plan.csv")
@@ -275,6 +341,48 @@ def test_two_runs_at_once_in_one_folder_are_refused(tmp_path: Path) -> None:
     truearm.fleet(file, out=out, workers=1)
     with Recorded(out, read_manifest(file)).alone():
         assert "another run computes parts there" in str(refused(lambda: truearm.fleet(file, out=out, workers=1)))
+
+
+@pytest.mark.parametrize("other", ["the same manifest", "another manifest"])
+def test_of_two_runs_that_begin_at_once_one_is_told_of_the_other(tmp_path: Path, other: str) -> None:
+    pytest.importorskip("fcntl")
+    one, out = read_manifest(manifest(tmp_path)), tmp_path / "out"
+    changed = {"seed": 7} if other == "another manifest" else {}
+    two = manifest(tmp_path, name="two.yaml", **changed)
+    second = Recorded(out, read_manifest(two))
+    assert second.missing() == 3
+    with Recorded(out, one).alone():
+        for begin in (second.missing, second.alone().__enter__, lambda: truearm.fleet(two, out=out, workers=1)):
+            assert "another run computes parts there" in str(refused(begin))
+    if changed:
+        assert "the parts there are of another manifest" in str(refused(second.alone().__enter__))
+
+
+@pytest.mark.parametrize("kind", ["same", "other"])
+def test_many_runs_that_begin_at_once_leave_one_fleet(tmp_path: Path, kind: str) -> None:
+    pytest.importorskip("fcntl")
+    file = manifest(tmp_path)
+    others = [manifest(tmp_path, name=f"{n}.yaml", **({} if kind == "same" else {"seed": n})) for n in range(1, 4)]
+    for turn in range(3):
+        out, gate = tmp_path / f"out-{turn}", Barrier(4)
+        working: list[Path] = []
+
+        def run(path: Path, out: Path = out, gate: Barrier = gate, working: list[Path] = working) -> str:
+            gate.wait()
+            try:
+                with Recorded(out, read_manifest(path)).alone():
+                    assert working == []
+                    working.append(path)
+                    time.sleep(0.02)
+                    working.remove(path)
+            except InputError as error:
+                return error.what
+            return ""
+
+        with ThreadPoolExecutor(4) as pool:
+            told = [*pool.map(run, [file, *others])]
+        assert "" in told
+        assert {*told} <= {"", "another run computes parts there", "the parts there are of another manifest"}
 
 
 def test_robots_of_lost_parts_are_named_and_an_error(tmp_path: Path) -> None:
@@ -308,6 +416,9 @@ def test_a_calibration_that_does_not_settle_is_a_row(tmp_path: Path, monkeypatch
         ({"robot": "irb12"}, "irb12"),
         ({"robot": "missing.yaml"}, "no such file"),
         ({"configurations": "missing.csv"}, "no such file"),
+        ({"configurations": 0}, "experiment.configurations: a number of configurations or a file"),
+        ({"configurations": 2.5}, "got 2.5; allowed: 1 or more, or a file"),
+        ({"configurations": True}, "got true; allowed"),
         ({"count": 0}, "too small"),
         ({"count": 2_000_000}, "too many robots"),
         ({"held_out": 100_000}, "out of range"),
@@ -326,6 +437,7 @@ def test_what_cannot_be_meant_is_refused_and_nothing_written(
     told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
     assert what in str(told)
     assert told.parameter == "manifest"
+    assert str(told.where).startswith(f"{file}, experiment")
     assert not (tmp_path / "out").exists()
 
 

@@ -59,7 +59,10 @@ def refused(path: Path) -> InputError:
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "train": ({"train": -5}, "must leave some held out"),
-    "hold": ({"hold": ["base"]}, "Give its places in a file with 'frames'."),
+    "hold": ({"hold": ["bases"]}, "nothing of this name to hold; got 'bases'; allowed: base"),
+    "hold without frames": ({"hold": ["base"]}, "Give its places in a file with 'frames'."),
+    "base_changes": ({"base_changes": [1, 2]}, "nothing was measured before the first configuration"),
+    "base_changes in a short part": ({"base_changes": [4]}, "too few training configurations"),
     "zones": ({"zones": 100}, "out of range"),
     "seed": ({"seed": -1}, "out of range"),
     "bootstrap": ({"bootstrap": 1}, "out of range"),
@@ -76,11 +79,11 @@ def test_an_option_that_no_robot_can_be_calibrated_with_is_refused_where_it_stan
     folder = own(measured, tmp_path)
     shutil.rmtree(folder / "out")
     told = refused(manifest(folder, [{**ROBOTS[0]}], wrong))
-    assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{option}")
+    assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{next(iter(wrong))}")
     assert words in str(told)
     assert not (folder / "out").exists()
     told = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "options": wrong}]))
-    assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{option}"
+    assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{next(iter(wrong))}"
 
 
 def test_an_option_that_one_robot_of_several_cannot_be_calibrated_with_is_its_own_failure(
@@ -236,3 +239,21 @@ def test_a_file_that_is_read_from_the_folder_of_a_robot_is_refused(measured: Pat
 def test_each_robot_knows_the_files_that_are_read_for_it(measured: Path) -> None:
     one = read_manifest(manifest(measured, ROBOTS)).robots[0]
     assert [*one.hashes] == [measured / "1.csv"]
+
+
+def test_where_ctrl_c_stops_a_fleet_the_command_says_how_many_parts_are_on_disk(
+    measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = own(measured, tmp_path)
+    (folder / "out" / "parts" / "0000" / "0000002.jsonl").unlink()
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("truearm.jobs.fleet._computed", stop)
+    path = manifest(folder, ROBOTS)
+    monkeypatch.setattr("sys.argv", ["truearm", "fleet", str(path), "--out", str(folder / "out"), "--workers", "1"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "Stopped: 1 of 2 parts are on disk; run it again to go on.\n"

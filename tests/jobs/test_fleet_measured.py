@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ import pytest
 import truearm
 from truearm.errors import InputError
 from truearm.fleets.entries import RobotEntry
+from truearm.fleets.rows import Accuracy
 from truearm.jobs import fleet_robots
 from truearm.jobs.fleet_robots import calibrated_robot
 from truearm.results.calibration import RESULT_FILES
@@ -84,6 +87,30 @@ def test_a_robot_whose_result_ends_with_an_error_is_named(measured: Path, tmp_pa
     found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
     told = {notice.code: notice.message for notice in found.warnings}
     assert told["robots-in-error"].startswith("The result of 1 robot (one) should not be used")
+    assert ("no-result" in told, found.lines()[0]) == (
+        True,
+        "1 robot: 0 usable, 1 whose result ends with an error, 0 not calibrated.",
+    )
+
+
+def test_what_cannot_be_used_is_told_first_and_figures_say_of_how_many_they_are(measured: Path, tmp_path: Path) -> None:
+    lines = (measured / "a.csv").read_text("utf-8").splitlines()
+    (tmp_path / "metres.csv").write_text("\n".join([lines[0].replace("[mm]", "[m]"), *lines[1:]]) + "\n", "utf-8")
+    robots = [
+        {"name": name, "robot": "irb120", "data": str(file)}
+        for name, file in (("wrong", "metres.csv"), ("right", measured / "b.csv"), ("empty", measured / "empty.csv"))
+    ]
+    (tmp_path / "fleet.yaml").write_text(json.dumps({"truearm": "truearm-fleet/1", "robots": robots}), "utf-8")
+    found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
+    text = found.lines()
+    said = "1 usable, 1 whose result ends with an error, 1 not calibrated."
+    assert text[0] == f"3 robots: {said}"
+    assert [line.partition(":")[0] for line in text[1:3]] == [
+        "Nominal robots, mean error of 1 robot",
+        "Calibrated robots, mean error of 1 robot",
+    ]
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert f"3 robots, {said}" in page
 
 
 def test_a_row_holds_the_arm_alone_with_its_covariance(measured: Path) -> None:
@@ -112,6 +139,15 @@ def test_a_robot_of_which_the_calibration_breaks_is_a_row(measured: Path, monkey
     row = calibrated_robot(RobotEntry("one", "irb120", measured / "a.csv", of="4711", date="2026-01-01")).row
     assert (row.status, row.of, row.date) == ("failed", "4711", "2026-01-01")
     assert row.message == "the calibration failed (ArithmeticError: singular)"
+
+
+def test_a_robot_whose_figures_are_not_finite_is_a_row(
+    measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = fleet_robots._row
+    monkeypatch.setattr(fleet_robots, "_row", lambda *given: replace(row(*given), held_out=Accuracy(math.nan, 1, 1, 3)))
+    done = calibrated_robot(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15}), tmp_path)
+    assert (done.row.status, done.written, "not finite" in done.row.message) == ("failed", (), True)
 
 
 def test_a_folder_that_cannot_be_written_is_no_fault_of_the_robot(measured: Path, tmp_path: Path) -> None:

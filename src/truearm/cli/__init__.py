@@ -120,6 +120,7 @@ def main() -> None:
     except SystemExit as stop:
         if isinstance(stop.__context__, BrokenPipeError):  # Typer has its own exit code for it
             _end_of_pipe()
+        _say_of_stop(stop)
         raise
     except OSError as error:
         _drop(sys.stdout)
@@ -167,12 +168,25 @@ def _refuse_unprintable(words: Sequence[str]) -> None:
             )
 
 
+def _say_of_stop(stop: SystemExit) -> None:
+    """Print what a job says where it was stopped by Ctrl-C, of which Typer keeps the exit code alone."""
+    cause: BaseException | None = stop
+    while cause is not None and not isinstance(cause, KeyboardInterrupt):
+        cause = cause.__context__
+    if cause is not None and cause.args:
+        _print_error(f"{cause}")
+
+
 def _end(message: str) -> NoReturn:
+    _print_error(f"truearm: {message}")
+    sys.exit(2)
+
+
+def _print_error(message: str) -> None:
     try:
-        print(printable(f"truearm: {message}"), file=sys.stderr, flush=True)  # noqa: T201
+        print(printable(message), file=sys.stderr, flush=True)  # noqa: T201
     except OSError:  # a pipe that nobody reads, a full disk: the exit code is all that is left
         _drop(sys.stderr)
-    sys.exit(2)
 
 
 def _end_of_pipe() -> NoReturn:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import logging
 import pkgutil
+import re
 import socket
 import threading
 import time
@@ -38,6 +39,8 @@ _LENGTH: Final = 8
 _LONGEST_GREETING: Final = 1_000_000
 #: How schedulers are reached.
 _PROTOCOLS: Final = ("tcp", "tls")
+#: Names and numbers of machines.
+_HOST: Final = re.compile(r"[0-9A-Za-z_.:%-]+")
 #: Who prints tracebacks where a connection is lost; Dask gives the second one a level of its own.
 _LOGGERS: Final = ("distributed", "distributed.client", "tornado.application")
 #: What to do where the cluster has gone.
@@ -270,13 +273,16 @@ def checked_address(address: str, *, insecure: bool) -> str:
         host, port = parts.hostname, parts.port
     except ValueError:
         parts, host, port = urlsplit(""), None, None
-    if parts.scheme not in _PROTOCOLS or not host or port is None:
+    whole = host is not None and port is not None and _HOST.fullmatch(host) is not None
+    if parts.scheme not in _PROTOCOLS or not whole or "@" in address:
         raise InputError(
             "this is no address of a scheduler",
             parameter="scheduler",
-            came=address,
+            came=_without_password(address),
             allowed="tcp://HOST:PORT or tls://HOST:PORT",
+            cure="A scheduler knows no users and passwords: leave them out." if "@" in address else None,
         )
+    assert host is not None
     if parts.scheme == "tcp" and not insecure and not _is_here(host):
         raise InputError(
             "this scheduler is on another machine, and is reached without TLS",
@@ -287,6 +293,13 @@ def checked_address(address: str, *, insecure: bool) -> str:
             "a tunnel such as 'ssh -L 8786:localhost:8786 HOST'. In a network that you trust, give `insecure`.",
         )
     return full
+
+
+def _without_password(address: str) -> str:
+    """Return an address as messages show it: nobody reads there what stands before an @."""
+    protocol, _, rest = address.rpartition("://")
+    named = f"{protocol}://" if protocol in _PROTOCOLS else ""
+    return f"{named}...@{rest.rpartition('@')[2]}" if "@" in address else address
 
 
 def _is_here(host: str) -> bool:

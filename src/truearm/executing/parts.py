@@ -25,10 +25,11 @@ _PATIENCE: Final = 1.0
 
 @dataclass(frozen=True)
 class Done(Generic[Part, Result]):
-    """A part with its result; None if the workers that did it died again and again."""
+    """A part with its result; lost, and without one, if the workers that did it died again and again."""
 
     part: Part
     result: Result | None
+    lost: bool = False
 
 
 def done_parts(
@@ -93,7 +94,7 @@ class _Run(Generic[Part, Result]):
                 try:
                     result = future.result()
                 except self._workers.lost:
-                    yield Done(self._taken(future), None)
+                    yield Done(self._taken(future), None, lost=True)
                 except (BrokenExecutor, CancelledError) as error:
                     broken = error
                 except InputError:
@@ -154,7 +155,7 @@ class _Run(Generic[Part, Result]):
         except InputError as error:
             raise error from reason
         if given_up:
-            yield Done(held[0], None)
+            yield Done(held[0], None, lost=True)
 
     def _renew(self) -> None:
         self._in_a_row += 1

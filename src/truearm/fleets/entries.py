@@ -132,8 +132,8 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
     Raises
     ------
     InputError
-        Naming file and entry, or file, line and column: for two robots of one name, a file that is not there, columns
-        and options that are not known, and a date that is none.
+        Naming file and entry, or file, line and column: for two robots of one name or with the same readings, a file
+        that is not there, columns and options that are not known, and a date that is none.
     """
     folder, hashes = manifest.parent.absolute(), dict[str, str]()  # workers may stand elsewhere
     if isinstance(said, str):
@@ -146,7 +146,7 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
     refuse_beyond("robots", len(entries), where=str(manifest))
     general = checked_options(options, folder, lambda name: f"{manifest}, options.{name}")
     seen: dict[str, str] = {}
-    campaigns: dict[tuple[str, str], str] = {}
+    readings: dict[str, tuple[RobotEntry, str]] = {}
     robots = []
     for one in entries:
         entry = one.entry
@@ -178,22 +178,25 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
                 **{name: one.place_of_option(name) for name in own},
             },
         )
-        _check_campaign(made, hashes[entry.data], one.place("data"), campaigns)
+        _check_readings(made, hashes[entry.data], one.place("data"), readings)
         robots.append(made)
     content = [one.entry.model_dump(mode="json") | {"options": {**options, **one.entry.options}} for one in entries]
     return Robots(tuple(robots), hashes, content)
 
 
-def _check_campaign(robot: RobotEntry, data: str, where: str, campaigns: dict[tuple[str, str], str]) -> None:
-    """Refuse the same readings as two campaigns of one machine: they would say that nothing has changed."""
-    other = campaigns.setdefault((robot.machine, data), where)
-    if other != where:
-        raise InputError(
-            "the same readings stand for two campaigns of one machine",
-            where=where,
-            came=robot.data.name,
-            cure=f"{other} has them too. Give each campaign its own file, or another 'of' if these are two machines.",
-        )
+def _check_readings(robot: RobotEntry, data: str, where: str, seen: dict[str, tuple[RobotEntry, str]]) -> None:
+    """Refuse readings that stand there twice: they would count as two robots, or say that nothing has changed."""
+    other, place = seen.setdefault(data, (robot, where))
+    if other is robot:
+        return
+    campaigns = other.machine == robot.machine
+    raise InputError(
+        f"the same readings stand for {f'two campaigns of {robot.machine}' if campaigns else 'two robots'}, "
+        f"{other.name} and {robot.name}",
+        where=where,
+        came=robot.data.name,
+        cure=f"{place} has them too. List them once, or give the right file.",
+    )
 
 
 def refuse_respelled(said: list[Any], manifest: Path) -> None:

@@ -16,17 +16,17 @@ from truearm.measurement.readers.canonical import read_csv
 from truearm.simulation.truths import carrying_targets
 
 
-def experiment(asked: ExperimentEntry) -> Experiment:
-    """Prepare an experiment.
+def experiment(asked: ExperimentEntry, where: str = "experiment") -> Experiment:
+    """Prepare an experiment; refusals name `where` it stands.
 
     Raises
     ------
     InputError
         For a robot or configurations that cannot be read, a model that is not known, and targets that are not there.
     """
-    with _refusals_of_entry("robot"):
+    with _refusals_at(f"{where}.robot"):
         nominal = load_robot(asked.robot)
-    with _refusals_of_entry("model"):
+    with _refusals_at(f"{where}.model"):
         model = named_model(asked.model)
     known = carrying_targets(nominal)
     places = {target.name: tuple(known.values[target.parameter(axis)] for axis in "xyz") for target in known.targets}
@@ -34,7 +34,7 @@ def experiment(asked: ExperimentEntry) -> Experiment:
         raise InputError(
             f"{nominal.name} has fewer targets",
             parameter="manifest",
-            where="experiment.targets",
+            where=f"{where}.targets",
             came=asked.targets,
             allowed=f"1 to {len(places)}",
         )
@@ -44,20 +44,20 @@ def experiment(asked: ExperimentEntry) -> Experiment:
     if isinstance(asked.configurations, int):
         joints = robot.random_configurations(asked.configurations, rng)
     else:
-        with _refusals_of_entry("configurations"):
+        with _refusals_at(f"{where}.configurations"):
             joints = in_model_joints(robot, read_csv(asked.configurations)).joints
-    with _refusals_of_entry("model"):
+    with _refusals_at(f"{where}.model"):
         model.free(model.prepared(robot))
     return Experiment(asked, robot, joints, held_out)
 
 
 @contextmanager
-def _refusals_of_entry(entry: str) -> Iterator[None]:
+def _refusals_at(place: str) -> Iterator[None]:
     """Let refusals of what an entry of the manifest holds name it."""
     try:
         yield
     except InputError as error:
         name_parameter(error, "manifest")
         if error.where is None:
-            name_place(error, f"experiment.{entry}")
+            name_place(error, place)
         raise

@@ -26,9 +26,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, PlainValidator
 
-from truearm.errors import InputError, refusals_at
+from truearm.errors import InputError, name_place, refusals_at
 from truearm.files import read_bytes, read_yaml
 from truearm.fleets.series import ExperimentEntry
 from truearm.limits import refuse_beyond
@@ -47,6 +47,17 @@ MEASURED_TOGETHER: Final = 8
 Count = Annotated[int, Field(ge=1, strict=True)]
 
 
+def _configurations(said: object) -> int | str:
+    if (isinstance(said, str) and said) or (type(said) is int and said >= 1):
+        return said
+    raise InputError(
+        "a number of configurations or a file of them belongs here", allowed="1 or more, or a file such as plan.csv"
+    )
+
+
+Configurations = Annotated[int | str, PlainValidator(_configurations)]
+
+
 class _Units(BaseModel):
     model_config = STRICT
 
@@ -60,7 +71,7 @@ class ExperimentFile(BaseModel):
 
     robot: str
     count: Count
-    configurations: Count | str = 20
+    configurations: Configurations = 20
     targets: Annotated[int, Field(ge=1, le=8, strict=True)] = 1
     model: str = "geometric"
     noise: NotNegative
@@ -147,6 +158,12 @@ class Manifest:
             return [self.experiment.name(number) for number in self.numbers(part)]
         return [self.robots[number].name for number in self.numbers(part)]
 
+    def said(self, part: int) -> list[tuple[str, str | None, str | None]]:
+        """Return name, machine and date of the robots in a part, as its rows repeat them."""
+        if self.experiment is not None:
+            return [(name, None, None) for name in self.names(part)]
+        return [(one.name, one.of, one.date) for one in (self.robots[number] for number in self.numbers(part))]
+
 
 def read_manifest(path: Path) -> Manifest:
     """Read a manifest, and look whether the files that it names are there.
@@ -166,8 +183,8 @@ def read_manifest(path: Path) -> Manifest:
         )
     content = said.model_dump(mode="json")
     if said.experiment is not None:
-        experiment, files = _experiment(said, path)
-        return Manifest(path, experiment, (), said.chunk or SIMULATED_TOGETHER, content, _hashes(files))
+        experiment, hashes = _experiment(said, path)
+        return Manifest(path, experiment, (), said.chunk or SIMULATED_TOGETHER, content, hashes)
     if said.units is not None:
         raise InputError("nothing here has a unit", where=f"{path}, units", cure="Remove it.")
     from truearm.fleets.entries import refuse_respelled, robots_of
@@ -179,8 +196,8 @@ def read_manifest(path: Path) -> Manifest:
     return Manifest(path, None, named.entries, said.chunk or MEASURED_TOGETHER, content, named.hashes)
 
 
-def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[str, Path]]:
-    """Return the experiment, and the files that it names."""
+def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[str, str]]:
+    """Return the experiment, and the SHA-256 of the files that it names."""
     asked = said.experiment
     assert asked is not None
     if said.units is None:
@@ -198,23 +215,30 @@ def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[s
         ("poses", "configurations", asked.configurations if isinstance(asked.configurations, int) else 0),
     ):
         refuse_beyond(name, came, where=f"{path}, experiment.{entry}")
-    files = {}
+    hashes = {}
     robot = asked.robot
     if Path(robot).suffix:
-        files[robot] = path.parent / robot
-        robot = str(files[robot])
+        hashes[robot] = _hash(robot, path, "robot")
+        robot = str(path.parent / robot)
     configurations: int | Path = asked.configurations if isinstance(asked.configurations, int) else Path()
     if isinstance(asked.configurations, str):
-        configurations = files[asked.configurations] = path.parent / asked.configurations
+        hashes[asked.configurations] = _hash(asked.configurations, path, "configurations")
+        configurations = path.parent / asked.configurations
     with refusals_at(f"{path}, experiment.noise"):
         noise = sized_si(asked.noise, said.units.length, deviation=True)
     return (
         ExperimentEntry(
             robot, asked.count, configurations, asked.targets, asked.model, noise, asked.held_out, asked.seed
         ),
-        files,
+        hashes,
     )
 
 
-def _hashes(files: Mapping[str, Path]) -> dict[str, str]:
-    return {name: hashlib.sha256(read_bytes(path)).hexdigest() for name, path in files.items()}
+def _hash(name: str, manifest: Path, entry: str) -> str:
+    """Return the SHA-256 of a file that an entry of the experiment names, or refuse it there."""
+    try:
+        return hashlib.sha256(read_bytes(manifest.parent / name)).hexdigest()
+    except InputError as error:
+        error.came = name
+        name_place(error, f"{manifest}, experiment.{entry}")
+        raise

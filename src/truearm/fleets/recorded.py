@@ -1,16 +1,18 @@
 """The parts of a fleet on disk: written once, never computed twice, and read robot by robot.
 
-``record.json`` says what is asked; ``parts/`` holds a file for each part that is done: a line of JSON with what its
-robots share, one for each robot, and one with the hash of those before. A file is there as a whole or not at all.
+``record.json`` says what is asked; ``parts/``, which a run locks, holds a file for each part that is done: a line of
+JSON with what its robots share, one for each robot, and one with the hash of those before. A file is there as a whole
+or not at all.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -18,8 +20,9 @@ from typing import Any, Final
 from pydantic_core import from_json
 
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, read_text
+from truearm.files import exists, read_bytes, read_text, reason_of
 from truearm.fleets.manifest import Manifest
+from truearm.fleets.part_schema import head_of, rows_of, said_of
 from truearm.fleets.rows import Row
 from truearm.shown import counted, listed
 from truearm.version import __version__
@@ -71,14 +74,7 @@ class Recorded:
         """Return where a part is, counted from 0."""
         return self.folder / PARTS / f"{part // _TOGETHER:04}" / f"{part + 1:07}.jsonl"
 
-    def check(self) -> None:
-        """Refuse a folder in which something else was asked, or that leads elsewhere.
-
-        Raises
-        ------
-        InputError
-            If parts of another manifest, other files or another version of truearm stand there.
-        """
+    def _refuse_links(self) -> None:
         for name in (PARTS, ROBOTS):
             if (self.folder / name).is_symlink():
                 raise InputError(
@@ -87,24 +83,22 @@ class Recorded:
                     where=str(self.folder / name),
                     cure="Remove the link, or choose another `out`.",
                 )
-        path = self.folder / RECORD
-        if exists(path):
-            self._refuse_others(self._read())
-            return
-        if exists(self.folder / PARTS):
+
+    def _recorded(self) -> dict[str, Any] | None:
+        """Return what the record says; None where there is none, and no parts that it could be of."""
+        if exists(self.folder / RECORD):
+            known = self._read()
+            self._refuse_others(known)
+            return known
+        parts = self.folder / PARTS
+        if exists(parts) and (not parts.is_dir() or any(parts.iterdir())):
             raise InputError(
                 "there is a folder of this name, and nothing says whose it is",
                 parameter="out",
-                where=str(self.folder / PARTS),
+                where=str(parts),
                 cure="Choose another `out`.",
             )
-
-    def begin(self) -> None:
-        """Write down what is asked, where nothing stands there yet."""
-        path = self.folder / RECORD
-        if not exists(path):
-            self._write_record()
-        self.check()
+        return None
 
     def _write_record(self) -> None:
         write_text(self.folder / RECORD, json.dumps(self._record(), indent=1, default=str) + "\n")
@@ -180,29 +174,34 @@ class Recorded:
     def alone(self) -> Iterator[Known]:
         """Let no other run work in the folder, and return what is done there; the lock ends with the process.
 
-        Where entries of the manifest have been mended, the parts that they are in are removed.
+        What is asked is written down where nothing stands there yet. Where entries of the manifest have been mended,
+        the parts that they are in are removed.
 
         Raises
         ------
         InputError
-            If another run works there, or somebody has changed a part.
+            If another run works there, something else was asked there, or somebody has changed a part.
         """
+        self._refuse_links()
+        try:
+            (self.folder / PARTS).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"the folder cannot be made ({reason_of(error)})", parameter="out", where=str(self.folder / PARTS)
+            ) from error
         with self._locked():
-            known = self._read()
-            self._refuse_others(known)
-            if known.get("digest") == self.manifest.digest:
-                yield self.known()
-                return
-            removed = self._remove_mended()
-            self._write_record()
-            with self._locked():  # what was locked before is the old file
-                found = self.known()
-                yield Known(found.done, (*removed, *found.again))
+            known = self._recorded()
+            removed: tuple[str, ...] = ()
+            if known is None or known.get("digest") != self.manifest.digest:
+                removed = self._remove_mended() if known is not None else ()
+                self._write_record()
+            found = self.known()
+            yield Known(found.done, (*removed, *found.again))
 
     def _remove_mended(self) -> tuple[str, ...]:
         """Remove the parts with robots whose entries or files are others than they were computed from."""
         removed = []
-        for part in self._on_disk():
+        for part in self.on_disk():
             head = self._head(self._content(part), part)
             if head.get("key") != self._key(part):
                 self.file(part).unlink()
@@ -217,14 +216,16 @@ class Recorded:
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
+        """Lock the folder of the parts, which is never replaced, as the record is that every run may write."""
         if sys.platform == "win32":
             yield
             return
         import fcntl
 
-        with (self.folder / RECORD).open("rb") as stream:
+        handle = os.open(self.folder / PARTS, os.O_RDONLY)
+        try:
             try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
                 raise InputError(
                     "another run computes parts there",
@@ -235,6 +236,10 @@ class Recorded:
             except OSError:  # a file system without locks
                 pass
             yield
+            with suppress(OSError):  # by itself, as a copy of this process would hold on to it
+                fcntl.flock(handle, fcntl.LOCK_UN)
+        finally:
+            os.close(handle)
 
     def known(self) -> Known:
         """Return which parts are on disk.
@@ -247,7 +252,7 @@ class Recorded:
             Naming a part that somebody has changed.
         """
         done, again = set[int](), list[str]()
-        for part in self._on_disk():
+        for part in self.on_disk():
             head = self._checked(part)[0]
             gone = [name for name in head["written"] if not exists(self.folder / name)]
             if head["changed"]:
@@ -261,27 +266,52 @@ class Recorded:
         return Known(frozenset(done), tuple(again))
 
     def missing(self) -> int:
-        """Return how many parts are to be computed; all of them where another manifest goes on."""
-        path = self.folder / RECORD
-        same = exists(path) and self._read().get("digest") == self.manifest.digest
-        return self.manifest.parts - (len(self.known().done) if same else 0)
+        """Return how many parts are to be computed; all of them where another manifest goes on.
 
-    def _on_disk(self) -> list[int]:
+        Raises
+        ------
+        InputError
+            As :meth:`alone`, and for other files that stand there.
+        """
+        self._refuse_links()
+        if not exists(self.folder / PARTS):
+            self._recorded()
+            return self.manifest.parts
+        with self._locked():
+            known = self._recorded()
+            same = known is not None and known.get("digest") == self.manifest.digest
+            return self.manifest.parts - (len(self.known().done) if same else 0)
+
+    def on_disk(self) -> list[int]:
         """Return which parts have a file, in their order."""
         names = {path.name for path in (self.folder / PARTS).glob("*/*.jsonl")}
         return [part for part in range(self.manifest.parts) if self.file(part).name in names]
 
     def write(self, part: int, text: str) -> None:
-        """Write a part that is done, as a whole or not at all; `text` as of :func:`truearm.fleets.rows.part_text`."""
-        first, _, rest = text.partition("\n")
+        """Write a part that is done, as a whole or not at all.
+
+        Parameters
+        ----------
+        text
+            As of :func:`truearm.fleets.rows.part_text`.
+
+        Raises
+        ------
+        ValueError
+            If it is not what belongs to the robots of this part: then nothing is written.
+        """
+        first, _, rest = text.encode().partition(b"\n")
+        said = said_of(first)
+        self._refuse_foreign(part, said)
+        self._made(part, said, rest)
         head = {
             "truearm": _PART_SCHEMA,
             "key": self._key(part),
             "part": part + 1,
             "robots": len(self.manifest.numbers(part)),
-            **json.loads(first),
+            **said,
         }
-        whole = f"{json.dumps(head)}\n{rest}"
+        whole = f"{json.dumps(head)}\n{rest.decode()}"
         write_text(self.file(part), f"{whole}{json.dumps({'sha256': _hash_of(whole.encode())})}\n")
 
     def rows(self) -> Iterator[Row]:
@@ -292,20 +322,36 @@ class Recorded:
         InputError
             Naming the part that somebody has changed.
         """
-        for part in self._on_disk():
+        for part in self.on_disk():
             yield from self._rows(part)
 
     def _rows(self, part: int) -> list[Row]:
         head, lines = self._checked(part)
         try:
-            shared = {kind: tuple(column) for kind, column in head["shared"].items()}
-            rows = [Row.read(row, shared) for row in from_json(b"[" + lines.rstrip(b"\n").replace(b"\n", b",") + b"]")]
-            names = [row.name for row in rows]
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            return self._made(part, head, lines)
+        except (ValueError, TypeError, RecursionError) as error:
             raise self._not_ours(part) from error
-        if names != self.manifest.names(part):
-            raise self._not_ours(part)
+
+    def _made(self, part: int, head: Mapping[str, Any], lines: bytes) -> list[Row]:
+        """Return the robots of a part, or raise ValueError if they are not those that the manifest has there."""
+        shared = {kind: tuple(column) for kind, column in head["shared"].items()}
+        rows = [Row.read(row, shared) for row in rows_of(lines)]
+        if [(row.name, row.of, row.date) for row in rows] != self.manifest.said(part):
+            raise ValueError("these are other robots")
         return rows
+
+    def _refuse_foreign(self, part: int, head: Mapping[str, Any]) -> None:
+        """Raise ValueError where the first line names other robots, or files that are none of theirs."""
+        names = self.manifest.names(part)
+        if not {*head["changed"]} <= {*names}:
+            raise ValueError("these are other robots")
+        if self.manifest.experiment is not None and (head["written"] or head["changed"]):
+            raise ValueError("of simulated robots nothing is written")
+        ours = {f"{ROBOTS}/{name}" for name in names}
+        for name in head["written"]:
+            folder, _, file = name.rpartition("/")
+            if folder not in ours or file in ("", ".", "..") or not file.isprintable():
+                raise ValueError("files of others")
 
     def _checked(self, part: int) -> tuple[dict[str, Any], bytes]:
         """Return the first line of a part and the lines of its robots, or refuse what is not as it was written."""
@@ -314,9 +360,12 @@ class Recorded:
         head = self._head(content, part)
         try:
             told = from_json(last)["sha256"]
+            self._refuse_foreign(part, head)
         except (ValueError, KeyError, TypeError) as error:
             raise self._not_ours(part) from error
         if told != _hash_of(whole + b"\n") or head["key"] != self._key(part):
+            raise self._not_ours(part)
+        if (head["part"], head["robots"]) != (part + 1, len(self.manifest.numbers(part))):
             raise self._not_ours(part)
         return head, (whole + b"\n").partition(b"\n")[2]
 
@@ -325,13 +374,9 @@ class Recorded:
 
     def _head(self, content: bytes, part: int) -> dict[str, Any]:
         try:
-            head = from_json(content.partition(b"\n")[0])
-            ours = head["truearm"] == _PART_SCHEMA and {"key", "shared", "written", "changed"} <= {*head}
-        except (ValueError, KeyError, TypeError) as error:
+            return head_of(content.partition(b"\n")[0])
+        except (ValueError, RecursionError) as error:
             raise self._not_ours(part) from error
-        if not ours:
-            raise self._not_ours(part)
-        return dict(head)
 
     def _key(self, part: int) -> str:
         """Return the hash of what is asked of a part."""

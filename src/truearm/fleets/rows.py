@@ -153,12 +153,17 @@ class FoundParameters(Mapping[str, FoundParameter]):
         Raises
         ------
         ValueError
-            If columns are not equally long.
+            If columns are missing or not equally long, or a name is there twice.
         """
+        if not content:  # of a robot that could not be calibrated
+            return cls()
         columns = {kind: tuple(column) for kind, column in {**shared, **content}.items()}
         if len({*map(len, columns.values())}) > 1:
             raise ValueError("columns of different lengths")
-        return cls(**columns)
+        made = cls(**columns)
+        if not len(made.name) == len({*made.name}) == len(made.unit) == len(made.prior) == len(made.value):
+            raise ValueError("columns are missing, or names are there twice")
+        return made
 
 
 @dataclass(frozen=True)

@@ -91,6 +91,24 @@ def parts_of(data: Dataset, labels: Sequence[str]) -> NDArray[np.intp]:
     return np.asarray(np.searchsorted(np.sort(np.unique(starts)), data.number, side="right"), dtype=np.intp)
 
 
+def checked_parts(data: Dataset, training: IntArray, labels: Sequence[str]) -> NDArray[np.intp]:
+    """Return the parts as :func:`parts_of`, and refuse one with fewer than five training configurations."""
+    part = parts_of(data, labels)
+    seen = np.unique(data.configuration[data.has_position])
+    for number in range(int(part.max()) + 1):
+        mine = np.intersect1d(training[part[training] == number], seen)
+        if len(mine) < _LEAST_CONFIGURATIONS:
+            raise InputError(
+                "a part between two changes of the base has too few training configurations",
+                parameter="base_changes",
+                where=data.source,
+                came=f"{counted(len(mine), 'configuration')} in part {number + 1}",
+                allowed=f"{_LEAST_CONFIGURATIONS} or more",
+                cure="Raise `train`, measure more, or leave the part out.",
+            )
+    return part
+
+
 def with_one_base(
     robot: Robot,
     data: Dataset,
@@ -120,19 +138,7 @@ def with_one_base(
     InputError
         As :func:`parts_of`, and for a part with fewer than five training configurations.
     """
-    part = parts_of(data, labels)
-    seen = np.unique(data.configuration[data.has_position])
-    for number in range(int(part.max()) + 1):
-        mine = np.intersect1d(training[part[training] == number], seen)
-        if len(mine) < _LEAST_CONFIGURATIONS:
-            raise InputError(
-                "a part between two changes of the base has too few training configurations",
-                parameter="base_changes",
-                where=data.source,
-                came=f"{counted(len(mine), 'configuration')} in part {number + 1}",
-                allowed=f"{_LEAST_CONFIGURATIONS} or more",
-                cure="Raise `train`, measure more, or leave the part out.",
-            )
+    part = checked_parts(data, training, labels)
     moved, tools = data, Held(targets=held.targets)
     bases = [
         initial_frames(robot, data.of_configurations(training[part[training] == number]), tools).base

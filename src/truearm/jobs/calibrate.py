@@ -12,7 +12,7 @@ import numpy as np
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
-from truearm.identification.base_changes import with_one_base
+from truearm.identification.base_changes import checked_parts, with_one_base
 from truearm.identification.choosing.balancer_loads import refuse_balancers_that_are_not_there, without_unseen_balancers
 from truearm.identification.choosing.candidates import compared_with
 from truearm.identification.choosing.choice import AUTO
@@ -274,6 +274,8 @@ def calibrate(
                 "there is no position reading", parameter="data", where=readings.source, cure="Fill in x, y and z."
             )
         check_split(readings.of_configurations(training), readings.of_configurations(held_out))
+        if base_changes:
+            checked_parts(readings, training, base_changes)
 
         progress(ACCEPTED)
         steady = without_table_motion(readings)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 
-from truearm.errors import InputError, refusals_of
+from truearm.errors import InputError, Words, kind_of, refusals_of
 from truearm.executing.parts import done_parts
 from truearm.executing.workers import Given, ThisProcess, Workers, processes, with_workers
 from truearm.files import noted_reads, path_argument
@@ -26,7 +26,7 @@ from truearm.jobs.arguments import (
     progress_argument,
     python_call,
 )
-from truearm.jobs.fleet_parts import Task, finished
+from truearm.jobs.fleet_parts import Finished, Task, finished
 from truearm.results.fleet import FLEET_FILES, Fleet, Run
 from truearm.shown import counted
 from truearm.version import __version__
@@ -71,7 +71,9 @@ def fleet(
     Raises
     ------
     InputError
-        If the manifest, a file that it names, the folder or the scheduler cannot be used.
+        If the manifest, a file that it names, the folder, the executor or the scheduler cannot be used.
+    KeyboardInterrupt
+        Where somebody stops it, with how many parts are on disk.
     """
     progress_argument(progress)
     path = path_argument(manifest, "manifest")
@@ -91,7 +93,6 @@ def fleet(
     with refusals_of("manifest"):
         make = _tasks(asked, folder.absolute())
     recorded = Recorded(folder, asked)
-    recorded.check()
     missing = recorded.missing()
     if asked.experiment is None and missing:
         from truearm.jobs.fleet_checks import check_folders, check_options  # with all that a calibration needs
@@ -101,13 +102,16 @@ def fleet(
         with refusals_of("manifest"):
             check_options(asked)
     chosen = _workers(count, address, insecure, executor, missing) if missing else ThisProcess()
-    with with_workers(chosen):
-        recorded.begin()
-        with recorded.alone() as known:
+    try:
+        with with_workers(chosen), recorded.alone() as known:
             run = _computed(recorded, known, make, chosen, progress)
             progress("reading the parts")
             found = Fleet(recorded, run, call)
             found.write()
+    except KeyboardInterrupt as stop:
+        done = len(recorded.on_disk())
+        words = f"{done} of {counted(asked.parts, 'part')} {'are' if asked.parts > 1 else 'is'} on disk"
+        raise KeyboardInterrupt(f"Stopped: {words}; run it again to go on.") from stop
     return found
 
 
@@ -130,7 +134,7 @@ def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
         robots = asked.robots
         return lambda part: Task(part, __version__, robots=tuple(robots[n] for n in asked.numbers(part)), folder=folder)
     with noted_reads() as noted:
-        made = pickle.dumps(experiment(asked.experiment))
+        made = pickle.dumps(experiment(asked.experiment, f"{asked.file}, experiment"))
     for name, known in asked.hashes.items():
         if {*noted.get((asked.file.parent / name).absolute(), ())} - {known}:
             raise InputError("this file changed while it was read", where=name, cure="Run this again.")
@@ -157,13 +161,34 @@ def _computed(
     progress(f"part {done} of {asked.parts}")
     for one in done_parts(finished, tasks, workers, tell):
         done += 1
-        if one.result is None:
+        if one.lost:
             lost.append(one.part.part)
             continue
-        recorded.write(one.part.part, one.result.text)
-        failed += one.result.failed
+        failed += _written(recorded, one.part.part, one.result, workers)
         left = (time.perf_counter() - began) / (done - before) * (asked.parts - done)
         words = f", {counted(failed, 'robot')} failed" if failed else ""
         progress(f"part {done} of {asked.parts}{words}, about {left:.0f} s left")
     names = [name for part in sorted(lost) for name in asked.names(part)]
     return Run(asked.parts, before, tuple(told), tuple(names))
+
+
+def _written(recorded: Recorded, part: int, result: object, workers: Workers) -> int:
+    """Write what came back of a part, and return how many of its robots failed; what belongs to no part is refused."""
+    try:
+        if not (isinstance(result, Finished) and isinstance(result.text, str) and type(result.failed) is int):
+            raise TypeError(f"an object of type {kind_of(result)} came back")
+        recorded.write(part, result.text)
+    except InputError:
+        raise
+    except (TypeError, ValueError) as error:
+        if not isinstance(workers, Given):
+            raise
+        raise InputError(
+            "the executor has returned something else than what was found of the robots that it was given",
+            parameter="executor",
+            where=f"part {part + 1}",
+            came=Words(str(error) if isinstance(error, TypeError) else "a result of another part, or a changed one"),
+            cure="Give one whose futures hold what the function returned. Run this again with it: what is on disk is "
+            "not computed twice.",
+        ) from error
+    return result.failed

@@ -10,10 +10,13 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from pydantic import ValidationError
+from pydantic_core import to_json
 
 from truearm.errors import InputError
 from truearm.files import noted_reads, read_bytes
 from truearm.fleets.entries import RobotEntry
+from truearm.fleets.part_schema import rows_of
 from truearm.fleets.recorded import ROBOTS
 from truearm.fleets.rows import Accuracy, FoundParameter, FoundParameters, Row
 from truearm.jobs.calibrate import calibrate
@@ -64,24 +67,28 @@ def calibrated_robot(entry: RobotEntry, folder: Path | None = None) -> Done:
     began = time.perf_counter()
     said = {"date": entry.date, "serial": entry.of}
     notes = {name: text for name, text in said.items() if text is not None}
-    message, changed = None, None
+    message, changed, found = None, None, None
     with noted_reads() as noted:
         try:
             made = calibrate(entry.robot, entry.data, notes=notes or None, **entry.options)
+            found = _row(entry, made, began)
+            rows_of(to_json(found.content()))
         except InputError as error:
             message = str(error)
+        except ValidationError:
+            message = "the calibration found figures that no part holds, as those that are not finite"
         except (ArithmeticError, ValueError, LookupError) as error:  # LinAlgError is a ValueError
             message = f"the calibration failed ({type(error).__name__}: {error})"
     changed = _changed(entry, noted)
     if changed is not None:
         message = f"{changed.name} changed while the fleet ran; start it again"
-    if message is not None:
-        row = Row(entry.name, "failed", message, entry.of, entry.date, seconds=time.perf_counter() - began)
+    if message is not None or found is None:
+        row = Row(entry.name, "failed", message or "", entry.of, entry.date, seconds=time.perf_counter() - began)
         return Done(row, changed=changed is not None)
     written = []
     if folder is not None:  # a folder that cannot be written to is no fault of the robot
         written = [path.relative_to(folder).as_posix() for path in made.save(folder / ROBOTS / entry.name)]
-    return Done(_row(entry, made, began), tuple(written))
+    return Done(found, tuple(written))
 
 
 def _changed(entry: RobotEntry, noted: Mapping[Path, Sequence[str]]) -> Path | None:

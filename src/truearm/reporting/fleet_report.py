@@ -15,7 +15,7 @@ from truearm.reporting.fleet_figures import figures_text, fleet_figures
 from truearm.reporting.numbers import significant
 from truearm.reporting.page import page
 from truearm.results.fleet import PRIORS_FILE, Fleet
-from truearm.results.fleet_words import difference_words, reason_words, together_words
+from truearm.results.fleet_words import difference_words, outcome_words, reason_words, together_words
 from truearm.units import SHOWN_AS
 
 #: Rows of tables of robots: who wants more reads robots.csv and fleet.json.
@@ -53,6 +53,8 @@ def fleet_html(found: Fleet) -> str:
         simulated=simulated,
         said=said,
         lead=_lead(said),
+        outcome=outcome_words(said),
+        draw=found.draw,
         columns=[(_COLUMNS[name], len(errors.mean)) for name, errors in said.errors.items()],
         shares=_shares(said),
         looks=[
@@ -80,7 +82,7 @@ def fleet_html(found: Fleet) -> str:
     )
 
 
-def _lead(said: Analysis) -> dict[str, str] | None:
+def _lead(said: Analysis) -> dict[str, str | int] | None:
     """Return the figure that people look for: the error of the middle of the series, before and after."""
     after = said.errors.get("held_out")
     if after is None:
@@ -90,6 +92,7 @@ def _lead(said: Analysis) -> dict[str, str] | None:
     return {
         "was": "" if before is None or before.of_means[0].value is None else _mm(before.of_means[0].value),
         "is": _mm(middle.value if middle.value is not None else float(after.mean.mean())),
+        "count": len(after.mean),
         "worst": _mm(float(after.mean.max())),
     }
 

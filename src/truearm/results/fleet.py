@@ -20,7 +20,7 @@ from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary
+from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary, outcome_words
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted, listed
 from truearm.writing import output_folder, write_files
@@ -104,7 +104,7 @@ class Fleet(Record):
                     "data or options, and run this again.",
                 )
             )
-        if len(failed) + len(self.analysis.left_out) == self.analysis.measurements:
+        if self.analysis.usable == 0:
             found.append(
                 Notice(
                     "no-result",
@@ -191,14 +191,33 @@ class Fleet(Record):
     def lines(self) -> list[str]:
         """Return what the command prints."""
         found, run = self.analysis, self.run
-        text = [f"{self._robots()}, {found.measurements - len(found.failed)} calibrated, {len(found.failed)} failed."]
+        text = [f"{self._robots()}{self._outcome()}."]
         if run.before:
             text.append(f"{counted(run.before, 'part')} of {run.parts} on disk already.")
         text += [f"{words[0].upper()}{words[1:]}." for words in run.told]
-        text += analysis_lines(found)
+        text += analysis_lines(found, None if self.draw is None else f"{self.draw}.")
         if self.proposed is not None:
             text.append(f"Priors proposed: {counted(len(self.proposed[1]), 'parameter')} in {PRIORS_FILE}.")
         return text + notice_lines(self.warnings)
+
+    def _outcome(self) -> str:
+        """Return how many have a result, and of how many of these it should not be used."""
+        found = self.analysis
+        if not found.left_out:
+            return f", {found.usable} calibrated, {len(found.failed)} failed"
+        return f": {outcome_words(found)}"
+
+    @property
+    def draw(self) -> str | None:
+        """What the intervals of a simulated series hold for; None of robots that were measured."""
+        asked = self.recorded.manifest.experiment
+        if asked is None:
+            return None
+        drawn = "configurations" if isinstance(asked.configurations, int) else "configurations that judge"
+        return (
+            f"Figures and intervals hold for the {drawn} drawn with the seed {asked.seed}; another draw can change "
+            "them by more than the intervals say: run other seeds"
+        )
 
     def _robots(self) -> str:
         count, machines = self.recorded.manifest.count, self.analysis.machines

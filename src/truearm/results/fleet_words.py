@@ -74,7 +74,8 @@ def accuracy_lines(found: Analysis) -> list[str]:
         count = len(errors.mean)
         told = [quantile_words(one, count) for one in errors.of_means if one.value is not None]
         worst = f"the worst {errors.mean.max() * 1e3:.3f} mm"
-        text.append(f"{ERRORS_OF[name]}, mean error: {', '.join([*told, worst])}.")
+        of = "" if count == found.machines else f" of {counted(count, 'robot')}"
+        text.append(f"{ERRORS_OF[name]}, mean error{of}: {', '.join([*told, worst])}.")
     if found.left_out:
         out = f"{counted(len(found.left_out), 'robot')} ({listed(found.left_out)})"
         text.append(f"Left out of all figures, because their results end with an error: {out}.")
@@ -201,10 +202,18 @@ def look_lines(looks: Sequence[Look]) -> list[str]:
     return [*text, f"  and {len(looks) - _TOLD} more"] if len(looks) > _TOLD else text
 
 
-def analysis_lines(found: Analysis) -> list[str]:
-    """Return all that a fleet says, line by line."""
+def outcome_words(found: Analysis) -> str:
+    """Return of how many the result can be used, of how many not, and how many have none."""
+    wrong = len(found.left_out)
+    return f"{found.usable} usable, {wrong} whose result ends with an error, {len(found.failed)} not calibrated"
+
+
+def analysis_lines(found: Analysis, draw: str | None = None) -> list[str]:
+    """Return all that a fleet says, line by line; `draw` is what its figures hold for."""
     several = len(found.kinds) > 1
     text = accuracy_lines(found)
+    if draw is not None and found.errors:
+        text.append(draw)
     for kind in found.kinds:
         text += parameter_lines(kind, several=several)
     return text + drift_lines(found) + look_lines(found.looks)

@@ -87,6 +87,11 @@ class Analysis:
     looks: tuple[Look, ...]
 
     @property
+    def usable(self) -> int:
+        """How many measurements have a result that ends without an error."""
+        return self.measurements - len(self.failed) - len(self.left_out)
+
+    @property
     def failing(self) -> tuple[float, float]:
         """The share of a series that cannot be calibrated so, as an interval of 95 %."""
         return share_interval(len(self.failed), self.measurements)

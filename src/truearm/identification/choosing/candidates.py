@@ -104,20 +104,15 @@ class CurveColumns:
     def scaled(self, without: int | None = None) -> Array | None:
         """Return the columns per prior, ``(rows, k)``; None where the data show no curve, or not how large it is.
 
-        The priors are the likeliest ones. From all rows they are those of bands: so few numbers say little of the
-        readings that they were found from, and those of single lines would be praised for what they took from the folds
-        that are held out. Without a fold, which then has no say in them, they are those of single lines, as in a fit.
+        The priors are the likeliest ones, band by band: so few numbers say little of the readings that they were found
+        from. Those of single lines would be praised for what they took from the folds that are held out.
 
         Parameters
         ----------
         without
             A fold that has no say in the priors.
         """
-        if without is not None:
-            alone = self._found(without)
-            used = alone > 0.0
-            return np.asarray(self.columns[:, used] * np.sqrt(alone[used])) if used.any() else None
-        found = self._variance
+        found = self._variance if without is None else self._found(without)
         bands = np.stack([self.joint, np.searchsorted(BANDS, self.period, side="right")])
         of = np.unique(bands, axis=1, return_inverse=True)[1].reshape(-1)
         variance = (np.bincount(of, found) / np.bincount(of))[of]

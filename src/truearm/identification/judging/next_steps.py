@@ -275,9 +275,9 @@ def _more(judged: Judged, known: float) -> list[NextStep]:
     n = judged.training.configurations
     if narrow and has_curves(judged.left.fit) and joints_that_moved_little(judged.left.fit, judged.training):
         fit = replace(judged.left.fit, joint_error=judged.expected.joint_error)
-        gain = judged.expected.overall.mean - expected_where_measured(fit, judged.training)
+        over = judged.expected.overall.mean - expected_where_measured(fit, judged.training)
         where = _where(judged, "know the whole workspace as well as where was measured")
-        return [NextStep("measure-more", f"{where} The gain is over the workspace.", max(gain, 0.0))]
+        return [NextStep("measure-more", f"{where} The gain is over the workspace.", max(over, 0.0))]
     gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else _LENGTH * (before - after)
     held_out = judged.left.problem.data.configurations - n
     train = " Or train on more of them: `train`." if held_out >= n else ""

@@ -55,7 +55,7 @@ _HIDING: Final = 0.7
 #: Steps to a model that has what the present one lacks, and how many times as much as by other steps must be gained by
 #: them for the others to come after.
 _ANOTHER_MODEL: Final = frozenset({"other-model", "give-loads", "give-payload"})
-_FAR_MORE: Final = 3.0
+_FAR_MORE: Final = 2.0
 #: Joints named one by one.
 _NAMED: Final = 3
 #: Errors that steps of their own are about.

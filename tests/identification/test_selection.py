@@ -31,7 +31,7 @@ from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.simulation.twin_joint import PERFECT, JointTruth
 
 #: The module, whose name the job of the same name hides.
 calibrating = import_module("truearm.jobs.calibrate")

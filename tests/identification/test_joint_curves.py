@@ -15,6 +15,7 @@ from truearm.errors import InputError
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.curve_range import check_curves
 from truearm.identification.judging.expected_error import expected_error
+from truearm.identification.judging.narrow_data import check_narrow_data
 from truearm.identification.solving.curve_stiffness import curve_variances, moments_without
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import named_model
@@ -231,14 +232,24 @@ def test_the_expected_error_holds_where_a_joint_was_measured_through_a_sixth_of_
     twin = truth_twin(robot, "gear-errors", np.random.default_rng(1001))
     joints = rng.uniform(-math.pi, math.pi, (150, 6))
     joints[:, 1] /= 6.0
-    fit = identify(robot, measure(twin, joints, 3e-5, rng), CURVED)
-    stated = expected_error(fit).overall
+    data = measure(twin, joints, 3e-5, rng)
+    fit = identify(robot, data, CURVED)
+    whole = expected_error(fit)
+    stated = whole.overall
     true = mean_error(fit.robot, measure(twin, rng.uniform(-math.pi, math.pi, (300, 6)), 2e-9, rng))
     assert stated.interval_90[0] < true < stated.interval_90[1]  # it was said to be at most a third of the truth
     assert stated.interval_90[1] < 4.0 * true
     zero = [name for name in fit.unfitted if name.endswith("_2")]
     assert zero
     assert all(fit.robot.values[name] == 0.0 for name in zero)
+    # The held-out error, which is hardly more than noise, does not show that the workspace is known much worse.
+    errors = errors_of(fit.robot, measure(twin, joints, 3e-5, rng))
+    (notice,) = check_narrow_data(fit, whole, data, errors, held_out=True)
+    assert (notice.code, notice.level) == ("narrow-data", "warning")
+    assert "shoulder (measured" in notice.message
+    assert "without the noise of a reading" in notice.message
+    noisy = replace(whole, overall=replace(stated, mean=0.9 * errors.position.mean))  # type: ignore[union-attr]
+    assert check_narrow_data(fit, noisy, data, errors, held_out=True) == []
 
 
 def test_the_same_data_are_not_counted_twice(fitted: tuple[Twin, Dataset, Fit]) -> None:

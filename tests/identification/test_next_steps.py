@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
+from truearm.identification.judging.curve_range import about_curves
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
-from truearm.identification.judging.next_steps import _end, steps_after_check
+from truearm.identification.judging.next_steps import _after, _end, steps_after_check
 from truearm.identification.judging.off_configurations import off_configurations
 from truearm.identification.judging.unmodelled import explanation
 from truearm.identification.solving.bounds import Bounds
@@ -290,3 +291,41 @@ def test_a_choice_that_tried_everything_does_not_say_that_nobody_can_tell() -> N
     assert "too few readings to tell" in few
     tried = replace(fit, model=replace(fit.model, name="auto", tried=("backlash",)))
     assert "cross-validation found no other joint effect" in _end(LeftOver.of(tried, data)).message
+
+
+@pytest.mark.parametrize(("model", "effects"), [("geometric", ()), ("geometric", ("joint-curve",)), ("auto", ())])
+def test_few_configurations_cannot_tell_errors_of_gears(model: str, effects: tuple[str, ...]) -> None:
+    data = simulate("irb120", truth="gear-errors", poses=25, noise=3e-5, seed=1).data
+    (step,) = calibrate("irb120", data, model=model, effects=list(effects)).next
+    assert step.code == "unexplained"
+    assert "no effect known here explains" not in step.message
+    assert "cannot be told from 18 training configurations: measure about 200" in step.message
+
+
+def test_what_is_not_known_of_curves_is_said() -> None:
+    data = elastic(poses=20)
+    fit = identify(load_robot("irb120").with_payload(LOAD), data, named_model("elastic"))
+    tried = replace(fit, model=replace(fit.model, tried=("joint-curve",)))
+    curved = replace(fit, model=replace(fit.model, effects=("joint-curve",)))
+    assert about_curves(fit, 20).startswith("Errors that follow a joint's angle")
+    assert about_curves(tried, 20).startswith("Cross-validation left `joint-curve` out, but errors")
+    assert "were not looked for" in about_curves(fit, 300)
+    assert "tried `joint-curve` and left it out" in about_curves(tried, 300)
+    assert about_curves(curved, 300) == ""
+
+
+def test_more_configurations_come_after_a_model_that_gains_far_more() -> None:
+    model, more = NextStep("other-model", "Add it.", 6e-4), NextStep("measure-more", "Measure more.", 6e-5)
+    (step,) = _after([model], [more])
+    assert (step.code, step.message, step.gain) == ("measure-more", "After that: measure more.", None)
+    assert _after([replace(model, gain=1e-4)], [more]) == [more]
+    assert _after([], [more]) == [more]
+
+
+def test_curves_that_leave_few_equations_are_no_lack_of_readings(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = elastic(poses=14)
+    fit = identify(load_robot("irb120").with_payload(LOAD), data, named_model("elastic"))
+    monkeypatch.setattr("truearm.identification.judging.next_steps.has_curves", lambda _: True)
+    said = _end(LeftOver.of(fit, data)).message
+    assert "The curves leave too few equations" in said
+    assert "too few readings" not in said

@@ -31,7 +31,7 @@ from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.simulation.twin_joint import PERFECT, JointTruth
 
 #: The module, whose name the job of the same name hides.
 calibrating = import_module("truearm.jobs.calibrate")
@@ -455,3 +455,20 @@ def test_curves_that_no_joint_gets_are_no_part_of_the_model() -> None:
     assert "curve" not in choice.model.summary
     assert reason(choice, "joint-curve") == "the fit to all training readings gave no joint a curve"
     assert "joint-curve" in fit.model.tried
+
+
+def test_curves_of_few_configurations_are_borne_out_by_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    gears = {1: ((1, 6e-4, 0.3), (13, 4e-4, 1.0)), 2: ((2, 4e-4, 2.0), (20, 4e-4, -1.0))}
+    plain = twin_of()
+    twin = replace(plain, joints={n: replace(plain.joints.get(n, PERFECT), gear=gear) for n, gear in gears.items()})
+    data = seen(twin, 60, 8)
+    monkeypatch.setattr(  # as where the weights of the fit without curves hide most of what they gain
+        "truearm.identification.choosing.selection._Choice._errors_of_curves",
+        lambda self, search, chosen: 0.999 * search.errors(search.best({*self.reasons, "joint-curve"})),
+    )
+    chosen = select(arm(), data, candidates=("joint-curve",))
+    assert "joint-curve" in chosen.model.effects
+    last, fitted = chosen.confirmations[-2:]
+    assert not last.gain.clear(3.0)
+    assert fitted.gain.clear(3.0)
+    assert fitted.error < 0.7 * fitted.smaller_error

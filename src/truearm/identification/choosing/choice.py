@@ -11,6 +11,8 @@ from truearm.identification.choosing.search import Gain
 from truearm.identification.judging.transmission import PeriodicError
 from truearm.identification.solving.models import Model, named_model
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.effects.fourier import Fourier
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.robot import Robot
 
 AUTO: Final = "auto"
@@ -118,7 +120,7 @@ class Selection:
 
     def without_curves(self) -> Selection:
         """Return the choice without joint curves, because a fit to all readings gave no joint one."""
-        curve, fourier = "joint-curve", "fourier"
+        curve, fourier = JointCurve.name, Fourier.name
         model = model_with([name for name in self.model.effects if name != curve], (*self.model.tried, curve))
         reasons = {
             curve: "the fit to all training readings gave no joint a curve",

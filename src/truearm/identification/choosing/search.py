@@ -15,10 +15,12 @@ from truearm.identification.choosing.candidates import Ground
 from truearm.identification.choosing.folds import Folds
 from truearm.identification.choosing.linear_cross_validation import Extensions, LinearFit
 from truearm.modeling.chain import Array
+from truearm.modeling.effects import EFFECTS
+from truearm.modeling.effects.joint_curve import JointCurve
 
-CURVE: Final = "joint-curve"
+CURVE: Final = JointCurve.name
 #: Effects that say how something differs from its base, which a model without the base would have them stand in for.
-BASES: Final = {"hardening": "compliance", "bearing-compliance": "compliance"}
+BASES: Final = {effect.name: effect.part_of for effect in EFFECTS if effect.part_of}
 #: So many choices are all looked at; of more, one effect after the other is added, or two.
 _ALL: Final = 1024
 #: Standard errors, and share of the held-out error, that curves have to gain: hundreds of coefficients are looked at no

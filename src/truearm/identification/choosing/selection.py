@@ -61,6 +61,8 @@ _SURE: Final = 2.0
 #: Choices that are fitted in the folds at most, where they are drawn once, and draws that fits are made in.
 _MOST_REFITS: Final = 3
 _DRAWS_OF_REFITS: Final = 2
+#: Training configurations up to which curves that the linear problem does not bear out are fitted in the folds.
+_CURVES_REFITTED: Final = 200
 _NOT_BORNE_OUT: Final = "what it gains is not borne out by fits in the folds"
 
 
@@ -246,6 +248,10 @@ class _Choice:
             found.append(_confirmation(chosen, plain, errors, before, self.folds))
             if found[-1].gain.clear(CLEAR):
                 return chosen, found
+            if found[-1].gain.mean > 0.0 and self.data.configurations <= _CURVES_REFITTED:
+                found += self._curves_refitted(search, chosen, plain)
+                if found[-1].gain.clear(CLEAR):
+                    return chosen, found
             self.reasons[CURVE] = _NOT_BORNE_OUT
             chosen = plain
         refits = self._refits(search, chosen)
@@ -262,6 +268,19 @@ class _Choice:
                 self.reasons[name] = reason
             chosen = smaller
         return start, found
+
+    def _curves_refitted(self, search: Choices, chosen: frozenset[str], plain: frozenset[str]) -> list[Confirmation]:
+        """Return how fits with curves in the folds compare with those without; nothing where a fold has too few.
+
+        The linear problem keeps the weights of the fit without curves, which takes what curves explain for errors of
+        every arrival: of few configurations it then gives curves too little.
+        """
+        self.progress("choosing a model: fits with curves in the folds")
+        refits = self._refits(search, chosen)
+        errors, before = refits.errors(tuple(chosen)), refits.errors(tuple(plain))
+        if errors is None or before is None:
+            return []
+        return [_confirmation(chosen, plain, errors, before, self.folds)]
 
     def _refuted(
         self, refits: Refits, chosen: frozenset[str], others: Sequence[frozenset[str]], found: list[Confirmation]

@@ -12,11 +12,52 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.effects.fourier import Fourier
 from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.notices import Notice
+from truearm.shown import counted
 
 #: A joint that turned through less [rad] can hardly tell a curve from geometry.
 _LITTLE: Final = math.radians(30.0)
 #: What is not measured of a turn, from which it is said that the curve is not known there [rad].
 _GAP: Final = math.radians(20.0)
+#: Training configurations from which on errors that follow the joints' angles are told from others.
+ENOUGH: Final = 200
+
+
+def has_curves(fit: Fit) -> bool:
+    """Return whether a fit found a curve of any joint."""
+    return any(parameter.group == JointCurve.name for parameter in fit.free.parameters)
+
+
+def about_curves(fit: Fit, configurations: int) -> str:
+    """Say what is not known of joint curves, where a fit has none; empty where they are known to be none.
+
+    Parameters
+    ----------
+    configurations
+        That the fit was made from.
+    """
+    if has_curves(fit) or not JointCurve(fit.robot.layout).parameters:
+        return ""
+    tried = JointCurve.name in fit.model.tried
+    if configurations < ENOUGH:
+        left_out = "cross-validation left `joint-curve` out, but " if tried else ""
+        words = (
+            f"{left_out}errors that follow a joint's angle, as those of gears and encoders do, cannot be told from "
+            f"{counted(configurations, 'training configuration')}: measure about {ENOUGH}, and compare with "
+            f"`effects={JointCurve.name}`"
+        )
+    elif tried:
+        words = (
+            f"cross-validation tried `{JointCurve.name}` and left it out, because it gained no more than chance may or "
+            f"was not borne out; to see what it does all the same, compare with `effects={JointCurve.name}`"
+        )
+    elif JointCurve.name in fit.model.effects:
+        return ""
+    else:
+        words = (
+            f"errors that follow a joint's angle in more than two periods a turn were not looked for: compare with "
+            f"`effects={JointCurve.name}`"
+        )
+    return words[0].upper() + words[1:] + "."
 
 
 def check_curves(fit: Fit, training: Dataset) -> list[Notice]:

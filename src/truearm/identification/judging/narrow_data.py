@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.identification.judging.curve_range import has_curves
 from truearm.identification.judging.expected_error import (
     ExpectedError,
     PositionErrors,
@@ -106,10 +107,10 @@ def check_narrow_data(
     mean = expected.overall.mean
     if (judged.position is None or fit.gauge_freedoms) and mean > _NEGLIGIBLE:
         # Such readings see positions badly wherever the arm is, and a length is one coordinate of three.
-        known = max(known if judged.position else _OF_ONE * known, _expected_where_measured(fit, measured))
-    if mean <= max(_WARNING * known, _NEGLIGIBLE) or high <= _ERROR * known:
-        return []
+        known = max(known if judged.position else _OF_ONE * known, expected_where_measured(fit, measured))
     few = joints_that_moved_little(fit, measured)
+    if mean <= max(_WARNING * known, _NEGLIGIBLE) or high <= _ERROR * known:
+        return _beyond_curves(fit, expected, measured, known, few)
     if fit.gauge_freedoms and not few:
         return []
     part = "held-out" if held_out else "training"
@@ -125,7 +126,38 @@ def check_narrow_data(
     return [Notice("narrow-data", words, "error" if mean > _ERROR * known else "warning")]
 
 
-def _expected_where_measured(fit: Fit, measured: Dataset) -> float:
+def _beyond_curves(fit: Fit, expected: ExpectedError, measured: Dataset, known: float, few: list[str]) -> list[Notice]:
+    """Say if curves of joints make the robot good where it was measured alone.
+
+    With curves hardly more than the noise of the readings is left there, which hides how much better the robot is there
+    than elsewhere: the errors to expect are compared, both without noise.
+
+    Parameters
+    ----------
+    known
+        Error of the readings that judge the fit [m].
+    few
+        Joints that moved little, in words.
+    """
+    mean, (low, high) = expected.overall.mean, expected.overall.interval_90
+    if not has_curves(fit) or not few or fit.gauge_freedoms or mean <= max(known, _NEGLIGIBLE):
+        return []
+    there = expected_where_measured(fit, measured)
+    if mean <= _WARNING * there:
+        return []
+    return [
+        Notice(
+            "narrow-data",
+            f"Over the workspace the targets are expected to be off by {_mm(mean)} mm on average (90 %: {_mm(low)} to "
+            f"{_mm(high)}), at configurations like those measured by {_mm(there)} mm, both without the noise of a "
+            "reading: curves of joints are known only where these were measured. Measure configurations in which these "
+            f"joints move further: {'; '.join(few)}.",
+            "warning",
+        )
+    ]
+
+
+def expected_where_measured(fit: Fit, measured: Dataset) -> float:
     """Return the mean error to expect at the configurations of the training part [m]."""
     some = np.linspace(0, measured.configurations - 1, min(measured.configurations, _PLACES)).round().astype(np.intp)
     return float(PositionErrors(fit, _DRAWS).at(measured.joints[some]).mean())

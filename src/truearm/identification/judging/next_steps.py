@@ -9,15 +9,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from truearm.identification.judging.changes import LEAST_ARRIVALS, Change, find_change
+from truearm.identification.judging.curve_range import about_curves, has_curves
 from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.judging.narrow_data import joints_that_moved_little, least_known
+from truearm.identification.judging.narrow_data import (
+    expected_where_measured,
+    joints_that_moved_little,
+    least_known,
+)
 from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
 from truearm.identification.judging.off_configurations import Off, off_configurations
 from truearm.identification.judging.step_words import about_change, measured_again, other_model
@@ -47,6 +52,10 @@ _LENGTH: Final = 2.0 * math.sqrt(2.0 / math.pi)
 _LEAST_SHARE: Final = 0.5
 #: Share that an effect leaves, as a root mean square, from which on it hides no more what else is wrong.
 _HIDING: Final = 0.7
+#: Steps to a model that has what the present one lacks, and how many times as much as by other steps must be gained by
+#: them for the others to come after.
+_ANOTHER_MODEL: Final = frozenset({"other-model", "give-loads", "give-payload"})
+_FAR_MORE: Final = 2.0
 #: Joints named one by one.
 _NAMED: Final = 3
 #: Errors that steps of their own are about.
@@ -132,7 +141,7 @@ def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
         or any(step.code == "measure-again" for step in steps)
     )
     if judged.status is not Status.RANK_LOSS and not spoiled:
-        steps += _more(judged, now)
+        steps += _after(steps, _more(judged, now))
     steps += _cures(judged.notices, steps)
     steps += bound
     if not judged.held_out:
@@ -140,7 +149,7 @@ def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
     if judged.status is Status.RANK_LOSS:
         more = NextStep("measure-more", _where(judged, f"determine {listed(left.fit.unobservable)}"))
         return (more, *most_useful_first(steps))[:MOST]
-    return most_useful_first(steps or [_end(left)])
+    return most_useful_first(steps or [_end(left, judged.training.configurations)])
 
 
 def steps_after_check(
@@ -264,11 +273,30 @@ def _more(judged: Judged, known: float) -> list[NextStep]:
     if not narrow and (before == 0.0 or 1.0 - after / before < _LEAST_GAIN):
         return []
     n = judged.training.configurations
+    if narrow and has_curves(judged.left.fit) and joints_that_moved_little(judged.left.fit, judged.training):
+        fit = replace(judged.left.fit, joint_error=judged.expected.joint_error)
+        over = judged.expected.overall.mean - expected_where_measured(fit, judged.training)
+        where = _where(judged, "know the whole workspace as well as where was measured")
+        return [NextStep("measure-more", f"{where} The gain is over the workspace.", max(over, 0.0))]
     gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else _LENGTH * (before - after)
     held_out = judged.left.problem.data.configurations - n
     train = " Or train on more of them: `train`." if held_out >= n else ""
     where = _where(judged, f"halve what {n} leave uncertain, as {n} more would")
     return [NextStep("measure-more", where + train, gain)]
+
+
+def _after(steps: Sequence[NextStep], more: list[NextStep]) -> list[NextStep]:
+    """Return the step for more configurations as a second one, where another model gains far more.
+
+    What more configurations gain was estimated without what the model lacks, and is not told then.
+    """
+    first = max((step.gain or 0.0 for step in steps if step.code in _ANOTHER_MODEL), default=0.0)
+    return [
+        NextStep(step.code, f"After that: {step.message[0].lower()}{step.message[1:]}")
+        if step.gain is not None and first > _FAR_MORE * step.gain
+        else step
+        for step in more
+    ]
 
 
 def _where(judged: Judged, purpose: str) -> str:
@@ -310,9 +338,24 @@ def _metres(left: LeftOver) -> Array:
     )
 
 
-def _end(left: LeftOver) -> NextStep:
-    """Say that it is done, or that nothing known here explains what is left."""
+def _unexplained(first: str, untold: str, last: str) -> str:
+    """Say that something is left, what of joint curves cannot be told, and what to look at."""
+    again = f"isit a few postures again to see how well the robot repeats, {last}"
+    if untold:
+        return f"{first}, and no other effect known here explains it. {untold} If they are not it, v{again}"
+    return f"{first}, and no effect known here explains it. V{again}"
+
+
+def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
+    """Say that it is done, or that nothing known here explains what is left.
+
+    Parameters
+    ----------
+    configurations
+        That the fit was made from; all of the readings if None.
+    """
     fit = left.fit
+    untold = about_curves(fit, left.problem.data.configurations if configurations is None else configurations)
     metres = _metres(left)
     used = metres > 0.0
     r = left.without_parameters(left.residual)
@@ -321,19 +364,19 @@ def _end(left: LeftOver) -> NextStep:
     noise = float(np.sqrt(np.mean(metres[used] ** 2))) if used.any() else 0.0
     said = f"{size * 1e3:.2g} mm in each coordinate"
     if fit.declared and size > _AT_THE_NOISE * noise:
-        return NextStep(
-            "unexplained",
-            f"What is left ({said}) is {size / noise:.2g} times the declared noise, and no effect known here explains "
-            "it. Visit a few postures again to see how well the robot repeats, and check sigma.",
-        )
+        first = f"What is left ({said}) is {size / noise:.2g} times the declared noise"
+        return NextStep("unexplained", _unexplained(first, untold, "and check sigma."))
     if not fit.declared and fit.joint_error.any():
         vector = np.array([fit.robot.values[name] for name in fit.free.names])
         shared = (left.problem.at(vector).by_joints[used] * metres[used][:, None]) ** 2 @ fit.joint_error**2
         if float(np.mean(shared)) > _OF_THE_JOINTS * size**2:
             return NextStep(
                 "unexplained",
-                f"What is left ({said}) is shared by the readings of a configuration, and no effect known here "
-                "explains it. Visit a few postures again: if they scatter as much, that is how well the robot repeats.",
+                _unexplained(
+                    f"What is left ({said}) is shared by the readings of a configuration",
+                    untold,
+                    "which is what is left if they scatter as much.",
+                ),
             )
     known = "is the instrument's noise" if fit.declared else "looks like the instrument's noise"
     effects = (
@@ -341,6 +384,8 @@ def _end(left: LeftOver) -> NextStep:
         if can_explain(left)
         else ", and cross-validation found no other joint effect that explains more of it."
         if fit.model.tried
+        else ". The curves leave too few equations to try other joint effects beside them: `model=auto` compares them."
+        if has_curves(fit)
         else ". There are too few readings to tell whether joint effects would explain more of it."
     )
     better = "" if fit.declared else " If the instrument is better than that, say so in a column sigma."

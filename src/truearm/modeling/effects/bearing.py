@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
+from truearm.modeling.effects.compliance import Compliance
 from truearm.modeling.effects.effect import LinearEffect, Rates
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.postures import Postures
@@ -21,6 +22,7 @@ class BearingCompliance(LinearEffect):
 
     name: ClassVar[str] = "bearing-compliance"
     loaded: ClassVar[bool] = True
+    part_of: ClassVar[str] = Compliance.name
     tilts: ClassVar[bool] = True
     non_negative: ClassVar[bool] = True
     exportable: ClassVar[bool] = True

@@ -90,6 +90,9 @@ class Effect(ABC):
         units or another order of the joints.
     selectable
         Whether it is tried where cross-validation chooses the effects; others are left to those who ask for them.
+    part_of
+        Name of the effect that it says how something differs from: a model without that one would have it stand in for
+        it. Empty where there is none.
     exportable
         Whether the Python file of a robot computes it, see :mod:`truearm.modeling.formats.python_file`.
     """
@@ -104,6 +107,7 @@ class Effect(ABC):
     non_negative: ClassVar[bool] = False
     kinematic: ClassVar[bool] = False
     selectable: ClassVar[bool] = True
+    part_of: ClassVar[str] = ""
     exportable: ClassVar[bool] = False
 
     @property

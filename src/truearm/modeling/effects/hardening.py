@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from truearm.modeling.effects.compliance import Compliance
 from truearm.modeling.effects.effect import LinearEffect, Rates, effort
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.postures import Postures
@@ -23,6 +24,7 @@ class Hardening(LinearEffect):
 
     name: ClassVar[str] = "hardening"
     loaded: ClassVar[bool] = True
+    part_of: ClassVar[str] = Compliance.name
     exportable: ClassVar[bool] = True
 
     @cached_property

@@ -200,7 +200,7 @@ READERS: Final[Mapping[str, Reader]] = {
     "mdh": _dh_table("mdh.csv", "modified-dh"),
     "hayati": _dh_table("hayati.csv", "hayati"),
     "fleet": Reader(
-        {name: name for name in ("fleet.yaml", "robots.csv", "data.csv", "bounds.yaml")},
+        {name: name for name in ("fleet.yaml", "robots.csv", "data.csv", "again.csv", "bounds.yaml")},
         lambda folder: read_manifest(folder / "fleet.yaml"),
     ),
     "fleet-experiment": Reader(

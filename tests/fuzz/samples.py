@@ -72,7 +72,7 @@ ROBOTS = """\
 name,robot,data,of,date,train,effects,gravity,payload
 one,irb120,data.csv,4711,2026-01-05,40,,"0,0,-9.81",
 # again
-two,kr5,data.csv,4712,2026-07-05,all,backlash;clearance,,"2.7kg,50mm,25mm,100mm"
+two,kr5,again.csv,4712,2026-07-05,all,backlash;clearance,,"2.7kg,50mm,25mm,100mm"
 """
 EXPERIMENT = """\
 truearm: truearm-fleet/1
@@ -129,6 +129,7 @@ def folder() -> Path:
         "sheet.csv": _sheet(),
         "touches.csv": _touches(),
     }
+    texts["again.csv"] = (place / "data.csv").read_text() + "\n"  # the same readings twice are refused
     for name, text in (texts | _performance()).items():
         (place / name).write_text(text)
     return place

@@ -247,6 +247,7 @@ def test_statuses() -> None:
         (lambda r: dataclasses.replace(r, criterion=Names.of(["AD"])), "the plan does not have this test"),
         (lambda r: dataclasses.replace(r, pose=Names.of(["P9"])), "does not have this pose in the test AP"),
         (lambda r: dataclasses.replace(r, position=r.position + 0.3), "1 pose outside the cube, the first 100 mm"),
+        (lambda r: dataclasses.replace(r, pose=Names.of(["P2"])), "1 pose at another place than the plan has it"),
         (lambda r: dataclasses.replace(r, criterion=Names.of(["vAP"])), "the approach is missing"),
         (
             lambda r: dataclasses.replace(r, criterion=Names.of(["vAP"]), approach=Names.of(["w"])),
@@ -310,3 +311,17 @@ def test_a_perfect_robot_is_seldom_called_inaccurate() -> None:
     points = rng.standard_normal((300, 30, 3)) * [3, 1, 0.3]
     intervals = [norm_interval(p.mean(axis=0), np.cov(p.T), 30, np.zeros((3, 3))) for p in points]
     assert np.mean([one is not None and one[0] == 0.0 for one in intervals]) > 0.95
+
+
+def test_a_tie_that_is_as_far_off_as_the_robot_leaves_drift_open() -> None:
+    rng = np.random.default_rng(4)
+    change = np.repeat([0.0, 3e-5, 6e-5, 9.5e-5], 10)
+    true = POINTS[0] + np.outer(5e-5 + change, [1.0, 0.0, 0.0]) + 5e-6 * rng.standard_normal((40, 3))
+    off = true - [1e-4, 0.0, 0.0]  # what is read with a tie that is one of its deviations off
+    task, read = plan(PlannedTest("dAP", ("P1",), 10)), rows("dAP", ["P1"] * 40, [*range(1, 11)] * 4, off)
+    known = Alignment("base-features", Transform(), 1e-4, 1e-6)
+    low, high = found(evaluate(task, read, known, TRACKER).values, "dAP").interval or (1.0, 0.0)
+    assert low < 9.5e-5 < high
+    exact = Alignment("base-features", Transform(), 1e-9, 1e-9)
+    low, high = found(evaluate(task, read, exact, TRACKER).values, "dAP").interval or (0.0, 1.0)
+    assert high < 7e-5

@@ -15,6 +15,7 @@ import numpy as np
 
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PlannedTest
+from truearm.validation.iso9283.alignment import Alignment
 from truearm.validation.iso9283.intervals import LEAST_CYCLES, Interval, repeatability, repeatability_scatter
 from truearm.validation.iso9283.inverted_tests import barycentre_scatter, largest_interval
 from truearm.validation.iso9283.pose_rows import Cycles
@@ -23,6 +24,8 @@ from truearm.validation.iso9283.values import Conditions, Instrument, Value
 
 #: A pause of so many times the usual time between two cycles begins a new group.
 _PAUSE: Final = 5.0
+#: Ties that are drawn.
+_TIES: Final = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,11 +73,13 @@ def groups_of(one: Cycles) -> list[Cycles]:
 
 
 def drift_values(
-    test: PlannedTest, cycles: list[Cycles], instrument: Instrument
+    test: PlannedTest, cycles: list[Cycles], instrument: Instrument, alignment: Alignment | None = None
 ) -> tuple[list[Value], list[DriftCourse]]:
     """Return dAP and dRP of every pose, and the courses they are taken from.
 
-    Where the instrument stands is common to all groups, and its tie to the base hardly matters.
+    Where the instrument stands is common to all groups. What its tie to the base leaves open moves all of them by the
+    same, and so changes dAP where AP is not far above it: that is drawn, and widens the interval. `alignment` is that
+    tie; None if it is exact.
     """
     values: list[Value] = []
     courses: list[DriftCourse] = []
@@ -92,7 +97,12 @@ def drift_values(
             ("dRP", course.rp, _scatter_of_spread([group.points for group in groups], course.rp)),
         ):
             value, interval = _largest_change(course_of, scatter)
-            values.append(valued(id, "position", *common, value, "length", interval, unknown))
+            tied = _changes_by_tie(groups, one.command, alignment) if id == "dAP" else None
+            left = unknown
+            if tied is not None:
+                left = math.hypot(unknown, float(np.std(tied)))
+                interval = None if interval is None else _widened(interval, value, tied)
+            values.append(valued(id, "position", *common, value, "length", interval, left))
             for k, angle in enumerate(ANGLES):
                 value, interval = math.nan, None
                 if one.angles is not None:
@@ -130,6 +140,29 @@ def _largest_change(course: Array, scatter: _Scatter) -> tuple[float, Interval |
         return math.nan, None
     value = float(_changes(course[None])[0])
     return value, None if scatter is None else largest_interval(_changes, course - course[0], *scatter)
+
+
+def _changes_by_tie(groups: list[Cycles], command: Array, alignment: Alignment | None) -> Array | None:
+    """Return what dAP would be with other ties that are as likely, ``(m,)`` [m]."""
+    if alignment is None or len(groups) < 2:
+        return None
+    away = np.array([group.barycentre - command for group in groups])
+    rng = np.random.default_rng(9283)
+    moved = rng.multivariate_normal(np.zeros(3), alignment.covariance_at(command), _TIES)
+    return _changes(np.linalg.norm(away + moved[:, None, :], axis=2))
+
+
+def _widened(interval: Interval, value: float, tied: Array) -> Interval:
+    """Return an interval widened by what other ties would give.
+
+    A change of a norm is at most the way that the poses went, and close to it for many ties: so each side has the
+    outermost hundredth of them, and what cycles scatter by is added to it.
+    """
+    low, high = np.quantile(tied, [0.005, 0.995])
+    return (
+        max(min(value, float(low)) - (value - interval[0]), 0.0),
+        max(value, float(high)) + (interval[1] - value),
+    )
 
 
 def _changes(courses: Array) -> Array:

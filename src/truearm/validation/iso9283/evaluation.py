@@ -137,7 +137,7 @@ def evaluated(
         tie = np.sqrt(np.diag(alignment.covariance_at(plan.cube.centre)))
         for test in ("AT", "AT-reorientation"):
             progress(TESTS[test].name)
-            found, courses = path_values(plan, paths, transform, instrument, test, tie)
+            found, courses = path_values(plan, paths, transform, instrument, test, tie, alignment.sigma_rot)
             values += found
             deviations += courses
         progress(TESTS["CR"].name)

@@ -78,6 +78,7 @@ def path_values(
     instrument: Instrument,
     test: str = "AT",
     tie: Array | None = None,
+    tie_rot: float = 0.0,
     seed: int = 9283,
 ) -> tuple[list[Value], list[PathDeviations]]:
     """Return AT and RT of every path and condition, and what they come from.
@@ -96,6 +97,8 @@ def path_values(
     tie
         Standard deviation with which that frame is known at each path's place, of each base axis [m], ``(3,)``; None
         if it is exact.
+    tie_rot
+        Standard deviation with which each angle of that frame is known [rad].
     seed
         Of the simulated campaigns.
 
@@ -120,7 +123,7 @@ def path_values(
         found.append(here)
         values += _position_values(here, suffix, instrument, tie, rng)
         if here.angles is not None:
-            values += _angle_values(here, suffix, instrument, rng)
+            values += _angle_values(here, suffix, instrument, tie_rot, rng)
     return values, found
 
 
@@ -218,7 +221,9 @@ def _position_values(
     return values
 
 
-def _angle_values(here: PathDeviations, suffix: str, instrument: Instrument, rng: np.random.Generator) -> list[Value]:
+def _angle_values(
+    here: PathDeviations, suffix: str, instrument: Instrument, tie_rot: float, rng: np.random.Generator
+) -> list[Value]:
     run = here.run
     values = []
     assert here.angles is not None
@@ -234,10 +239,10 @@ def _angle_values(here: PathDeviations, suffix: str, instrument: Instrument, rng
                 here.path,
                 accuracy,
                 "angle",
-                _accuracy_interval(angle, None, rng) if n > 1 else None,
+                _accuracy_interval(angle, np.array([tie_rot]) if tie_rot else None, rng) if n > 1 else None,
                 n,
                 run.conditions,
-                run.status(coarse=sigma / np.sqrt(n) > COARSE * accuracy),
+                run.status(coarse=np.hypot(sigma / np.sqrt(n), tie_rot) > COARSE * accuracy),
             )
         )
         spread = 3 * float(angle.std(axis=0, ddof=1).max()) if n > 1 else np.nan
@@ -275,8 +280,8 @@ def _accuracy_interval(deviation: Array, tie: Array | None, rng: np.random.Gener
     weight = rng.standard_normal((_TRIALS, n)) / np.sqrt(n * (n - 1))
     inflation = np.sqrt((n - 1) / rng.chisquare(n - 1, _TRIALS))
     error = (weight @ residual).reshape(_TRIALS, m, d) * inflation[:, None, None]
-    if tie is not None and d == 3:
-        error = error + (rng.standard_normal((_TRIALS, 3)) * tie)[:, None, :]
+    if tie is not None:
+        error = error + (rng.standard_normal((_TRIALS, d)) * tie)[:, None, :]
     distance = np.linalg.norm(mean, axis=1)
     added = (deviation.var(axis=0, ddof=1) / n).sum(axis=1)
     share = np.sqrt(np.maximum(distance**2 - added, 0.0)) / np.maximum(distance, 1e-15)
@@ -290,7 +295,7 @@ def _accuracy_interval(deviation: Array, tie: Array | None, rng: np.random.Gener
     away = residual.reshape(n, m, d)
     scatter = np.einsum("nmi,nmj->mij", away, away) / (n * (n - 1))
     half = stats.t.ppf(0.975, n - 1) * np.sqrt(np.maximum(np.linalg.eigvalsh(scatter)[:, -1], 0.0))
-    if tie is not None and d == 3:
+    if tie is not None:
         half = np.hypot(half, stats.norm.ppf(0.975) * float(np.max(tie)))
     return max(low, 0.0), float((distance + half).max())
 

@@ -19,6 +19,8 @@ from truearm.validation.iso9283.alignment import Alignment, best_fit
 
 #: How far outside the cube is rounding [m].
 _ROUNDING: Final = 1e-9
+#: A row is at another pose if that is nearer than this share of the distance to its own.
+_NEARER: Final = 0.5
 _FILES: Final = {"paths": "paths", "settling": "poses over time", "forces": "pushes"}
 
 
@@ -87,11 +89,12 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
     ------
     InputError
         For a test, a pose or an approach that the plan does not have, a robot without a name where robots are compared,
-        poses outside the cube, and a cycle that appears twice.
+        poses outside the cube or at another pose of the plan than they are called, and a cycle that appears twice.
     """
     _check_names(plan, readings)
     position = alignment.in_base(readings.position)
     _check_cube(plan, readings, position)
+    _check_nearest(plan, readings, position)
     rotation = None if readings.rotation is None else alignment.turned_to_base(readings.rotation)
     approaches = readings.approach.code.copy()
     approaches[~readings.criterion.are("vAP")] = -1
@@ -228,4 +231,23 @@ def _check_cube(plan: PerformancePlan, readings: AttainedPoses, position: Array)
             came=f"x {x}, y {y}, z {z} mm in the base frame",
             allowed=", ".join(f"{axis} {a:.4g} to {b:.4g} mm" for axis, a, b in zip("xyz", low, high, strict=True)),
             cure="Check the unit, the pose's name, and how the instrument was tied to the robot's base.",
+        )
+
+
+def _check_nearest(plan: PerformancePlan, readings: AttainedPoses, position: Array) -> None:
+    """Refuse rows that lie at another pose than the one they are called."""
+    names = [name for test in plan.tests if TESTS[test.id].readings == "poses" for name in test.places]
+    places = np.array([plan.poses[name].position for name in dict.fromkeys(names)])
+    called = np.array([plan.poses[name].position for name in readings.pose.names])[readings.pose.code]
+    own = np.linalg.norm(position - called, axis=1)
+    apart = np.linalg.norm(position[:, None] - places, axis=2)
+    wrong = np.flatnonzero(apart.min(axis=1) < _NEARER * own)
+    if len(wrong):
+        row = int(wrong[0])
+        there = list(dict.fromkeys(names))[int(apart[row].argmin())]
+        raise InputError(
+            f"{len(wrong)} pose{'s' * (len(wrong) != 1)} at another place than the plan has it",
+            where=f"{readings.source}, line {int(readings.line[row])}, column pose",
+            came=f"{_name(readings.pose, row)} is {1e3 * own[row]:.4g} mm away, {there} {1e3 * apart[row].min():.4g} mm",
+            cure="Correct the name, take the plan that was measured, or remove the cycle.",
         )

@@ -125,7 +125,7 @@ def evaluate(
     for test in plan.tests:
         mine = [one for one in cycles if one.test == test.id]
         if test.id == "dAP":
-            made, found = drift_values(test, mine, instrument)
+            made, found = drift_values(test, mine, instrument, alignment)
             values += made
             courses += found
         elif test.id in _EVALUATED:

@@ -248,6 +248,6 @@ def _check_nearest(plan: PerformancePlan, readings: AttainedPoses, position: Arr
         raise InputError(
             f"{len(wrong)} pose{'s' * (len(wrong) != 1)} at another place than the plan has it",
             where=f"{readings.source}, line {int(readings.line[row])}, column pose",
-            came=f"{_name(readings.pose, row)} is {1e3 * own[row]:.4g} mm away, {there} {1e3 * apart[row].min():.4g} mm",
+            came=f"{_name(readings.pose, row)} is {1e3 * own[row]:.4g} mm off, {there} {1e3 * apart[row].min():.4g} mm",
             cure="Correct the name, take the plan that was measured, or remove the cycle.",
         )

@@ -165,7 +165,7 @@ def evaluate(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Evaluate what was measured: every criterion with its 95 % interval, and a report."""
+    """Evaluate what was measured: each criterion with its 95 % interval or the range of its cycles, and a report."""
     from truearm.cli.output import progress
     from truearm.jobs.iso9283_evaluate import iso9283_evaluate
     from truearm.units import sized_si

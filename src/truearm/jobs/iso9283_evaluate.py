@@ -45,7 +45,7 @@ def iso9283_evaluate(
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Iso9283Evaluation:
-    """Evaluate the tests of a plan by ISO 9283, every value with a 95 % interval.
+    """Evaluate the tests of a plan by ISO 9283, each value with a 95 % interval or the range of its cycles.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -212,7 +213,7 @@ class _Layout:
         wanted = {place for test in tests if TESTS[test].readings == "paths" for place in TESTS[test].places}
         self.paths = {name: path for name, path in self._paths().items() if name in wanted}
         if "AT-reorientation" not in tests:
-            self.paths = {name: _kept(path) for name, path in self.paths.items()}
+            self.paths = {name: replace(path, other=None) for name, path in self.paths.items()}
         self.found = np.zeros((0, len(robot.joints)))
         self.names = [*self.places, *self.distances]
 
@@ -307,10 +308,3 @@ class _Layout:
             key: PlannedPose(f"{key[0]} from {key[1]}", p, self.rotation, self.found[first + k])
             for k, (key, p) in enumerate(self.begin.items())
         }
-
-
-def _kept(path: PlannedPath) -> PlannedPath:
-    """Return a path that keeps its orientation."""
-    return PlannedPath(
-        path.name, path.kind, path.points, path.normal, path.rotation, None, path.stroke, path.wavelength
-    )

@@ -1,7 +1,8 @@
 """Yaskawa jobs with stops, waits and circles.
 
-Source: Yaskawa, INFORM language manuals of the controllers DX100 and DX200: MOVJ, MOVL, MOVC, TIMER, and the tags VJ,
-V, PL and FPT. The first MOVC of a row is reached on a line: it stands where the arc begins.
+Source: Yaskawa, INFORM language manuals of the controllers DX100 and DX200: MOVJ, MOVL, MOVC, TIMER, WAIT, PAUSE, and
+the tags VJ, V, PL and FPT. The first MOVC of a row is reached on a line: it stands where the arc begins. Tool and load
+are in the tool files of the controller, not in jobs.
 """
 
 from __future__ import annotations
@@ -10,8 +11,10 @@ from truearm.compensation.programs.jbi.forms import ANGLES, POSE
 from truearm.compensation.programs.jbi.new import DATE, rconf
 from truearm.compensation.programs.motion_program import (
     CircleMove,
+    InputWait,
     JointMove,
     MotionProgram,
+    Pause,
     Remark,
     StraightMove,
     Wait,
@@ -60,10 +63,16 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
                 steps.append(f"TIMER T={number(step.seconds, 2)}")
             case Remark():
                 steps.append(f"'{step.text}")
+            case InputWait():
+                steps.append(f"WAIT IN#({step.input})=ON T={step.seconds:.2f}")
+                steps += [f"'{step.label}: no signal", f"PAUSE IF IN#({step.input})=OFF"]
+            case Pause():
+                steps += ["'Measure, then start again", "PAUSE"]
         arc = isinstance(step, CircleMove)
     lines = ["/JOB", f"//NAME {name}", "//POS", f"///NPOS {count},0,0,0,0,0", "///TOOL 0", *positions]
     lines += ["//INST", f"///DATE {DATE}", "///ATTR SC,RW", "///GROUP1 RB1", "NOP"]
-    lines += [*(f"'{line}" for line in program.comments), *steps, "END", ""]
+    told = program.comments if program.carried is None else (*program.comments, "Tool file 0 must hold this load")
+    lines += [*(f"'{line}" for line in told), *steps, "END", ""]
     return {f"{name}.JBI": "\n".join(lines)}
 
 

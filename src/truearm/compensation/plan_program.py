@@ -1,0 +1,235 @@
+"""The measuring program of a plan: every configuration under its label, from the safe one and back to it.
+
+Joints go evenly, all at once, as the ways were checked. How fast the joints of an arm go at 100 % is rarely known, so
+both limits are kept for all arms between slow and fast ones: the speed of the tip for the fastest, where a language
+says shares, and the share of the joints' speed for the slowest, where it says times or speeds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from truearm.compensation.programs.motion_program import (
+    Carried,
+    InputWait,
+    JointMove,
+    MotionProgram,
+    Pause,
+    ProgramStep,
+    Remark,
+    Wait,
+    number,
+)
+from truearm.compensation.programs.urscript.measuring import FASTEST
+from truearm.modeling.chain import Array
+from truearm.modeling.inverse.kinematics import reach
+from truearm.modeling.robot import Robot
+from truearm.planning.driving.tour import Stop, Tour
+
+#: Name of the program; every language takes it.
+PROGRAM: Final = "MEASURE"
+#: What stands before the label of a configuration in its comment.
+MEASURED: Final = "Measure"
+#: No joint of an arm of six is faster at 100 %: of the first three, and of the others [rad/s]; a sliding joint [m/s].
+FAST: Final = (math.radians(600.0), math.radians(1500.0), 5.0)
+#: No joint is slower at 100 % [rad/s], nor a sliding one [m/s].
+SLOW: Final = (math.radians(50.0), 0.2)
+#: While it speeds up and slows down, a robot is slower than on average, by less than so long [s].
+_RAMPS: Final = 0.5
+#: Ways are looked at in steps of no more [rad or m].
+_STEP: Final = math.radians(3.0)
+#: The lowest share that a program says.
+_LOWEST: Final = 0.01
+_FIRST_JOINTS: Final = 3
+
+
+@dataclass(frozen=True)
+class Driving:
+    """How a program drives through a plan.
+
+    Attributes
+    ----------
+    speed
+        Of no target and of the flange is higher [m/s].
+    share
+        Of the fastest that the joints go, at most.
+    dwell
+        How long the robot stands in each configuration [s].
+    wait
+        What it waits for after that: nothing more (``time``), a digital ``input``, or the ``operator``.
+    input
+        Number or name of the digital input.
+    longest
+        How long it is waited for [s].
+    """
+
+    speed: float = 0.25
+    share: float = 0.1
+    dwell: float = 2.0
+    wait: Literal["time", "input", "operator"] = "time"
+    input: str = ""
+    longest: float = 300.0
+
+    @property
+    def words(self) -> str:
+        """What it waits for, in words."""
+        if self.wait == "input":
+            return f"input {self.input}, {number(self.longest, 2)} s"
+        return self.wait
+
+
+def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark: str) -> MotionProgram:
+    """Return the program that drives a tour.
+
+    Parameters
+    ----------
+    tour
+        Whose ways were checked.
+    robot
+        With its targets and what it carries.
+    language
+        Its name; languages say speeds in different ways.
+    driving
+        How fast, and for what it waits.
+    mark
+        By which the plan is known, for a comment.
+    """
+    shown = robot.controller.from_model(tour.joints)
+    moves = [_first_move(robot, language, driving)]
+    moves += [_move(robot, language, driving, tour.joints[k : k + 2], shown[k : k + 2]) for k in range(len(shown) - 1)]
+    targets: list[Array] = []
+    numbers: dict[bytes, int] = {}
+    steps: list[ProgramStep] = []
+    for stop, joints, move in zip(tour.stops, shown, moves, strict=True):
+        key = joints.tobytes()
+        if key not in numbers:
+            numbers[key] = len(targets)
+            targets.append(joints)
+        steps += [Remark(_called(stop)), JointMove(numbers[key], *move)]
+        if stop.kind == "measure":
+            steps += _stand(str(stop.label), driving)
+    carried = _carried(robot)
+    return MotionProgram(
+        PROGRAM,
+        robot.name,
+        np.array(targets),
+        tuple(joint.kind == "prismatic" for joint in robot.joints),
+        None,
+        None,
+        _notes(robot, carried, driving, mark),
+        tuple(steps),
+        carried,
+    )
+
+
+def _called(stop: Stop) -> str:
+    if stop.kind == "measure":
+        return f"{MEASURED} {stop.label}"
+    return {"home": "Home", "via": "On the way", "approach": "Approach from below"}[stop.kind]
+
+
+def _stand(label: str, driving: Driving) -> list[ProgramStep]:
+    stands: list[ProgramStep] = [Wait(driving.dwell)]
+    if driving.wait == "input":
+        stands.append(InputWait(driving.input, driving.longest, label))
+    elif driving.wait == "operator":
+        stands.append(Pause(label))
+    return stands
+
+
+def _first_move(robot: Robot, language: str, driving: Driving) -> tuple[float, float, None, float]:
+    """Return share, speed, time and angular velocity of the move to the safe configuration, from nobody knows where.
+
+    As if all joints turned the outstretched arm.
+    """
+    far = max(reach(robot, name) for name in (None, *(target.name for target in robot.targets)))
+    slow, fast = _rates(robot)
+    rate = FASTEST if language == "URScript" else float(fast.max())
+    share = min(driving.share, driving.speed / (rate * far))
+    turning = min(driving.share * float(slow.min()), driving.speed / far)
+    return _whole(share, language), driving.speed, None, turning
+
+
+def _move(
+    robot: Robot, language: str, driving: Driving, joints: Array, shown: Array
+) -> tuple[float, float, float, float]:
+    """Return share, speed of the tip, time and angular velocity of a move of all joints ``(2, joints)``.
+
+    The angular velocity is of no meaning where the time is said.
+    """
+    turned = np.abs(np.diff(shown, axis=0))[0]
+    rate = _fastest_point(robot, joints)
+    slow, fast = _rates(robot)
+    if language == "URScript":
+        fast = np.full(len(turned), FASTEST)
+    leading = float((turned / fast).max())
+    share = driving.share if rate <= 0 else min(driving.share, driving.speed * leading / rate)
+    seconds = max(float((turned / slow).max()) / driving.share, rate / driving.speed) + _RAMPS
+    return _whole(share, language), driving.speed, seconds, driving.share * float(slow.min())
+
+
+def _whole(share: float, language: str) -> float:
+    """Return a share in whole percent and no larger, as most languages have it; URScript has a speed instead."""
+    if language == "URScript":
+        return share
+    return max(math.floor(100.0 * share + 1e-9) / 100.0, _LOWEST)
+
+
+def _rates(robot: Robot) -> tuple[Array, Array]:
+    """Return how fast the joints go at 100 %, at least and at most, ``(joints,)`` each."""
+    first, others, sliding = FAST
+    turns = [joint.kind == "revolute" for joint in robot.joints]
+    slow = np.array([SLOW[0] if turning else SLOW[1] for turning in turns])
+    fast = [(first if k < _FIRST_JOINTS else others) if turning else sliding for k, turning in enumerate(turns)]
+    return slow, np.array(fast)
+
+
+def _fastest_point(robot: Robot, joints: Array) -> float:
+    """Return how fast the fastest of the targets and the flange goes, in the whole way of a move [m]."""
+    count = max(2, math.ceil(float(np.abs(np.diff(joints, axis=0)).max()) / _STEP) + 1)
+    share = np.linspace(0.0, 1.0, count)[:, None]
+    along = (1.0 - share) * joints[0] + share * joints[1]
+    fastest = 0.0
+    for name in (None, *(target.name for target in robot.targets)):
+        steps = np.diff(robot.forward(along, target=name)[0], axis=0)
+        fastest = max(fastest, float(np.linalg.norm(steps, axis=1).max()) * (count - 1))
+    return fastest
+
+
+def _carried(robot: Robot) -> Carried:
+    """Return what the controller is told of the tool: its tip is the target that is farthest from the flange."""
+    flange = robot.controller.flange
+    there = {one.name: np.array(robot.tool_place(one.name).translation) for one in robot.targets}
+    name = max(there, key=lambda one: float(np.linalg.norm(there[one])), default="")
+
+    def of_controller(point: Array) -> tuple[float, float, float]:
+        x, y, z = ((point - np.array(flange.translation)) @ flange.rotation).tolist()
+        return x, y, z
+
+    tip = of_controller(there[name]) if name else (0.0, 0.0, 0.0)
+    return Carried(name, tip, robot.payload.mass, of_controller(np.array(robot.payload.cog)))
+
+
+def _notes(robot: Robot, carried: Carried, driving: Driving, mark: str) -> tuple[str, ...]:
+    def at(point: tuple[str, ...]) -> str:
+        return "X {} Y {} Z {} mm".format(*point)
+
+    return (
+        "Measuring program of a plan",
+        f"Robot {robot.name}",
+        f"Plan {mark}",
+        f"Tip: target {carried.name} at" if carried.name else "Tip: the flange",
+        at(carried.tip_mm),
+        f"Load {number(carried.mass, 3)} kg at",
+        at(carried.cog_mm),
+        f"At most {number(1e3 * driving.speed, 1)} mm/s and {number(100 * driving.share, 2)} %",
+        f"Dwell {number(driving.dwell, 2)} s, wait: {driving.words}",
+        "Not verified, no safety function",
+        "First run: step by step,",
+        "at reduced speed, nobody near",
+        "Go to Home by hand before it",
+    )

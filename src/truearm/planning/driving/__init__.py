@@ -1,0 +1,1 @@
+"""How configurations are driven: what the arm must keep clear of, and checked ways from one to the next."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_beside, refuse_pull
-from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity, read_numbers
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
 
@@ -18,7 +18,9 @@ def plan(
         str, typer.Argument(metavar="ROBOT", help="A library id, a robot file, calibrated or not, or a URDF.")
     ],
     poses: Annotated[str, typer.Option(metavar="N|auto", help="How many configurations; auto lets O1 decide.")],
-    out: Annotated[Path, typer.Option("--out", metavar="PLAN.csv", help="File to write, and PLAN.html beside it.")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="PLAN.csv|FOLDER", help="File to write, and PLAN.html beside it.")
+    ],
     candidates_from: Annotated[
         str | None,
         typer.Option(
@@ -80,6 +82,35 @@ def plan(
     payload: PayloadText = None,
     gravity: GravityText = None,
     joints: JointsText = None,
+    program: Annotated[
+        str | None,
+        typer.Option(
+            metavar="rapid|krl|fanuc|urscript|inform|val3",
+            help="Write a program that drives the plan, and a sheet; --out is then a folder.",
+            show_default=False,
+        ),
+    ] = None,
+    approach: Annotated[
+        bool, typer.Option("--approach", help="It comes to every configuration from below, by a stop before it.")
+    ] = False,
+    speed: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MM/S[,%]", help="Its highest speed of the tip, and of the joints.", show_default="250,10"
+        ),
+    ] = None,
+    dwell: Annotated[
+        float | None, typer.Option(metavar="S", help="How long it stands in each configuration.", show_default="2")
+    ] = None,
+    wait: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WAIT",
+            help='What it waits for then: time, for nothing more; operator, who starts it again; "input 3,300s", a '
+            "digital input, at most for so long.",
+            show_default="time",
+        ),
+    ] = None,
     pull: Pull = None,
     json: Json = False,
 ) -> None:
@@ -95,6 +126,7 @@ def plan(
 
         beside = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
         beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
+        beside |= {"program": program, "approach": approach or None, "speed": speed, "dwell": dwell, "wait": wait}
         refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
         with progress() as say:
             pairs = plan_inclinometers(
@@ -140,14 +172,32 @@ def plan(
             payload=payload,
             gravity=read_gravity(gravity),
             joints=joints,  # type: ignore[arg-type]
+            program=program,
+            approach=approach,
+            speed=_speed(speed),
+            dwell=dwell,
+            wait=wait,
             command=command_line(),
             progress=say,
         )
     if json:
         print_json(planned.summary())
-    else:
-        print_record(planned)
+        return
+    print_record(planned)
+    if planned.program is None:
         print_line(f"Written: {out}, {out.with_suffix('.html')}")
+    else:
+        print_line(f"Written to {out}: {', '.join(planned.contents())}")
+
+
+def _speed(text: str | None) -> list[float] | None:
+    """Return speed [m/s] and share of a text in mm/s and percent."""
+    from truearm.units import sized_si
+
+    if text is None:
+        return None
+    speed, *shares = read_numbers(text, "speed", "mm/s, and percent of the joints' speed: 250,10")
+    return [sized_si(speed, "mm", parameter="speed"), *(share / 100.0 for share in shares)]
 
 
 def _poses(text: str) -> Any:

@@ -34,10 +34,13 @@ from truearm.planning.driving.tour import Stop, Tour
 PROGRAM: Final = "MEASURE"
 #: What stands before the label of a configuration in its comment.
 MEASURED: Final = "Measure"
-#: No joint of an arm of six is faster at 100 %: of the first three, and of the others [rad/s]; a sliding joint [m/s].
-FAST: Final = (math.radians(600.0), math.radians(1500.0), 5.0)
-#: No joint is slower at 100 % [rad/s], nor a sliding one [m/s].
-SLOW: Final = (math.radians(50.0), 0.2)
+#: At 100 % no joint of an arm is faster than this: of the first three, and of the others [rad/s], nor do they turn the
+#: stretched arm faster [m/s].
+_FAST: Final = ((math.radians(600.0), 12.0), (math.radians(1500.0), math.radians(2500.0)))
+#: At 100 % no joint is slower, of an arm that is no longer than this stretched [m], and of longer ones [rad/s].
+_SLOW: Final = (2.0, math.radians(100.0), math.radians(50.0))
+#: The same of sliding joints: the slowest and the fastest [m/s].
+_SLIDING: Final = (0.2, 5.0)
 #: While it speeds up and slows down, a robot is slower than on average, by less than so long [s].
 _RAMPS: Final = 0.5
 #: Ways are looked at in steps of no more [rad or m].
@@ -147,7 +150,7 @@ def _first_move(robot: Robot, language: str, driving: Driving) -> tuple[float, f
     As if all joints turned the outstretched arm.
     """
     far = max(reach(robot, name) for name in (None, *(target.name for target in robot.targets)))
-    slow, fast = _rates(robot)
+    slow, fast = joint_rates(robot)
     rate = FASTEST if language == "URScript" else float(fast.max())
     share = min(driving.share, driving.speed / (rate * far))
     turning = min(driving.share * float(slow.min()), driving.speed / far)
@@ -163,7 +166,7 @@ def _move(
     """
     turned = np.abs(np.diff(shown, axis=0))[0]
     rate = _fastest_point(robot, joints)
-    slow, fast = _rates(robot)
+    slow, fast = joint_rates(robot)
     if language == "URScript":
         fast = np.full(len(turned), FASTEST)
     leading = float((turned / fast).max())
@@ -179,13 +182,18 @@ def _whole(share: float, language: str) -> float:
     return max(math.floor(100.0 * share + 1e-9) / 100.0, _LOWEST)
 
 
-def _rates(robot: Robot) -> tuple[Array, Array]:
-    """Return how fast the joints go at 100 %, at least and at most, ``(joints,)`` each."""
-    first, others, sliding = FAST
+def joint_rates(robot: Robot) -> tuple[Array, Array]:
+    """Return how fast the joints go at 100 %, at least and at most [rad/s, m/s], ``(joints,)`` each.
+
+    The bounds hold for the arms of all makers whose data sheets were looked at.
+    """
+    length = max(reach(robot, None), 0.1)
     turns = [joint.kind == "revolute" for joint in robot.joints]
-    slow = np.array([SLOW[0] if turning else SLOW[1] for turning in turns])
-    fast = [(first if k < _FIRST_JOINTS else others) if turning else sliding for k, turning in enumerate(turns)]
-    return slow, np.array(fast)
+    slowest = _SLOW[1] if length <= _SLOW[0] else _SLOW[2]
+    fastest = [min(rate, along / length) for rate, along in _FAST]
+    slow = [slowest if turning else _SLIDING[0] for turning in turns]
+    fast = [fastest[k >= _FIRST_JOINTS] if turning else _SLIDING[1] for k, turning in enumerate(turns)]
+    return np.array(slow), np.array(fast)
 
 
 def _fastest_point(robot: Robot, joints: Array) -> float:

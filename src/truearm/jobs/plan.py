@@ -20,6 +20,7 @@ from truearm.jobs.arguments import (
     device_argument,
     file_for,
     files_of,
+    folder_beside,
     gravity_argument,
     joints_argument,
     payload_argument,
@@ -29,10 +30,11 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.jobs.plan_programs import program_wanted, with_program
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
-from truearm.modeling.parts import Payload
+from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.measurement_plan import (
     ERROR,
@@ -44,6 +46,7 @@ from truearm.planning.choosing.measurement_plan import (
 from truearm.planning.choosing.observability import INDICES
 from truearm.planning.constraints.constraints import Constraints, read_constraints
 from truearm.results.plan import PAGE, Plan
+from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE
 
 
 def plan(
@@ -66,6 +69,11 @@ def plan(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     joints: JointsOf | None = None,
+    program: str | None = None,
+    approach: bool = False,
+    speed: Sequence[float] | None = None,
+    dwell: float | None = None,
+    wait: str | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Plan:
@@ -78,7 +86,8 @@ def plan(
     poses
         How many configurations to choose; ``auto`` lets O1 decide.
     out
-        CSV file to write, and a page beside it; None writes nothing, see :meth:`Plan.save`.
+        CSV file to write, and a page beside it; with a program a folder for both, the program and a sheet. None writes
+        nothing, see :meth:`Plan.save`.
     candidates_from
         Readings, or a canonical CSV file, among whose configurations to choose; None draws them within the limits.
     objective
@@ -110,6 +119,19 @@ def plan(
     joints
         Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
+    program
+        Language of a program that drives the plan: ``rapid``, ``krl``, ``fanuc``, ``urscript``, ``inform`` or ``val3``;
+        None writes none.
+    approach
+        Whether it comes to every configuration from below, by a stop a little before it.
+    speed
+        Of no target and of the flange it is higher [m/s], and the largest share of the joints' speed; None for
+        (0.25, 0.1).
+    dwell
+        How long the robot stands in each configuration [s]; None for 2 s.
+    wait
+        What it waits for after that: nothing more (``time``), ``operator``, who starts the program again, or a digital
+        input with the longest time (``input 3,300s``), after which the program pauses. None for ``time``.
     command
         How to run it again, for the page; None writes the call in Python.
     progress
@@ -122,7 +144,8 @@ def plan(
     """
     progress_argument(progress)
     read = (robot, candidates_from, constraints, accurate_at, tools, frames)
-    table = None if out is None else _files(out, *read)
+    wanted_program = program_wanted(program, approach, speed, dwell, wait)
+    table = None if out is None else _files(out, *read) if wanted_program is None else _folder(out, *read)
     count = _count(poses)
     if objective is not None:
         choice_argument(objective, "objective", dict.fromkeys((*INDICES, ERROR)))
@@ -159,10 +182,17 @@ def plan(
         payload=carried,
         gravity=fall,
         joints=joints,
+        program=program,
+        approach=approach,
+        speed=speed,
+        dwell=dwell,
+        wait=wait,
     )
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
+    if wanted_program is not None:
+        wanted_program.check(carrying)
     labels, readings, own = None, None, bool(carrying.targets)
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
@@ -193,6 +223,9 @@ def plan(
         readings=readings,
     )
     planned = Plan(made, call, files_of(*read), deviation, joints_are, "" if goal is None else goal.words)
+    if wanted_program is not None:
+        weighed = payload is not None or carrying.payload != NO_PAYLOAD
+        planned = with_program(planned, wanted_program, _tour(made, wanted_program.approach), carrying, weighed=weighed)
     if table is not None:
         progress("writing the files")
         planned.save(table)
@@ -206,6 +239,26 @@ def _files(out: object, *read: object) -> Path:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
     file_for(table.with_suffix(PAGE), *read)
     return table
+
+
+def _tour(made, approach):  # to be replaced
+    from truearm.planning.driving.tour import Stop, Tour
+
+    home = Stop(np.array([*made.joints[:1, 0] * 0, *made.joints[0, 1:] * 0]), "home")
+    stops = [home]
+    for q, b, label in zip(made.joints, made.before, made.labels, strict=True):
+        stops += [Stop(b, "approach")] if approach else []
+        stops.append(Stop(q, "measure", label))
+    return Tour((*stops, home), None, 0.05, 0.1)
+
+
+def _folder(out: object, *read: object) -> Path:
+    """Return the folder for a plan with its program."""
+    if isinstance(out, str | Path) and Path(out).suffix.lower() in (".csv", PAGE):
+        raise InputError(
+            "a plan with a program needs a folder", parameter="out", came=str(out), cure="Name a folder, or no program."
+        )
+    return folder_beside((TABLE, PLAN_PAGE, SHEET), TABLE, out, *read)
 
 
 def _rules(constraints: object) -> Constraints | None:

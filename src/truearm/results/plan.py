@@ -12,8 +12,9 @@ from truearm.modeling.controller import JointsOf
 from truearm.planning.choosing.measurement_plan import ERROR, MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.choosing.prediction import There
+from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, PlanProgram
 from truearm.results.record import Record, joints_lines
-from truearm.writing import output_file, write_files
+from truearm.writing import output_file, output_folder, write_files
 
 #: What the page beside a plan ends with.
 PAGE: Final = ".html"
@@ -37,6 +38,8 @@ class Plan(Record):
         Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     accurate_at
         Where the robot shall be accurate, in words; empty for everywhere.
+    program
+        What drives it; None where no program was asked for.
     """
 
     made: MeasurementPlan
@@ -45,6 +48,7 @@ class Plan(Record):
     noise: float = 1e-4
     joints_are: JointsOf = "model"
     accurate_at: str = ""
+    program: PlanProgram | None = None
 
     @property
     def joints(self) -> Array:
@@ -116,6 +120,7 @@ class Plan(Record):
             "left_out": list(made.left_out),
             **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
             "seconds": made.seconds,
+            **({} if self.program is None else {"program": self.program.summary()}),
             "prediction": {
                 "floor_mm": prediction.floor * 1e3,
                 "planned_mm": prediction.planned * 1e3,
@@ -147,10 +152,21 @@ class Plan(Record):
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
-        return [*text, *self.answer, *joints_lines(self.joints_are)]
+        driven = [] if self.program is None else self.program.lines()
+        return [*text, *self.answer, *joints_lines(self.joints_are), *driven]
 
-    def save(self, file: str | Path) -> tuple[Path, Path]:
+    def contents(self) -> dict[str, str]:
+        """Return the texts of all files of a plan with a program, by their names."""
+        from truearm.reporting.plan_report import plan_html
+        from truearm.reporting.plan_sheet import plan_sheet
+
+        texts = {TABLE: plan_csv(self.made, self.joints_are), PLAN_PAGE: plan_html(self)}
+        return texts if self.program is None else {**texts, SHEET: plan_sheet(self), **self.program.files}
+
+    def save(self, file: str | Path) -> tuple[Path, ...]:
         """Write the plan as CSV, and a page with the same name that ends in ``.html``.
+
+        A plan with a program is written into a folder, with the program and a sheet for the operator.
 
         Returns
         -------
@@ -158,6 +174,11 @@ class Plan(Record):
         """
         from truearm.reporting.plan_report import plan_html
 
+        if self.program is not None:
+            contents = self.contents()
+            folder = output_folder(file, contents, self.inputs, "file")
+            write_files(folder, contents, self.command)
+            return tuple(folder / name for name in contents)
         table = output_file(file, self.inputs)
         if table.suffix == PAGE:
             raise InputError("the plan is a CSV file", parameter="file", came=table.name, allowed="PLAN.csv")

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from truearm.compensation.programs.numbers import written
 from truearm.compensation.programs.new_targets import NewTargets, ascii_only
+from truearm.compensation.programs.numbers import written
 
 #: What a target is written as.
 TargetKind = Literal["joints", "pose"]

@@ -84,9 +84,14 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
         for value, name in zones.items()
         for wide, turn in [(number(1.5 * float(value), 3), number(0.15 * float(value), 3))]
     ]
-    lines += ["", f"  PROC {program.name}_main()", "    ConfL \\Off;", "    CirPathMode \\ObjectFrame;", *steps]
-    end = ["    CirPathMode \\PathFrame;", "    ConfL \\On;", "  ENDPROC", "ENDMODULE", ""]
-    return {f"{program.name}.mod": "\n".join([*lines, *end])}
+    if program.carried is None:
+        begins, ends = (
+            ("    ConfL \\Off;", "    CirPathMode \\ObjectFrame;"),
+            ("    CirPathMode \\PathFrame;", "    ConfL \\On;"),
+        )
+        steps = [*begins, *steps, *ends]
+    lines += ["", f"  PROC {program.name}_main()", *steps, "  ENDPROC", "ENDMODULE", ""]
+    return {f"{program.name}.mod": "\n".join(lines)}
 
 
 def _tooldata(carried: Carried) -> str:

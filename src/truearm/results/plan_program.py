@@ -1,0 +1,96 @@
+"""The measuring program of a plan: its texts, and what to know of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from truearm.compensation.plan_program import Driving
+from truearm.compensation.programs.motion_program import Carried, number
+from truearm.notices import Notice
+from truearm.planning.driving.tour import Tour
+from truearm.results.record import notice_lines, notice_summaries
+from truearm.shown import counted
+
+#: What is written beside a program: the plan as CSV, its page, and what the operator takes along.
+TABLE: Final = "plan.csv"
+PLAN_PAGE: Final = "plan.html"
+SHEET: Final = "sheet.html"
+#: What the robot waits for, in words.
+_WAITS: Final = {
+    "time": "",
+    "input": ", then for input {} up to {} s",
+    "operator": ", then until the operator starts it again",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PlanProgram:
+    """A program that drives a plan.
+
+    Attributes
+    ----------
+    language
+        Its name.
+    files
+        Texts by their names in the folder of the plan.
+    tour
+        What it drives.
+    driving
+        How fast, and for what it waits.
+    carried
+        What it tells the controller of the tool.
+    warnings
+        What to know about it.
+    """
+
+    language: str
+    files: Mapping[str, str]
+    tour: Tour
+    driving: Driving
+    carried: Carried
+    warnings: tuple[Notice, ...] = ()
+
+    @property
+    def answer(self) -> tuple[str, ...]:
+        """What it does, in words."""
+        driving, carried = self.driving, self.carried
+        stops = self.tour.stops
+        between = counted(sum(stop.kind == "via" for stop in stops), "stop")
+        approached = any(stop.kind == "approach" for stop in stops)
+        waits = _WAITS[driving.wait].format(driving.input, number(driving.longest, 2))
+        tip = f"target {carried.name}" if carried.name else "the flange"
+        return (
+            f"Measuring program in {self.language}: {counted(len(self.tour.measured), 'configuration')} with {between} "
+            f"on the way, from Home and back{', each approached from below' if approached else ''}.",
+            f"At most {number(1e3 * driving.speed, 1)} mm/s and {number(100 * driving.share, 2)} % of the joints' "
+            f"speed; it stands for {number(driving.dwell, 2)} s{waits}.",
+            f"It tells the controller of {tip} at ({', '.join(carried.tip_mm)}) mm and of {number(carried.mass, 3)} kg "
+            f"at ({', '.join(carried.cog_mm)}) mm.",
+            "It is not verified and no safety function: run it step by step first, at reduced speed, nobody near.",
+        )
+
+    def lines(self) -> list[str]:
+        """Return what it does, and what to know about it."""
+        return [*self.answer, *notice_lines(self.warnings)]
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        driving, carried = self.driving, self.carried
+        return {
+            "language": self.language,
+            "files": list(self.files),
+            "order": [stop.label for stop in self.tour.measured],
+            "stops_on_the_way": sum(stop.kind == "via" for stop in self.tour.stops),
+            "approached": any(stop.kind == "approach" for stop in self.tour.stops),
+            "speed_mm_s": 1e3 * driving.speed,
+            "joint_speed_percent": 100.0 * driving.share,
+            "dwell_s": driving.dwell,
+            "wait": driving.words,
+            "tip": carried.name or None,
+            "tip_mm": [1e3 * v for v in carried.tip],
+            "load_kg": carried.mass,
+            "load_cog_mm": [1e3 * v for v in carried.cog],
+            "warnings": notice_summaries(self.warnings),
+        }

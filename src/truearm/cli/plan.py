@@ -19,7 +19,7 @@ def plan(
     ],
     poses: Annotated[str, typer.Option(metavar="N|auto", help="How many configurations; auto lets O1 decide.")],
     out: Annotated[
-        Path, typer.Option("--out", metavar="PLAN.csv|FOLDER", help="File to write, and PLAN.html beside it.")
+        Path, typer.Option("--out", metavar="PLAN", help="CSV file to write, its page beside it; a folder with --program.")
     ],
     candidates_from: Annotated[
         str | None,

@@ -172,7 +172,7 @@ def _move(
     leading = float((turned / fast).max())
     share = driving.share if rate <= 0 else min(driving.share, driving.speed * leading / rate)
     seconds = max(float((turned / slow).max()) / driving.share, rate / driving.speed) + _RAMPS
-    return _whole(share, language), driving.speed, seconds, driving.share * float(slow.min())
+    return _whole(share, language), driving.speed, math.ceil(100.0 * seconds) / 100.0, driving.share * float(slow.min())
 
 
 def _whole(share: float, language: str) -> float:

@@ -235,11 +235,11 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
             )
         )
     if not (weighed and given.targets):
-        unsaid = [word for word, said in (("its load", weighed), ("its targets", bool(given.targets))) if not said]
+        unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
         found.append(
             Notice(
                 "tool-assumed",
-                f"Nobody said {' and '.join(unsaid)}: the program tells the controller of what is assumed. A "
+                f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is assumed. A "
                 "wrong load can stop the robot or let it give way. State `payload`, and the targets in the robot file.",
             )
         )

@@ -57,13 +57,15 @@ class PlanProgram:
         """What it does, in words."""
         driving, carried = self.driving, self.carried
         stops = self.tour.stops
-        between = counted(sum(stop.kind == "via" for stop in stops), "stop")
+        between = sum(stop.kind == "via" for stop in stops)
         approached = any(stop.kind == "approach" for stop in stops)
         waits = _WAITS[driving.wait].format(driving.input, number(driving.longest, 2))
         tip = f"target {carried.name}" if carried.name else "the flange"
+        way = [f"{counted(len(self.tour.measured), 'configuration')} from Home and back"]
+        way += [f"{counted(between, 'stop')} on the way"] if between else []
+        way += ["each approached from below"] if approached else []
         return (
-            f"Measuring program in {self.language}: {counted(len(self.tour.measured), 'configuration')} with {between} "
-            f"on the way, from Home and back{', each approached from below' if approached else ''}.",
+            f"Measuring program in {self.language}: {', '.join(way)}.",
             f"At most {number(1e3 * driving.speed, 1)} mm/s and {number(100 * driving.share, 2)} % of the joints' "
             f"speed; it stands for {number(driving.dwell, 2)} s{waits}.",
             f"It tells the controller of {tip} at ({', '.join(carried.tip_mm)}) mm and of {number(carried.mass, 3)} kg "

@@ -47,7 +47,7 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     if any(isinstance(step, InputWait | Pause) for step in program.steps):
         data.append(variable("nKey", "num", ['<Value key="0" value="0" />']))
     lines = [f"  // {line}" for line in program.comments]
-    lines += [] if program.carried is None else ["  // Set this load on the controller"]
+    lines += [] if program.carried is None else ["  // The controller must hold this load"]
     said: dict[str, str] = {}
 
     def say(name: str, value: str) -> None:

@@ -1,0 +1,339 @@
+"""The program that drives a plan: read back by the own reader, its speeds and waits, and run by the moving twin."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.plan_tours import a_tour
+
+from truearm.compensation.path_program import BY_NAME
+from truearm.compensation.plan_program import Driving, joint_rates, plan_program
+from truearm.compensation.programs.motion_program import JointMove, MotionProgram, Wait
+from truearm.compensation.programs.program import Program, Source
+from truearm.compensation.programs.urscript.measuring import FASTEST
+from truearm.library import load_robot
+from truearm.modeling.chain import Array
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.planning.driving.tour import Tour
+from truearm.simulation.moving.arm import DRIVES, MovingArm, last_moves
+from truearm.simulation.moving.interpolator import joint_move
+from truearm.simulation.truths import truth_twin
+
+ROBOTS = {
+    "rapid": "irb1600",
+    "krl": "kr5",
+    "fanuc-ls": "lrmate200ic",
+    "urscript": "ur5e",
+    "inform": "puma560",
+    "val3": "puma560",
+}
+WAITS = ("time", "input", "operator")
+
+
+@cache
+def toured(name: str, approach: bool) -> tuple[Robot, Tour]:
+    return a_tour(load_robot(ROBOTS[name]), approach=approach)
+
+
+@cache
+def made(name: str, driving: Driving | None = None, *, approach: bool = True) -> tuple[Robot, Tour, MotionProgram]:
+    robot, tour = toured(name, approach)
+    driving = driving or Driving(wait="input", input="3")
+    return robot, tour, plan_program(tour, robot, BY_NAME[name].name, driving, "0123456789ab")
+
+
+def text_of(name: str, program: MotionProgram) -> str:
+    motion = BY_NAME[name].motion
+    assert motion is not None
+    return "\n".join(motion(program).values())
+
+
+def read_again(name: str, program: MotionProgram) -> Program:
+    motion = BY_NAME[name].motion
+    assert motion is not None
+    sources = [Source(Path(file), text) for file, text in motion(program).items()]
+    assert all(source.text.isascii() for source in sources)
+    return BY_NAME[name].read(sources)
+
+
+def commanded(found: Program, count: int) -> Array:
+    """Return the joint positions of all moves as the controller takes them ``(moves, count)`` [rad or m]."""
+    targets = [found.targets[move.target] for move in found.moves]
+    assert {target.form.kind for target in targets} == {"joints"}
+    return np.array([target.values[:count] for target in targets]) * targets[0].form.angle
+
+
+def visited(found: Program) -> list[str]:
+    """Return the comment above each move."""
+    called = []
+    for move in found.moves:
+        lines = found.sources[move.source].text.splitlines()[: move.line - 1]
+        called.append(
+            next(
+                m[1]
+                for line in reversed(lines)
+                if (m := re.search(r"(Measure \S+|Home|On the way|Approach from below)", line))
+            )
+        )
+    return called
+
+
+@pytest.mark.parametrize("wait", WAITS)
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_own_reader_finds_the_planned_joint_positions_under_their_labels(name: str, wait: str) -> None:
+    robot, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
+    found = read_again(name, program)
+    assert found.skipped == ()
+    assert not found.unknown
+    assert {move.kind for move in found.moves} == {"joint"}
+    digit = 0.5e-6 if name == "urscript" else np.radians(0.5e-4)
+    went = robot.controller.to_model(commanded(found, len(robot.joints)))
+    shown = robot.controller.from_model(tour.joints)
+    assert np.abs(commanded(found, len(robot.joints)) - shown).max() <= digit * (1 + 1e-9)
+    assert np.abs(went - tour.joints).max() <= 2.1 * digit  # one joint may count another
+    expected = {"home": "Home", "via": "On the way", "approach": "Approach from below"}
+    assert visited(found) == [expected.get(stop.kind, f"Measure {stop.label}") for stop in tour.stops]
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_no_output_is_set_and_no_mode_changed(name: str) -> None:
+    for wait in WAITS:
+        text = text_of(name, made(name, Driving(wait=wait, input="3"))[2])  # type: ignore[arg-type]
+        for words in (
+            r"\bSetDO\b",
+            r"\bSet\s",
+            r"\bReset\s",
+            r"\bPulse",
+            r"\$OUT",
+            r"\bDO\[",
+            r"\bRO\[",
+            r"\bDOUT\b",
+            "_out",
+            "dioSet",
+        ):
+            assert not re.search(words, text), words
+        for words in (
+            "ConfL",
+            "CirPathMode",
+            "VelSet",
+            "AccSet",
+            "$OV_PRO",
+            "OVERRIDE",
+            "SPEED_SLIDER",
+            "setMonitorSpeed",
+            "workingMode",
+        ):
+            assert words not in text
+
+
+STOPS = {
+    "rapid": r"MoveAbsJ j\d+,s\d+(\\T:=[\d.]+)?,fine,tMeasure;",
+    "krl": r"  PTP \{[^}]*\}",
+    "fanuc-ls": r"J P\[\d+\] \d+% FINE    ;",
+    "urscript": r"  movej\(\[[^]]*\], v=0\.\d{4}\)",
+    "inform": r"MOVJ C\d{5} VJ=\d+\.00 PL=0",
+    "val3": r"  movej\(jPath\[\d+\],flange,mJoint\)",
+}
+STANDS = {
+    "rapid": {
+        "time": r"WaitTime \\InPos,2;",
+        "input": r"WaitDI di3,1\\MaxTime:=300\\TimeFlag:=late;\n    IF late THEN\n      TPWrite \"P001: no signal\";\n      Stop;\n    ENDIF",
+        "operator": r'TPWrite "P001: measure, then start again";\n    Stop;',
+    },
+    "krl": {
+        "time": r"WAIT SEC 2\n",
+        "input": r"\$TIMER\[20\] = -300000\n.*\n  WAIT FOR \$IN\[3\] OR \$TIMER_FLAG\[20\]\n  IF \$TIMER_FLAG\[20\] THEN\n    ; P001: no signal\n    HALT\n  ENDIF",
+        "operator": r"; P001: measure, then start again\n  HALT",
+    },
+    "fanuc-ls": {
+        "time": r"WAIT   2\.00\(sec\)",
+        "input": r"\$WAITTMOUT=30000    ;\n.*WAIT DI\[3\]=ON TIMEOUT,LBL\[1\]    ;\n.*JMP LBL\[2\]    ;\n.*LBL\[1\]    ;\n.*!P001: no signal    ;\n.*PAUSE    ;\n.*LBL\[2\]",
+        "operator": r"!Measure, then start again    ;\n.*PAUSE    ;",
+    },
+    "urscript": {
+        "time": r"sleep\(2\)",
+        "input": r"looks = 15000\n  while \(looks > 0 and get_standard_digital_in\(3\) == False\):\n    sleep\(0\.02\)\n    looks = looks - 1\n  end\n  if \(looks <= 0\):\n    popup\(\"P001: no signal\", blocking=True\)\n  end",
+        "operator": r'popup\("P001: measure, then go on", blocking=True\)',
+    },
+    "inform": {
+        "time": r"TIMER T=2\n",
+        "input": r"WAIT IN#\(3\)=ON T=300\.00\n'P001: no signal\nPAUSE IF IN#\(3\)=OFF",
+        "operator": r"'Measure, then start again\nPAUSE\n",
+    },
+    "val3": {
+        "time": r"waitEndMove\(\)\n  delay\(2\)",
+        "input": r'if watch\(diMeasure==true,300\)==false\n    userPage\(\)\n    putln\("P001: no signal, press a key"\)\n    nKey=get\(\)\n  endIf',
+        "operator": r'userPage\(\)\n  putln\("P001: measure, press a key"\)\n  nKey=get\(\)',
+    },
+}
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_robot_stops_stands_and_waits_in_every_configuration(name: str) -> None:
+    for wait in WAITS:
+        _, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
+        text = text_of(name, program)
+        assert len(re.findall(STOPS[name], text)) == len(tour.stops)
+        count = len(tour.measured)
+        assert sum(isinstance(step, Wait) for step in program.steps) == count
+        assert len(re.findall(STANDS[name]["time"], text)) == count
+        label = tour.measured[0].label
+        assert label == "P001"
+        for other in WAITS[1:]:
+            expected = 1 if other == wait and "P001" in STANDS[name][other] else count if other == wait else 0
+            assert len(re.findall(STANDS[name][other], text)) == expected, (wait, other)
+    assert ("BasicIO-1\\%I3" in text_of(name, made(name)[2])) == (name == "val3")
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_head_says_what_the_program_is(name: str) -> None:
+    robot, _, program = made(name)
+    text = text_of(name, program)
+    for words in (
+        f"Robot {robot.name}",
+        "Plan 0123456789ab",
+        "At most 250 mm/s and 10 %",
+        "Dwell 2 s, wait: input 3, 300 s",
+        "Not verified, no safety function",
+        "First run: step by step,",
+        "Go to Home by hand before it",
+    ):
+        assert len(words) <= 32
+        assert words in text
+    assert text == text_of(name, made(name)[2])
+
+
+def test_the_controller_is_told_of_the_tool_in_its_own_axes() -> None:
+    turned = Transform.from_matrix(
+        np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([0.0, 0.0, 0.01])
+    )
+    for name, words in {
+        "rapid": "PERS tooldata tMeasure:=[TRUE,[[20,-30,90],[1,0,0,0]],[1.5,[2,-1,30],[1,0,0,0],0,0,0]];",
+        "krl": "$LOAD = {M 1.5,CM {X 2,Y -1,Z 30,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}",
+        "fanuc-ls": "!PAYLOAD[1] must hold this load    ;",
+        "urscript": "set_tcp(p[0.02, -0.03, 0.09, 0, 0, 0])\n  set_payload(1.5, [0.002, -0.001, 0.03])",
+        "inform": "'Tool file 0 must hold this load",
+        "val3": "// The controller must hold this load",
+    }.items():
+        given = load_robot(ROBOTS[name])
+        given = given.with_frames(given.base, {"near": (0.0, 0.0, 0.02), "far": (0.03, 0.02, 0.1)})
+        given = replace(
+            given, controller=replace(given.controller, flange=turned), payload=Payload(1.5, (0.001, 0.002, 0.04))
+        )
+        robot, tour = a_tour(given)
+        program = plan_program(tour, robot, BY_NAME[name].name, Driving(), "abc")
+        text = text_of(name, program)
+        assert words in text
+        assert "Tip: target far at" in text
+        assert "Load 1.5 kg at" in text
+        found = read_again(name, program)
+        if name in ("rapid", "urscript"):
+            (load,) = found.loads.values()
+            assert load.mass == 1.5
+            assert load.cog == pytest.approx((0.002, -0.001, 0.03))
+
+
+def test_nothing_on_the_flange_weighs_as_little_as_a_tool_may() -> None:
+    bare = load_robot("irb120")
+    robot, tour = a_tour(bare.with_frames(bare.base, {"tip": (0.0, 0.0, 0.1)}))
+    text = text_of("rapid", plan_program(tour, robot, "RAPID", Driving(), "abc"))
+    assert "[0.001,[0,0,0.001],[1,0,0,0],0,0,0]" in text
+
+
+def durations(name: str, text: str, shown: Array, rates: Array) -> list[float]:
+    """Return how long the moves take at least that the text says, of joints with these rates at 100 %."""
+    turned = np.abs(np.diff(shown, axis=0))
+    if name == "rapid":
+        return [float(time) - 0.5 for time in re.findall(r"\\T:=([\d.]+)", text)]
+    if name == "urscript":
+        speeds = [float(v) for v in re.findall(r"v=([\d.]+)", text)][1:]
+        return [float(way.max()) / v for way, v in zip(turned, speeds, strict=True)]
+    pattern = {
+        "krl": r"VEL_AXIS\[1\] = (\d+)|PTP",
+        "fanuc-ls": r"J P\[\d+\] (\d+)%",
+        "inform": r"VJ=(\d+)",
+        "val3": r"mJoint\.vel=(\d+)|movej",
+    }
+    shares, last = [], 0.0
+    for found in re.finditer(pattern[name], text):
+        last = float(found[1]) / 100 if found[1] else last
+        if not found[1] or name in ("fanuc-ls", "inform"):
+            shares.append(last)
+    return [float((way / rates).max()) / share for way, share in zip(turned, shares[1:], strict=True)]
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+@pytest.mark.parametrize("driving", [Driving(), Driving(speed=0.1, share=0.3), Driving(speed=2.0, share=0.05)])
+def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Driving) -> None:
+    robot, tour, program = made(name, driving)
+    shown = robot.controller.from_model(tour.joints)
+    slow, fast = joint_rates(robot)
+    rates = np.full(len(slow), FASTEST) if name == "urscript" else fast
+    found = durations(name, text_of(name, program), shown, rates)
+    assert len(found) == len(tour.stops) - 1
+    fastest = 0.0
+    for start, end, seconds in zip(tour.joints[:-1], tour.joints[1:], found, strict=True):
+        along = start + np.linspace(0.0, 1.0, 400)[:, None] * (end - start)
+        for target in robot.targets:
+            steps = np.linalg.norm(np.diff(robot.forward(along, target=target.name)[0], axis=0), axis=1)
+            speed = float(steps.max()) * 399 / seconds
+            fastest = max(fastest, speed)
+            assert speed <= 1.03 * driving.speed or name in ("krl", "fanuc-ls", "inform", "val3")
+    shares = [step.share for step in program.steps if isinstance(step, JointMove)]
+    assert max(shares) <= driving.share + 1e-12
+    assert min(shares) >= 0.0 if name == "urscript" else 0.01
+    if name == "rapid":
+        joints = np.abs(np.diff(shown, axis=0)) / np.array(found)[:, None]
+        assert (joints <= driving.share * slow * (1 + 1e-2)).all()
+    if driving.speed > 0.1:  # whole percent are not so few there that 1 % is too fast
+        assert fastest <= 1.03 * driving.speed
+    assert fastest > 0.02 * driving.speed
+
+
+def test_the_first_move_is_slow_wherever_it_begins() -> None:
+    for name in BY_NAME:
+        _, _, program = made(name)
+        first, *others = (step for step in program.steps if isinstance(step, JointMove))
+        assert first.seconds is None
+        assert first.share <= min(step.share for step in others) + 1e-12 or name == "urscript"
+        assert first.turning < np.radians(20.0)
+
+
+def test_the_twin_driven_by_the_program_stands_in_all_configurations_in_order() -> None:
+    robot, tour = a_tour(load_robot("irb120"), count=5, approach=True)
+    program = plan_program(tour, robot, "RAPID", Driving(dwell=1.0), "abc")
+    found = read_again("rapid", program)
+    text = found.sources[0].text
+    shares = [float(v) for v in re.findall(r"\\T:=([\d.]+)", text)]
+    went = robot.controller.to_model(commanded(found, 6))
+    step = 4e-3
+    pieces, ends, now = [went[:1]], [], 1
+    for start, end, seconds in zip(went[:-1], went[1:], shares, strict=True):
+        moved = joint_move(start, end, np.abs(end - start).max() / (seconds - 0.5), DRIVES.acceleration, step)
+        stood = np.repeat(end[None], round(1.0 / step), axis=0)
+        pieces += [moved, stood]
+        now += len(moved) + len(stood)
+        ends.append(now - 1)
+    command = np.concatenate(pieces)
+    position, velocity = DRIVES.servo.follow(command, step)
+    labels = {stop.label: stop.joints for stop in tour.measured}
+    seen = [
+        next((label for label, joints in labels.items() if np.abs(joints - position[k]).max() < 1e-5), None)
+        for k in ends
+    ]
+    assert [label for label in seen if label] == [stop.label for stop in tour.measured]
+    assert np.abs(velocity[ends]).max() < 1e-6
+    twin = truth_twin(robot, "tracker-triangular", np.random.default_rng(0))
+    arm = MovingArm(robot, None, twin, Transform((0.05, 0.02, 0.1)), robot.payload)
+    rows = [k for k, label in zip(ends, seen, strict=True) if label]
+    approach = last_moves(command)[rows]
+    assert (approach == 1.0).all()  # every joint comes from below
+    frames = arm.at_rest(position[rows], approach, np.full(len(rows), np.inf))
+    assert np.isfinite(frames).all()

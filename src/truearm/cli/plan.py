@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from truearm.cli.ik import read_seed
 from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_beside, refuse_pull
 from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
 from truearm.cli.options import command_line
@@ -80,6 +81,31 @@ def plan(
     payload: PayloadText = None,
     gravity: GravityText = None,
     joints: JointsText = None,
+    floor: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="Height of the floor in the base frame, kept clear.",
+            show_default="0, and none where the robot hangs",
+        ),
+    ] = None,
+    no_floor: Annotated[bool, typer.Option("--no-floor", help="There is no floor to keep clear.")] = False,
+    clearance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="Room that the arm keeps to floor, boxes and its own links, on the ways too.",
+            show_default="50",
+        ),
+    ] = None,
+    home: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DEG,DEG,..",
+            help="The safe configuration to start and end in (mm if sliding), of the kind that is written.",
+            show_default="one is found",
+        ),
+    ] = None,
     pull: Pull = None,
     json: Json = False,
 ) -> None:
@@ -95,6 +121,7 @@ def plan(
 
         beside = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
         beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
+        beside |= {"floor": floor, "no_floor": no_floor or None, "clearance": clearance, "home": home}
         refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
         with progress() as say:
             pairs = plan_inclinometers(
@@ -140,6 +167,10 @@ def plan(
             payload=payload,
             gravity=read_gravity(gravity),
             joints=joints,  # type: ignore[arg-type]
+            floor=None if floor is None else sized_si(floor, "mm", parameter="floor"),
+            no_floor=no_floor,
+            clearance=None if clearance is None else sized_si(clearance, "mm", parameter="clearance"),
+            home=read_seed(robot, home, joints, "home"),
             command=command_line(),
             progress=say,
         )
@@ -147,7 +178,8 @@ def plan(
         print_json(planned.summary())
     else:
         print_record(planned)
-        print_line(f"Written: {out}, {out.with_suffix('.html')}")
+        ways = "" if planned.tour is None else f", {out.with_name(f'{out.stem}-ways.csv')}"
+        print_line(f"Written: {out}, {out.with_suffix('.html')}{ways}")
 
 
 def _poses(text: str) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -29,6 +30,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.jobs.driving import cell_argument, finder_argument
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
@@ -37,13 +39,14 @@ from truearm.modeling.robot import Robot
 from truearm.planning.choosing.measurement_plan import (
     ERROR,
     device_candidates,
+    driven_candidates,
     plan_measurements,
-    random_candidates,
     with_targets,
 )
 from truearm.planning.choosing.observability import INDICES
 from truearm.planning.constraints.constraints import Constraints, read_constraints
-from truearm.results.plan import PAGE, Plan
+from truearm.planning.driving.touring import tour_of, unreached
+from truearm.results.plan import PAGE, Plan, ways_beside
 
 
 def plan(
@@ -66,6 +69,10 @@ def plan(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     joints: JointsOf | None = None,
+    floor: float | None = None,
+    no_floor: bool = False,
+    clearance: float | None = None,
+    home: Sequence[float] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Plan:
@@ -110,6 +117,18 @@ def plan(
     joints
         Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
+    floor
+        Height of the floor in the base frame [m], 0 or less; None for 0, and for none where the robot's gravity says
+        that it does not stand. With a clearance it is kept by all that moves, as are the boxes of the constraints and
+        the arm's own links: in every configuration, and on the ways from the safe one to the first, on to each other
+        and back. Configurations that are given or that a device finds are checked if one of these four is said.
+    no_floor
+        Whether there is no floor.
+    clearance
+        Room to keep [m]; None for 50 mm.
+    home
+        The safe configuration in which the arm starts and ends, by the model [rad; m for prismatic joints]; None to
+        find one.
     command
         How to run it again, for the page; None writes the call in Python.
     progress
@@ -159,40 +178,69 @@ def plan(
         payload=carried,
         gravity=fall,
         joints=joints,
+        floor=floor,
+        no_floor=no_floor,
+        clearance=clearance,
+        home=home,
     )
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
-    labels, readings, own = None, None, bool(carrying.targets)
+    where = str(constraints) if isinstance(constraints, str | Path) else "constraints"
+    cell = cell_argument(carrying, rules, where, floor, no_floor, clearance)
+    # What a device touches stands where the arm may not be; what was measured was reached.
+    driven = candidates_from is None and instrument is None
+    driven = driven or no_floor or any(given is not None for given in (floor, clearance, home))
+    labels, readings, own, finder = None, None, bool(carrying.targets), None
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
         own = True
-    elif candidates_from is None:
-        seen = with_targets(carrying)
-        choice = random_candidates(seen, number, rng)
-    else:
+    elif candidates_from is not None:
         data = readings_argument(carrying, candidates_from, "candidates_from")
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
         own = own or bool(data.has_position.any())
+    else:
+        seen = with_targets(carrying)
+    if driven:
+        progress("looking where the arm keeps clear")
+        finder = finder_argument(seen, rules, where, cell, home)
+    if finder is not None and instrument is None and candidates_from is None:
+        choice = driven_candidates(seen, number, rng, finder)
     progress("looking where the robot shall be accurate")
     goal = accuracy_goal(seen, accurate_at, region, tools, frames, np.random.default_rng(seed))
-    progress(f"choosing among {len(choice)} configurations")
-    made = plan_measurements(
-        seen,
-        choice,
-        wanted,
-        poses=count,
-        rng=rng,
-        objective=objective or ("O1" if goal is None else ERROR),
-        accurate_at=None if goal is None else goal.postures,
-        noise=deviation,
-        labels=labels,
-        constraints=rules,
-        where=str(constraints) if isinstance(constraints, str | Path) else "constraints",
-        seen_from_the_origin=own,
-        readings=readings,
-    )
-    planned = Plan(made, call, files_of(*read), deviation, joints_are, "" if goal is None else goal.words)
+    left = np.arange(len(choice))
+    while True:
+        progress(f"choosing among {len(left)} configurations")
+        made = plan_measurements(
+            seen,
+            choice.at(left),
+            wanted,
+            poses=count,
+            rng=rng,
+            objective=objective or ("O1" if goal is None else ERROR),
+            accurate_at=None if goal is None else goal.postures,
+            noise=deviation,
+            labels=None if labels is None else tuple(labels[k] for k in left),
+            constraints=rules,
+            where=where,
+            seen_from_the_origin=own,
+            readings=None if readings is None else readings.of_configurations(left),
+            finder=finder,
+        )
+        if finder is None:
+            tour = None
+            break
+        progress("looking for ways that keep clear")
+        lost = unreached(finder, made.joints, made.before)
+        if not lost:
+            tour = tour_of(finder, made.joints, made.labels, made.before)
+            break
+        left = np.delete(left, made.chosen[lost])
+    without = len(choice) - len(left)
+    if without:
+        made = replace(made, chosen=left[made.chosen], candidates=len(choice), rejected={**made.rejected, "ways": without})
+    words = "" if goal is None else goal.words
+    planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
     if table is not None:
         progress("writing the files")
         planned.save(table)
@@ -205,6 +253,7 @@ def _files(out: object, *read: object) -> Path:
     if table.suffix == PAGE:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
     file_for(table.with_suffix(PAGE), *read)
+    file_for(ways_beside(table), *read)
     return table
 
 

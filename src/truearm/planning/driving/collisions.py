@@ -208,7 +208,7 @@ class CollisionCheck:
         return found
 
     def _moving(self) -> list[Capsule]:
-        """The capsules that move; the first of them without what is next to its fixed end."""
+        """Return the capsules that move."""
         fixed = self.arm.fixed
         return [c for c in (*self.arm.links, *self.arm.tools) if not (c.start in fixed and c.end in fixed)]
 

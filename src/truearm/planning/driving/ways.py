@@ -55,7 +55,7 @@ class WayFinder:
     def __init__(self, check: CollisionCheck, home: Array, low: Array, high: Array) -> None:
         self.check, self.home = check, home
         self.low, self.high = low, high
-        self._roomy: tuple[Array, Array, list[Way]] | None = None
+        self._roomy: tuple[Array, list[Way]] | None = None
         joints = len(home)
         self._shares = np.array([[(n >> j) & 1 for j in range(joints)] for n in range(1, 2**joints - 1)], bool)
 
@@ -120,7 +120,7 @@ class WayFinder:
         return None
 
     def _with_room(self) -> tuple[Array, list[Way]]:
-        """Configurations with much room, and their ways home."""
+        """Return configurations with much room, and their ways home."""
         if self._roomy is None:
             drawn = np.random.default_rng(0).uniform(self.low, self.high, (_DRAWN, len(self.low)))
             room = self.check.room(drawn)
@@ -133,8 +133,8 @@ class WayFinder:
                 way = way or self._around(at[k], self.home)
                 if way is not None:
                     known.append((k, way))
-            self._roomy = at[[k for k, _ in known]], at, [way for _, way in known]
-        return self._roomy[0], self._roomy[2]
+            self._roomy = at[[k for k, _ in known]], [way for _, way in known]
+        return self._roomy
 
 
 def touched(check: CollisionCheck, joints: Array) -> tuple[int, float, str] | None:

@@ -238,7 +238,8 @@ def plan(
         left = np.delete(left, made.chosen[lost])
     without = len(choice) - len(left)
     if without:
-        made = replace(made, chosen=left[made.chosen], candidates=len(choice), rejected={**made.rejected, "ways": without})
+        rejected = {**made.rejected, "ways": without}
+        made = replace(made, chosen=left[made.chosen], candidates=len(choice), rejected=rejected)
     words = "" if goal is None else goal.words
     planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
     if table is not None:

@@ -355,14 +355,14 @@ def _in_words(readings: Dataset) -> tuple[str, ...]:
 
 
 def before(robot: Robot, joints: Array, low: Array | None = None) -> Array:
-    """Return where each joint stops before configurations ``(n, joints)``, no lower than `low` or the robot's limits."""
+    """Return where each joint stops before configurations ``(n, joints)``, no lower than `low`, or its limits."""
     if low is None:
         low = np.array([-np.inf if joint.limits is None else joint.limits[0] for joint in robot.joints])
     return np.asarray(np.minimum(np.maximum(joints - _approach(robot), low), joints))
 
 
 def _elsewhere(robot: Robot, finder: WayFinder | None, rng: np.random.Generator) -> Postures:
-    """Return configurations at which the accuracy is predicted: all over the robot's own limits, those that are clear."""
+    """Return configurations at which the accuracy is predicted: all over the robot's own limits, where it is clear."""
     if finder is None:
         return random_candidates(robot, _PREDICTED_CONFIGURATIONS, rng)
     low, high = joint_window(robot)

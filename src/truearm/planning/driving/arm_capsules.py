@@ -61,6 +61,7 @@ class ArmCapsules:
         self.targets = tuple(target.name for target in robot.targets)
         if len(self.targets) > _MOST_TARGETS:
             self.targets = self._outermost()
+            del self.__dict__["_places"]
 
     def points(self, q: Array) -> Array:
         """Return the points at joint positions ``(n, joints)`` [m], ``(points, 3, n)``."""
@@ -69,7 +70,9 @@ class ArmCapsules:
         points = [np.zeros(shape)]
         points += [np.broadcast_to(kinematics.origin(i), shape) for i in self.robot.moving[: self.joints]]
         points.append(kinematics.position)
-        points += [self.robot.world_poses(q, name)[0].T for name in self.targets]
+        if self.targets:
+            rotation = kinematics.matrix()
+            points += [kinematics.position + (rotation @ place).T for place in self._places]
         return np.array(points)
 
     @cached_property
@@ -133,7 +136,12 @@ class ArmCapsules:
             point += 1
         return point
 
+    @cached_property
+    def _places(self) -> list[Array]:
+        """Where targets are on the flange [m]."""
+        return [np.array(self.robot.tool_place(name).translation) for name in self.targets]
+
     def _outermost(self) -> tuple[str, ...]:
-        places = np.array([self.robot.tool_place(name).translation for name in self.targets])
+        places = np.array(self._places)
         ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
         return tuple(self.targets[k] for k in sorted({int(k) for k in np.argmax(places @ ways.T, axis=0)}))

@@ -8,6 +8,7 @@ the other, so that two postures with much room answer for what lies between them
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -195,6 +196,7 @@ class CollisionCheck:
 
     def _measured(self, rooms: list[_Room], points: Array) -> Array:
         found = np.empty((len(rooms), points.shape[2]))
+        pairs: list[tuple[int, _Piece, _Piece]] = []
         for k, room in enumerate(rooms):
             if room.piece is None:
                 assert self.cell.floor is not None
@@ -203,8 +205,11 @@ class CollisionCheck:
                 box = self.cell.boxes[room.box]
                 found[k] = box_distance(*room.piece.ends(points), box.low, box.high) - room.piece.capsule.radius
             else:
-                apart = segment_distance(*room.piece.ends(points), *room.other.ends(points))
-                found[k] = apart - room.piece.capsule.radius - room.other.capsule.radius
+                pairs.append((k, room.piece, room.other))
+        if pairs:
+            rows, one, other = zip(*pairs, strict=True)
+            radii = np.array([a.capsule.radius + b.capsule.radius for a, b in zip(one, other, strict=True)])
+            found[list(rows)] = segment_distance(*_ends(one, points), *_ends(other, points)) - radii[:, None]
         return found
 
     def _moving(self) -> list[Capsule]:
@@ -296,6 +301,14 @@ class CollisionCheck:
                     allowed="a box beside the base, or below it: in the base frame",
                     cure="Check its unit, and that it is in the base frame of the robot.",
                 )
+
+
+def _ends(pieces: Sequence[_Piece], points: Array) -> tuple[Array, Array]:
+    """Return both ends of pieces, each ``(pieces, 3, n)``."""
+    start = points[[piece.capsule.start for piece in pieces]]
+    along = points[[piece.capsule.end for piece in pieces]] - start
+    first, last = (np.array(share)[:, None, None] for share in zip(*((p.first, p.last) for p in pieces), strict=True))
+    return start + first * along, start + last * along
 
 
 def _least(rooms: Array) -> tuple[Array, NDArray[np.intp]]:

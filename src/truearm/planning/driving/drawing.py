@@ -45,7 +45,7 @@ def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.G
         q = q[np.all([*kept.values(), np.ones(count, bool)], axis=0)]
         q = q[finder.check.ways(np.maximum(q - approach, low), q).clear]
         home = np.broadcast_to(finder.home, q.shape)
-        ways = finder.check.ways(q, home).clear & finder.check.ways(np.maximum(q - approach, low), home).clear
+        ways = finder.check.ways(q, home).clear
         straight, clear = np.concatenate([straight, q[ways]]), np.concatenate([clear, q])
     if not len(clear):
         cost = ", ".join(f"{name} {number}" for name, number in lost.items() if number)

@@ -16,10 +16,11 @@ from truearm.planning.driving.ways import Way, WayFinder
 def unreached(finder: WayFinder, joints: Array, before: Array | None) -> list[int]:
     """Return the numbers of configurations ``(n, joints)`` to which no way from the safe one was found."""
     entered = joints if before is None else before
-    clear = finder.check.ways(entered, joints).clear
-    ways = [finder.home_from(at[None])[0] if ok else None for at, ok in zip(entered, clear, strict=True)]
-    back = [finder.home_from(at[None])[0] if ok else None for at, ok in zip(joints, clear, strict=True)]
-    return [k for k, (there, here) in enumerate(zip(ways, back, strict=True)) if there is None or here is None]
+    clear = np.flatnonzero(finder.check.ways(entered, joints).clear)
+    there, back = finder.home_from(entered[clear]), finder.home_from(joints[clear])
+    ways = zip(clear.tolist(), there, back, strict=True)
+    reached = {k for k, one, other in ways if one is not None and other is not None}
+    return [k for k in range(len(joints)) if k not in reached]
 
 
 def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Array | None = None) -> Tour:

@@ -144,22 +144,35 @@ STOPS = {
 STANDS = {
     "rapid": {
         "time": r"WaitTime \\InPos,2;",
-        "input": r"WaitDI di3,1\\MaxTime:=300\\TimeFlag:=late;\n    IF late THEN\n      TPWrite \"P001: no signal\";\n      Stop;\n    ENDIF",
+        "input": (
+            r"WaitDI di3,1\\MaxTime:=300\\TimeFlag:=late;\n    IF late THEN\n"
+            r"      TPWrite \"P001: no signal\";\n      Stop;\n    ENDIF"
+        ),
         "operator": r'TPWrite "P001: measure, then start again";\n    Stop;',
     },
     "krl": {
         "time": r"WAIT SEC 2\n",
-        "input": r"\$TIMER\[20\] = -300000\n.*\n  WAIT FOR \$IN\[3\] OR \$TIMER_FLAG\[20\]\n  IF \$TIMER_FLAG\[20\] THEN\n    ; P001: no signal\n    HALT\n  ENDIF",
+        "input": (
+            r"\$TIMER\[20\] = -300000\n.*\n  WAIT FOR \$IN\[3\] OR \$TIMER_FLAG\[20\]\n"
+            r"  IF \$TIMER_FLAG\[20\] THEN\n    ; P001: no signal\n    HALT\n  ENDIF"
+        ),
         "operator": r"; P001: measure, then start again\n  HALT",
     },
     "fanuc-ls": {
         "time": r"WAIT   2\.00\(sec\)",
-        "input": r"\$WAITTMOUT=30000    ;\n.*WAIT DI\[3\]=ON TIMEOUT,LBL\[1\]    ;\n.*JMP LBL\[2\]    ;\n.*LBL\[1\]    ;\n.*!P001: no signal    ;\n.*PAUSE    ;\n.*LBL\[2\]",
+        "input": (
+            r"\$WAITTMOUT=30000    ;\n.*WAIT DI\[3\]=ON TIMEOUT,LBL\[1\]    ;\n.*JMP LBL\[2\]    ;\n"
+            r".*LBL\[1\]    ;\n.*!P001: no signal    ;\n.*PAUSE    ;\n.*LBL\[2\]"
+        ),
         "operator": r"!Measure, then start again    ;\n.*PAUSE    ;",
     },
     "urscript": {
         "time": r"sleep\(2\)",
-        "input": r"looks = 15000\n  while \(looks > 0 and get_standard_digital_in\(3\) == False\):\n    sleep\(0\.02\)\n    looks = looks - 1\n  end\n  if \(looks <= 0\):\n    popup\(\"P001: no signal\", blocking=True\)\n  end",
+        "input": (
+            r"looks = 15000\n  while \(looks > 0 and get_standard_digital_in\(3\) == False\):\n"
+            r"    sleep\(0\.02\)\n    looks = looks - 1\n  end\n  if \(looks <= 0\):\n"
+            r"    popup\(\"P001: no signal\", blocking=True\)\n  end"
+        ),
         "operator": r'popup\("P001: measure, then go on", blocking=True\)',
     },
     "inform": {
@@ -169,7 +182,10 @@ STANDS = {
     },
     "val3": {
         "time": r"waitEndMove\(\)\n  delay\(2\)",
-        "input": r'if watch\(diMeasure==true,300\)==false\n    userPage\(\)\n    putln\("P001: no signal, press a key"\)\n    nKey=get\(\)\n  endIf',
+        "input": (
+            r"if watch\(diMeasure==true,300\)==false\n    userPage\(\)\n"
+            r'    putln\("P001: no signal, press a key"\)\n    nKey=get\(\)\n  endIf'
+        ),
         "operator": r'userPage\(\)\n  putln\("P001: measure, press a key"\)\n  nKey=get\(\)',
     },
 }

@@ -93,7 +93,7 @@ def ik(
         raise typer.Exit(3)
 
 
-def read_seed(robot: str, text: str | None, joints: str | None) -> list[float] | None:
+def read_seed(robot: str, text: str | None, joints: str | None, parameter: str = "seed") -> list[float] | None:
     """Return the model's joint positions [rad or m] that a text in deg or mm names, of the kind that is written."""
     if text is None:
         return None
@@ -102,7 +102,7 @@ def read_seed(robot: str, text: str | None, joints: str | None) -> list[float] |
     from truearm.jobs.arguments import joints_argument, robot_argument
 
     loaded = robot_argument(robot)
-    given = np.array([read_joints(text, loaded, "seed")])
+    given = np.array([read_joints(text, loaded, parameter)])
     if joints_argument(joints, loaded) == "controller":
         given = loaded.controller.to_model(given)
     return [float(value) for value in given[0]]

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from truearm.cli.ik import read_seed
 from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_beside, refuse_pull
 from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity, read_numbers
 from truearm.cli.options import command_line
@@ -19,7 +20,8 @@ def plan(
     ],
     poses: Annotated[str, typer.Option(metavar="N|auto", help="How many configurations; auto lets O1 decide.")],
     out: Annotated[
-        Path, typer.Option("--out", metavar="PLAN", help="CSV file to write, its page beside it; a folder with --program.")
+        Path,
+        typer.Option("--out", metavar="PLAN", help="CSV file to write, its page beside it; a folder with --program."),
     ],
     candidates_from: Annotated[
         str | None,
@@ -82,6 +84,31 @@ def plan(
     payload: PayloadText = None,
     gravity: GravityText = None,
     joints: JointsText = None,
+    floor: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="Height of the floor in the base frame, kept clear.",
+            show_default="0, and none where the robot hangs",
+        ),
+    ] = None,
+    no_floor: Annotated[bool, typer.Option("--no-floor", help="There is no floor to keep clear.")] = False,
+    clearance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="Room that the arm keeps to floor, boxes and its own links, on the ways too.",
+            show_default="50",
+        ),
+    ] = None,
+    home: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DEG,DEG,..",
+            help="The safe configuration to start and end in (mm if sliding), of the kind that is written.",
+            show_default="one is found",
+        ),
+    ] = None,
     program: Annotated[
         str | None,
         typer.Option(
@@ -126,6 +153,7 @@ def plan(
 
         beside = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
         beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
+        beside |= {"floor": floor, "no_floor": no_floor or None, "clearance": clearance, "home": home}
         beside |= {"program": program, "approach": approach or None, "speed": speed, "dwell": dwell, "wait": wait}
         refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
         with progress() as say:
@@ -172,6 +200,10 @@ def plan(
             payload=payload,
             gravity=read_gravity(gravity),
             joints=joints,  # type: ignore[arg-type]
+            floor=None if floor is None else sized_si(floor, "mm", parameter="floor"),
+            no_floor=no_floor,
+            clearance=None if clearance is None else sized_si(clearance, "mm", parameter="clearance"),
+            home=read_seed(robot, home, joints, "home"),
             program=program,
             approach=approach,
             speed=_speed(speed),
@@ -185,7 +217,8 @@ def plan(
         return
     print_record(planned)
     if planned.program is None:
-        print_line(f"Written: {out}, {out.with_suffix('.html')}")
+        ways = "" if planned.tour is None else f", {out.with_name(f'{out.stem}-ways.csv')}"
+        print_line(f"Written: {out}, {out.with_suffix('.html')}{ways}")
     else:
         print_line(f"Written to {out}: {', '.join(planned.contents())}")
 

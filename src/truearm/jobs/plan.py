@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -30,6 +31,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.jobs.driving import cell_argument, finder_argument
 from truearm.jobs.plan_programs import program_wanted, with_program
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -39,14 +41,15 @@ from truearm.modeling.robot import Robot
 from truearm.planning.choosing.measurement_plan import (
     ERROR,
     device_candidates,
+    driven_candidates,
     plan_measurements,
-    random_candidates,
     with_targets,
 )
 from truearm.planning.choosing.observability import INDICES
 from truearm.planning.constraints.constraints import Constraints, read_constraints
-from truearm.results.plan import PAGE, Plan
-from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE
+from truearm.planning.driving.touring import tour_of, unreached
+from truearm.results.plan import PAGE, Plan, ways_beside
+from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS
 
 
 def plan(
@@ -69,6 +72,10 @@ def plan(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     joints: JointsOf | None = None,
+    floor: float | None = None,
+    no_floor: bool = False,
+    clearance: float | None = None,
+    home: Sequence[float] | None = None,
     program: str | None = None,
     approach: bool = False,
     speed: Sequence[float] | None = None,
@@ -119,6 +126,18 @@ def plan(
     joints
         Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
+    floor
+        Height of the floor in the base frame [m], 0 or less; None for 0, and for none where the robot's gravity says
+        that it does not stand. With a clearance it is kept by all that moves, as are the boxes of the constraints and
+        the arm's own links: in every configuration, and on the ways from the safe one to the first, on to each other
+        and back. Configurations that are given or that a device finds are checked if one of these four is said.
+    no_floor
+        Whether there is no floor.
+    clearance
+        Room to keep [m]; None for 50 mm.
+    home
+        The safe configuration in which the arm starts and ends, by the model [rad; m for prismatic joints]; None to
+        find one.
     program
         Language of a program that drives the plan: ``rapid``, ``krl``, ``fanuc``, ``urscript``, ``inform`` or ``val3``;
         None writes none.
@@ -182,6 +201,10 @@ def plan(
         payload=carried,
         gravity=fall,
         joints=joints,
+        floor=floor,
+        no_floor=no_floor,
+        clearance=clearance,
+        home=home,
         program=program,
         approach=approach,
         speed=speed,
@@ -193,39 +216,66 @@ def plan(
     joints_are = joints_argument(joints, carrying)
     if wanted_program is not None:
         wanted_program.check(carrying)
-    labels, readings, own = None, None, bool(carrying.targets)
+    where = str(constraints) if isinstance(constraints, str | Path) else "constraints"
+    cell = cell_argument(carrying, rules, where, floor, no_floor, clearance)
+    # What a device touches stands where the arm may not be; what was measured was reached.
+    driven = wanted_program is not None or (candidates_from is None and instrument is None)
+    driven = driven or no_floor or any(given is not None for given in (floor, clearance, home))
+    labels, readings, own, finder = None, None, bool(carrying.targets), None
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
         own = True
-    elif candidates_from is None:
-        seen = with_targets(carrying)
-        choice = random_candidates(seen, number, rng)
-    else:
+    elif candidates_from is not None:
         data = readings_argument(carrying, candidates_from, "candidates_from")
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
         own = own or bool(data.has_position.any())
+    else:
+        seen = with_targets(carrying)
+    if driven:
+        progress("looking where the arm keeps clear")
+        finder = finder_argument(seen, rules, where, cell, home)
+    if finder is not None and instrument is None and candidates_from is None:
+        choice = driven_candidates(seen, number, rng, finder)
     progress("looking where the robot shall be accurate")
     goal = accuracy_goal(seen, accurate_at, region, tools, frames, np.random.default_rng(seed))
-    progress(f"choosing among {len(choice)} configurations")
-    made = plan_measurements(
-        seen,
-        choice,
-        wanted,
-        poses=count,
-        rng=rng,
-        objective=objective or ("O1" if goal is None else ERROR),
-        accurate_at=None if goal is None else goal.postures,
-        noise=deviation,
-        labels=labels,
-        constraints=rules,
-        where=str(constraints) if isinstance(constraints, str | Path) else "constraints",
-        seen_from_the_origin=own,
-        readings=readings,
-    )
-    planned = Plan(made, call, files_of(*read), deviation, joints_are, "" if goal is None else goal.words)
+    left = np.arange(len(choice))
+    while True:
+        progress(f"choosing among {len(left)} configurations")
+        made = plan_measurements(
+            seen,
+            choice.at(left),
+            wanted,
+            poses=count,
+            rng=rng,
+            objective=objective or ("O1" if goal is None else ERROR),
+            accurate_at=None if goal is None else goal.postures,
+            noise=deviation,
+            labels=None if labels is None else tuple(labels[k] for k in left),
+            constraints=rules,
+            where=where,
+            seen_from_the_origin=own,
+            readings=None if readings is None else readings.of_configurations(left),
+            finder=finder,
+        )
+        if finder is None:
+            tour = None
+            break
+        progress("looking for ways that keep clear")
+        lost = unreached(finder, made.joints, made.before)
+        if not lost:
+            stops = made.before if wanted_program is None or wanted_program.approach else None
+            tour = tour_of(finder, made.joints, made.labels, stops)
+            break
+        left = np.delete(left, made.chosen[lost])
+    without = len(choice) - len(left)
+    if without:
+        rejected = {**made.rejected, "ways": without}
+        made = replace(made, chosen=left[made.chosen], candidates=len(choice), rejected=rejected)
+    words = "" if goal is None else goal.words
+    planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
     if wanted_program is not None:
         weighed = payload is not None or carrying.payload != NO_PAYLOAD
-        planned = with_program(planned, wanted_program, _tour(made, wanted_program.approach), carrying, weighed=weighed)
+        planned = with_program(planned, wanted_program, carrying, weighed=weighed)
     if table is not None:
         progress("writing the files")
         planned.save(table)
@@ -238,18 +288,8 @@ def _files(out: object, *read: object) -> Path:
     if table.suffix == PAGE:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
     file_for(table.with_suffix(PAGE), *read)
+    file_for(ways_beside(table), *read)
     return table
-
-
-def _tour(made, approach):  # to be replaced
-    from truearm.planning.driving.tour import Stop, Tour
-
-    home = Stop(np.array([*made.joints[:1, 0] * 0, *made.joints[0, 1:] * 0]), "home")
-    stops = [home]
-    for q, b, label in zip(made.joints, made.before, made.labels, strict=True):
-        stops += [Stop(b, "approach")] if approach else []
-        stops.append(Stop(q, "measure", label))
-    return Tour((*stops, home), None, 0.05, 0.1)
 
 
 def _folder(out: object, *read: object) -> Path:
@@ -258,7 +298,7 @@ def _folder(out: object, *read: object) -> Path:
         raise InputError(
             "a plan with a program needs a folder", parameter="out", came=str(out), cure="Name a folder, or no program."
         )
-    return folder_beside((TABLE, PLAN_PAGE, SHEET), TABLE, out, *read)
+    return folder_beside((TABLE, PLAN_PAGE, WAYS, SHEET), TABLE, out, *read)
 
 
 def _rules(constraints: object) -> Constraints | None:

@@ -19,7 +19,6 @@ from truearm.manifest import hash_of
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
-from truearm.planning.driving.tour import Tour
 from truearm.results.plan import Plan
 from truearm.results.plan_program import PlanProgram
 from truearm.units import as_number
@@ -129,23 +128,22 @@ def program_wanted(program: object, approach: object, speed: Any, dwell: object,
     return ProgramWanted(str(program), language, driving, from_below)
 
 
-def with_program(planned: Plan, wanted: ProgramWanted, tour: Tour, given: Robot, *, weighed: bool) -> Plan:
+def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed: bool) -> Plan:
     """Return a plan with the program that drives it.
 
     Parameters
     ----------
     planned
-        Whose robot has its targets and what it carries, maybe assumed.
+        Whose ways were checked; its robot has targets and what it carries, maybe assumed.
     wanted
         What was asked for.
-    tour
-        Whose ways were checked.
     given
         The robot as the user has it.
     weighed
         Whether the user said what it carries.
     """
-    language, robot = wanted.language, planned.made.robot
+    language, robot, tour = wanted.language, planned.made.robot, planned.tour
+    assert tour is not None
     wanted.check_labels([str(stop.label) for stop in tour.measured])
     mark = hash_of(plan_csv(planned.made, planned.joints_are).encode())[:_MARK]
     program = plan_program(tour, robot, language.name, wanted.driving, mark)
@@ -239,8 +237,9 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
         found.append(
             Notice(
                 "tool-assumed",
-                f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is assumed. A "
-                "wrong load can stop the robot or let it give way. State `payload`, and the targets in the robot file.",
+                f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is "
+                "assumed. A wrong load can stop the robot or let it give way. State `payload`, and the targets in the "
+                "robot file.",
             )
         )
     slow, fast = (math.degrees(rate) for rate in (joint_rates(robot)[0].min(), joint_rates(robot)[1].max()))

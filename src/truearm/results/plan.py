@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -12,7 +13,9 @@ from truearm.modeling.controller import JointsOf
 from truearm.planning.choosing.measurement_plan import ERROR, MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.choosing.prediction import There
-from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, PlanProgram
+from truearm.planning.driving.tour import Tour
+from truearm.planning.driving.tour_table import home_shown, tour_csv, tour_words
+from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.results.record import Record, joints_lines
 from truearm.writing import output_file, output_folder, write_files
 
@@ -38,6 +41,8 @@ class Plan(Record):
         Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     accurate_at
         Where the robot shall be accurate, in words; empty for everywhere.
+    tour
+        How the configurations are driven, each way checked; None where nothing was checked.
     program
         What drives it; None where no program was asked for.
     """
@@ -48,6 +53,7 @@ class Plan(Record):
     noise: float = 1e-4
     joints_are: JointsOf = "model"
     accurate_at: str = ""
+    tour: Tour | None = None
     program: PlanProgram | None = None
 
     @property
@@ -118,6 +124,7 @@ class Plan(Record):
             "usable": made.usable,
             "rejected": dict(made.rejected),
             "left_out": list(made.left_out),
+            **self._tour_summary(),
             **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
             "seconds": made.seconds,
             **({} if self.program is None else {"program": self.program.summary()}),
@@ -144,6 +151,21 @@ class Plan(Record):
             "by_O1_mean_mm": None if there.by_o1 is None else 1e3 * float(there.by_o1.mean()),
         }
 
+    def _tour_summary(self) -> dict[str, Any]:
+        tour = self.tour
+        if tour is None:
+            return {}
+        return {
+            "ways": {
+                "moves": len(tour.stops) - 1,
+                "via_points": sum(stop.kind == "via" for stop in tour.stops),
+                "home": home_shown(tour.home, self.made.robot, self.joints_are),
+                "floor_mm": None if tour.floor is None else 1e3 * tour.floor,
+                "clearance_mm": 1e3 * tour.clearance,
+                "room_mm": 1e3 * tour.room if math.isfinite(tour.room) else None,
+            }
+        }
+
     def lines(self) -> list[str]:
         """Return what was chosen, what constraints cost, and how accurate the calibration will be."""
         made = self.made
@@ -152,6 +174,8 @@ class Plan(Record):
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
+        if self.tour is not None:
+            text += tour_words(self.tour, made.robot, self.joints_are)
         driven = [] if self.program is None else self.program.lines()
         return [*text, *self.answer, *joints_lines(self.joints_are), *driven]
 
@@ -160,17 +184,24 @@ class Plan(Record):
         from truearm.reporting.plan_report import plan_html
         from truearm.reporting.plan_sheet import plan_sheet
 
-        texts = {TABLE: plan_csv(self.made, self.joints_are), PLAN_PAGE: plan_html(self)}
-        return texts if self.program is None else {**texts, SHEET: plan_sheet(self), **self.program.files}
+        assert self.program is not None
+        assert self.tour is not None
+        return {
+            TABLE: plan_csv(self.made, self.joints_are),
+            PLAN_PAGE: plan_html(self),
+            WAYS: tour_csv(self.tour, self.made.robot, self.joints_are),
+            SHEET: plan_sheet(self),
+            **self.program.files,
+        }
 
     def save(self, file: str | Path) -> tuple[Path, ...]:
-        """Write the plan as CSV, and a page with the same name that ends in ``.html``.
+        """Write the plan as CSV, a page with the same name that ends in ``.html``, and the ways if they were checked.
 
         A plan with a program is written into a folder, with the program and a sheet for the operator.
 
         Returns
         -------
-        The files written.
+        The files written; all stops on the ways are in the one that ends in ``-ways.csv``.
         """
         from truearm.reporting.plan_report import plan_html
 
@@ -183,7 +214,14 @@ class Plan(Record):
         if table.suffix == PAGE:
             raise InputError("the plan is a CSV file", parameter="file", came=table.name, allowed="PLAN.csv")
         page = output_file(table.with_suffix(PAGE), self.inputs)
-        write_files(
-            table.parent, {table.name: plan_csv(self.made, self.joints_are), page.name: plan_html(self)}, self.command
-        )
-        return table, page
+        texts = {table.name: plan_csv(self.made, self.joints_are), page.name: plan_html(self)}
+        if self.tour is not None:
+            ways = output_file(ways_beside(table), self.inputs)
+            texts[ways.name] = tour_csv(self.tour, self.made.robot, self.joints_are)
+        write_files(table.parent, texts, self.command)
+        return tuple(table.parent / name for name in texts)
+
+
+def ways_beside(table: Path) -> Path:
+    """Return where the stops of a plan are written."""
+    return table.with_name(f"{table.stem}-ways.csv")

@@ -13,9 +13,10 @@ from truearm.planning.driving.tour import Tour
 from truearm.results.record import notice_lines, notice_summaries
 from truearm.shown import counted
 
-#: What is written beside a program: the plan as CSV, its page, and what the operator takes along.
+#: What is written beside a program: the plan as CSV, its page, all stops, and what the operator takes along.
 TABLE: Final = "plan.csv"
 PLAN_PAGE: Final = "plan.html"
+WAYS: Final = "plan-ways.csv"
 SHEET: Final = "sheet.html"
 #: What the robot waits for, in words.
 _WAITS: Final = {
@@ -56,13 +57,10 @@ class PlanProgram:
     def answer(self) -> tuple[str, ...]:
         """What it does, in words."""
         driving, carried = self.driving, self.carried
-        stops = self.tour.stops
-        between = sum(stop.kind == "via" for stop in stops)
-        approached = any(stop.kind == "approach" for stop in stops)
+        approached = any(stop.kind == "approach" for stop in self.tour.stops)
         waits = _WAITS[driving.wait].format(driving.input, number(driving.longest, 2))
         tip = f"target {carried.name}" if carried.name else "the flange"
         way = [f"{counted(len(self.tour.measured), 'configuration')} from Home and back"]
-        way += [f"{counted(between, 'stop')} on the way"] if between else []
         way += ["each approached from below"] if approached else []
         return (
             f"Measuring program in {self.language}: {', '.join(way)}.",
@@ -84,7 +82,6 @@ class PlanProgram:
             "language": self.language,
             "files": list(self.files),
             "order": [stop.label for stop in self.tour.measured],
-            "stops_on_the_way": sum(stop.kind == "via" for stop in self.tour.stops),
             "approached": any(stop.kind == "approach" for stop in self.tour.stops),
             "speed_mm_s": 1e3 * driving.speed,
             "joint_speed_percent": 100.0 * driving.share,

@@ -25,12 +25,17 @@ from truearm.planning.choosing.ordering import short_order
 from truearm.planning.choosing.prediction import Prediction, There, model_error, predict
 from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
 from truearm.planning.constraints.constraints import Constraints, allowed
+from truearm.planning.driving.drawing import drawn_clear
+from truearm.planning.driving.joint_window import joint_window
+from truearm.planning.driving.ways import WayFinder
 from truearm.simulation.devices import Device, in_view_of
 from truearm.simulation.truths import carrying_targets
 
 #: How far before a configuration each joint stops, to come to it moving forward [rad; m for sliding joints].
 APPROACH: Final = {"revolute": np.deg2rad(2.0), "prismatic": 5e-3}
 _PREDICTED_CONFIGURATIONS: Final = 500
+_DRAWN_ELSEWHERE: Final = 5000
+_FEWEST_ELSEWHERE: Final = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +58,7 @@ class MeasurementPlan:
         Readings [rad or m], ``(n, joints)``.
     before
         Where each joint stops before, so that all come to a configuration moving forward and backlash cancels; as
-        far as the limits allow, ``(n, joints)``.
+        far as the limits allow, those of the constraints too, ``(n, joints)``.
     indices
         O1 to O5 of the whole.
     candidates
@@ -105,8 +110,35 @@ def with_targets(robot: Robot, data: Dataset | None = None) -> Robot:
 
 def random_candidates(robot: Robot, count: int, rng: np.random.Generator) -> Postures:
     """Return configurations drawn within the limits, each joint coming to it moving forward."""
-    joints = robot.random_configurations(count, rng)
-    return Postures(joints, approach=np.ones_like(joints), number=np.zeros(count))
+    return _forward(robot.random_configurations(count, rng))
+
+
+def driven_candidates(robot: Robot, count: int, rng: np.random.Generator, finder: WayFinder) -> Postures:
+    """Return configurations drawn where the arm keeps clear, each joint coming to it moving forward.
+
+    There are fewer than `count` if the cell leaves little room.
+
+    Parameters
+    ----------
+    robot
+        Whose configurations they are.
+    finder
+        What is kept clear, and the limits.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    return _forward(drawn_clear(finder, count, _approach(robot), rng))
+
+
+def _forward(joints: Array) -> Postures:
+    return Postures(joints, approach=np.ones_like(joints), number=np.zeros(len(joints)))
+
+
+def _approach(robot: Robot) -> Array:
+    return np.array([APPROACH[joint.kind] for joint in robot.joints])
 
 
 @dataclass(frozen=True)
@@ -155,6 +187,7 @@ def plan_measurements(
     where: str = "constraints",
     seen_from_the_origin: bool = True,
     readings: Dataset | None = None,
+    finder: WayFinder | None = None,
 ) -> MeasurementPlan:
     """Choose configurations to measure.
 
@@ -185,6 +218,8 @@ def plan_measurements(
     readings
         What a device would read at the candidates, see :func:`device_candidates`; None for the positions of all targets
         at each.
+    finder
+        What the arm keeps clear of, at the candidates and where its accuracy is predicted; None for nothing.
 
     Raises
     ------
@@ -194,7 +229,9 @@ def plan_measurements(
     """
     _check_objective(objective, poses, accurate_at)
     seen = model.prepared(robot)
-    kept = allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin)
+    kept = dict(allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin))
+    if finder is not None:
+        kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
     given = "candidates" if labels is None else "candidates_from"
@@ -217,7 +254,7 @@ def plan_measurements(
             came=f"{noise:g} m",
             cure="Lower `noise`.",
         )
-    elsewhere = random_candidates(seen, _PREDICTED_CONFIGURATIONS, rng)
+    elsewhere = _elsewhere(seen, finder, rng)
     predicted = sensitivity(seen, elsewhere, free, noise, gauge)
     needed = len(among)
     if readings is None:  # few candidates show less than there is to identify
@@ -260,7 +297,7 @@ def plan_measurements(
         labels=tuple(str(k + 1) for k in range(len(chosen))) if labels is None else tuple(labels[k] for k in chosen),
         chosen=chosen,
         joints=joints,
-        before=_before(seen, joints),
+        before=before(seen, joints, None if finder is None else finder.low),
         indices=observability(known + chosen_rows.T @ chosen_rows, len(chosen)),
         candidates=len(candidates),
         rejected=rejected,
@@ -317,9 +354,21 @@ def _in_words(readings: Dataset) -> tuple[str, ...]:
     return tuple("; ".join(one) for one in words)
 
 
-def _before(robot: Robot, joints: Array) -> Array:
-    low = np.array([-np.inf if joint.limits is None else joint.limits[0] for joint in robot.joints])
-    return np.asarray(np.maximum(joints - [APPROACH[joint.kind] for joint in robot.joints], low))
+def before(robot: Robot, joints: Array, low: Array | None = None) -> Array:
+    """Return where each joint stops before configurations ``(n, joints)``, no lower than `low`, or its limits."""
+    if low is None:
+        low = np.array([-np.inf if joint.limits is None else joint.limits[0] for joint in robot.joints])
+    return np.asarray(np.minimum(np.maximum(joints - _approach(robot), low), joints))
+
+
+def _elsewhere(robot: Robot, finder: WayFinder | None, rng: np.random.Generator) -> Postures:
+    """Return configurations at which the accuracy is predicted: all over the robot's own limits, where it is clear."""
+    if finder is None:
+        return random_candidates(robot, _PREDICTED_CONFIGURATIONS, rng)
+    low, high = joint_window(robot)
+    some = rng.uniform(low, high, (_DRAWN_ELSEWHERE, len(low)))
+    clear = some[finder.check.room(some) >= finder.check.cell.clearance]
+    return _forward((clear if len(clear) >= _FEWEST_ELSEWHERE else some)[:_PREDICTED_CONFIGURATIONS])
 
 
 def _refuse_too_few(needed: int, usable: int, candidates: int, rejected: Mapping[str, int], given: str) -> None:

@@ -53,6 +53,21 @@ class Box(BaseModel):
     z: _Range | None = None
 
 
+class KeptOut(BaseModel):
+    """A box that the arm stays out of, in the base frame.
+
+    Attributes
+    ----------
+    x, y, z
+        Lowest and highest coordinate; without end if left out.
+    """
+
+    model_config = _CLOSED
+    x: _Range | None = None
+    y: _Range | None = None
+    z: _Range | None = None
+
+
 class Visibility(BaseModel):
     """Which way targets must look: all that are named, into the instrument.
 
@@ -96,6 +111,8 @@ class Constraints(BaseModel):
         Which way the targets must look.
     clearance
         Smallest distance between the middle lines of links that are not neighbours.
+    keep_out
+        Boxes that the arm stays out of, by name.
     """
 
     model_config = _CLOSED
@@ -107,6 +124,7 @@ class Constraints(BaseModel):
     floor: _Number | None = None
     visibility: Visibility | None = None
     clearance: _Positive | None = None
+    keep_out: dict[str, KeptOut] = {}
 
 
 def read_constraints(path: Path) -> Constraints:
@@ -138,19 +156,12 @@ def allowed(
     """
     q = postures.joints
     world = robot.base
-    robot = _at_the_origin(robot)
-    kept: dict[str, Allowed] = {}
-    low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
+    robot = at_the_origin(robot)
+    low, high = limits_of(robot, constraints, where)
+    kept: dict[str, Allowed] = {"limits": np.asarray(((q >= low) & (q <= high)).all(axis=1))}
     if constraints is None:
-        kept["limits"] = np.asarray(((q >= low) & (q <= high)).all(axis=1))
         return kept
     length = constraints.units.length
-    for number, given in constraints.limits.items():
-        joint = _joint(robot, number, f"{where}, limits")
-        unit = constraints.units.angle if robot.joints[joint].kind == "revolute" else length
-        first, last = _range(given, unit, f"{where}, limits, {number}")
-        low[joint], high[joint] = max(low[joint], first), min(high[joint], last)
-    kept["limits"] = np.asarray(((q >= low) & (q <= high)).all(axis=1))
     if constraints.moments:
         if not robot.masses and not robot.payload.mass:
             raise InputError(
@@ -181,6 +192,55 @@ def allowed(
         least = sized_si(constraints.clearance, length, f"{where}, clearance")
         kept["clearance"] = smallest_clearance(robot, postures, least) >= least
     return kept
+
+
+def limits_of(robot: Robot, constraints: Constraints | None, where: str) -> tuple[Array, Array]:
+    """Return lowest and highest joint positions that the robot and the constraints allow, each ``(joints,)``.
+
+    They are infinite where nothing is said.
+
+    Raises
+    ------
+    InputError
+        For a joint that the robot does not have, or a range the wrong way round.
+    """
+    low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
+    if constraints is None:
+        return low, high
+    for number, given in constraints.limits.items():
+        joint = _joint(robot, number, f"{where}, limits")
+        unit = constraints.units.angle if robot.joints[joint].kind == "revolute" else constraints.units.length
+        first, last = _range(given, unit, f"{where}, limits, {number}")
+        low[joint], high[joint] = max(low[joint], first), min(high[joint], last)
+    return low, high
+
+
+def keep_out(constraints: Constraints, where: str) -> dict[str, tuple[Array, Array]]:
+    """Return lowest and highest corner of each box that the arm stays out of [m], infinite where it does not end.
+
+    Raises
+    ------
+    InputError
+        For a range the wrong way round, and for a box without any.
+    """
+    corners = {}
+    for name, box in constraints.keep_out.items():
+        ranges = (box.x, box.y, box.z)
+        if all(given is None for given in ranges):
+            raise InputError(
+                "a box to keep out of that has no end leaves no room",
+                where=f"{where}, keep_out, {name}",
+                allowed="x, y or z: [lowest, highest]",
+            )
+        ends = [
+            (-np.inf, np.inf)
+            if given is None
+            else _range(given, constraints.units.length, f"{where}, keep_out, {name}, {'xyz'[axis]}")
+            for axis, given in enumerate(ranges)
+        ]
+        low, high = np.array(ends).T
+        corners[name] = (low, high)
+    return corners
 
 
 def _joint(robot: Robot, number: int, where: str) -> int:
@@ -237,7 +297,7 @@ def _visible(
     return kept
 
 
-def _at_the_origin(robot: Robot) -> Robot:
+def at_the_origin(robot: Robot) -> Robot:
     """Return the robot in a world that is its base frame."""
     places = {f"base_{axis}": 0.0 for axis in ("x", "y", "z", "rx", "ry", "rz")}
     return replace(robot, base_quaternion=(1.0, 0.0, 0.0, 0.0)).with_values(places)

@@ -1,10 +1,14 @@
-"""How far apart two line segments are, the cores of capsules."""
+"""How far apart two line segments are, the cores of capsules, and how far a segment is from a box."""
 
 from __future__ import annotations
+
+from typing import Final
 
 import numpy as np
 
 from truearm.modeling.chain import Array
+
+_HALVINGS: Final = 30
 
 
 def segment_distance(p1: Array, q1: Array, p2: Array, q2: Array) -> Array:
@@ -33,6 +37,28 @@ def segment_distance(p1: Array, q1: Array, p2: Array, q2: Array) -> Array:
         _to_segment(q2, p1, u, a),
     ]
     return np.asarray(np.minimum(np.min(np.broadcast_arrays(*ends), axis=0), np.where(inside, between, np.inf)))
+
+
+def box_distance(p: Array, q: Array, low: Array, high: Array) -> Array:
+    """Return the distance of segments ``p q``, each end ``(3, n)``, from a box with faces along the axes, ``(n,)``.
+
+    The square of the distance of a point from a box is convex along a line, so the nearest one is found by halving.
+
+    Parameters
+    ----------
+    low, high
+        Corners of the box, ``(3,)``; infinite where it does not end.
+    """
+    along = q - p
+    first, last = np.zeros(p.shape[-1]), np.ones(p.shape[-1])
+    for _ in range(_HALVINGS):
+        middle = (first + last) / 2.0
+        point = p + middle * along
+        rising = _dot(along, point - np.clip(point, low[:, None], high[:, None])) > 0
+        first, last = np.where(rising, first, middle), np.where(rising, middle, last)
+    ends = (p + part * along for part in (0.0, 1.0, (first + last) / 2.0))
+    apart = [np.linalg.norm(point - np.clip(point, low[:, None], high[:, None]), axis=0) for point in ends]
+    return np.asarray(np.min(apart, axis=0))
 
 
 def _to_segment(point: Array, start: Array, along: Array, square: Array) -> Array:

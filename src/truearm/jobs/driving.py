@@ -1,0 +1,96 @@
+"""What jobs are told of where an arm is driven: a floor, boxes, room to keep, and a safe configuration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.jobs.arguments import flag_argument, length_argument, numbers_argument
+from truearm.modeling.robot import Robot
+from truearm.planning.constraints.constraints import Constraints, keep_out
+from truearm.planning.driving.cell import CLEARANCE, Cell, boxes_of, refuse_floor_above_base, stands
+from truearm.planning.driving.collisions import CollisionCheck
+from truearm.planning.driving.home import checked_home, safe_configuration
+from truearm.planning.driving.joint_window import joint_window
+from truearm.planning.driving.ways import WayFinder
+from truearm.units import sized_si
+
+
+def cell_argument(
+    robot: Robot,
+    constraints: Constraints | None,
+    where: str,
+    floor: object = None,
+    no_floor: object = False,
+    clearance: object = None,
+) -> Cell:
+    """Return what stands around an arm.
+
+    Parameters
+    ----------
+    robot
+        Whether it stands, hangs or is on a wall follows from its gravity.
+    constraints, where
+        With boxes to keep out of, and the file that says so, for messages. Its floor, if it has one below the base,
+        is the floor unless `floor` says another.
+    floor
+        Height in the base frame [m]; None for 0 where the robot stands, and for none where it hangs.
+    no_floor
+        Whether there is no floor to keep clear of.
+    clearance
+        Room to keep [m]; None for 50 mm.
+
+    Raises
+    ------
+    InputError
+        If the floor is above the base, or both given and denied, or a length is none.
+    """
+    without = flag_argument(no_floor, "no_floor")
+    height = None if floor is None else length_argument(floor, "floor")
+    if without and height is not None:
+        raise InputError(
+            "a floor is given and denied",
+            parameter="floor, no_floor",
+            came=f"{1e3 * float(height):g} mm",
+            cure="Leave one of them out.",
+        )
+    if height is not None:
+        refuse_floor_above_base(height)
+    elif not without and stands(robot):
+        height = 0.0
+        if constraints is not None and constraints.floor is not None:
+            height = min(0.0, sized_si(constraints.floor, constraints.units.length, f"{where}, floor"))
+    room = CLEARANCE if clearance is None else length_argument(clearance, "clearance", 0.0)
+    return Cell(height, boxes_of({} if constraints is None else keep_out(constraints, where)), room)
+
+
+def finder_argument(
+    robot: Robot, constraints: Constraints | None, where: str, cell: Cell, home: object = None
+) -> WayFinder:
+    """Return what finds the ways of an arm in a cell.
+
+    Parameters
+    ----------
+    robot
+        With its targets.
+    constraints, where
+        With limits, and the file that says so, for messages.
+    cell
+        What is kept clear.
+    home
+        The safe configuration by the model [rad or m]; None to find one.
+
+    Raises
+    ------
+    InputError
+        If a box holds the base or the safe configuration, that has not as many numbers as joints or lies beyond the
+        limits, or none was found.
+    """
+    low, high = joint_window(robot, constraints, where)
+    given = None
+    if home is not None:
+        count = len(robot.joints)
+        given = np.array(numbers_argument(home, "home", count, f"{count}, one for each joint of {robot.name}"))
+    check = CollisionCheck(robot, cell)
+    at = safe_configuration(check, low, high) if given is None else checked_home(check, given, low, high)
+    return WayFinder(check, at, low, high)

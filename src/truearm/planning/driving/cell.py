@@ -1,0 +1,78 @@
+"""What an arm must keep clear of where it is driven: a floor, boxes and its own links."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+
+#: Room that is kept between the arm and everything else, unless told [m].
+CLEARANCE: Final = 0.05
+#: A robot stands on a floor if free fall points this near to the base's -z.
+_STANDING: Final = np.cos(np.deg2rad(30.0))
+
+
+@dataclass(frozen=True, eq=False)
+class KeepOut:
+    """A box that the arm stays out of, its faces along the axes of the base frame.
+
+    Attributes
+    ----------
+    name
+        In messages.
+    low, high
+        Two corners [m], ``(3,)``; infinite where it does not end.
+    """
+
+    name: str
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """What stands around an arm, in its base frame.
+
+    Attributes
+    ----------
+    floor
+        Height of the floor [m]; None if there is none to keep clear of.
+    boxes
+        What the arm stays out of.
+    clearance
+        Room to keep to each of them, and between links that are not neighbours [m].
+    """
+
+    floor: float | None = 0.0
+    boxes: tuple[KeepOut, ...] = field(default=())
+    clearance: float = CLEARANCE
+
+
+def stands(robot: Robot) -> bool:
+    """Return whether a robot stands on a floor: on a wall or a ceiling free fall points another way."""
+    fall = np.array(robot.gravity)
+    size = float(np.linalg.norm(fall))
+    return size > 0.0 and -fall[2] >= _STANDING * size
+
+
+def refuse_floor_above_base(floor: float) -> None:
+    """Refuse a floor that the base of the robot would stand in."""
+    if floor > 0.0:
+        raise InputError(
+            "the floor is above the base of the robot",
+            parameter="floor",
+            came=f"{floor * 1e3:g} mm",
+            allowed="0 mm or less: its height in the base frame",
+            cure="A robot on a pedestal has its floor below 0. Something higher than the base is a box to keep out of.",
+        )
+
+
+def boxes_of(given: Mapping[str, tuple[Array, Array]]) -> tuple[KeepOut, ...]:
+    """Return boxes by their names, with their lowest and highest corners [m]."""
+    return tuple(KeepOut(name, low, high) for name, (low, high) in given.items())

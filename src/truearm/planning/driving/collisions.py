@@ -1,0 +1,320 @@
+"""How much room an arm has: to the floor, to boxes, and between its own links; at postures and on ways between them.
+
+A way is driven with all joints moving at once, each from one value to the other. It is looked at where it is needed:
+how fast the distance of two bodies changes at most follows from the lengths between the joints that move one against
+the other, so that two postures with much room answer for what lies between them (conservative advancement: Mirtich,
+"Impulse-based dynamic simulation of rigid body systems", 1996, chapter 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.planning.constraints.segments import box_distance, segment_distance
+from truearm.planning.driving.arm_capsules import ArmCapsules, Capsule
+from truearm.planning.driving.cell import Cell
+
+FLOOR: Final = "floor"
+LINKS: Final = "links"
+#: What is kept on top of the clearance, so that it holds between the postures that are looked at, too [m].
+MARGIN: Final = 2e-3
+#: A joint that changes a height by less than this for each rad does not count: its axis is upright [m].
+_UPRIGHT: Final = 5e-4
+#: Two places on the arm are kept apart if the way between them along the arm is so many times what they keep.
+APART: Final = 3.0
+_AT_ONCE: Final = 20_000
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A capsule without what is next to one of its ends, as shares of its length."""
+
+    capsule: Capsule
+    first: float = 0.0
+    last: float = 1.0
+
+    def ends(self, points: Array) -> tuple[Array, Array]:
+        start, end = points[self.capsule.start], points[self.capsule.end]
+        return start + self.first * (end - start), start + self.last * (end - start)
+
+
+@dataclass(frozen=True)
+class _Room:
+    """What is kept clear of what: the floor, a box, or another link."""
+
+    what: str
+    words: str
+    piece: _Piece | None = None
+    other: _Piece | None = None
+    point: int = 0
+    radius: float = 0.0
+    box: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """Ways that were looked at.
+
+    Attributes
+    ----------
+    clear
+        Whether the clearance is kept all the way, ``(n,)``.
+    room
+        The smallest room that was found [m], ``(n,)``.
+    worst
+        Number of what comes nearest, see :meth:`CollisionCheck.words`, ``(n,)``.
+    """
+
+    clear: NDArray[np.bool_]
+    room: Array
+    worst: NDArray[np.intp]
+
+
+class CollisionCheck:
+    """Whether an arm keeps clear of its cell and of itself.
+
+    The first link stands with the base: only what moves is kept clear of the floor and of boxes, and of the first link
+    that moves not the part next to its fixed end. Two links are kept apart without what is next to their connection:
+    as much of them that the way along the arm between the rest is :data:`APART` times what they keep, their radii and
+    the clearance. What no posture keeps apart is left out.
+
+    Raises
+    ------
+    InputError
+        If a box holds the base of the robot.
+    """
+
+    def __init__(self, robot: Robot, cell: Cell) -> None:
+        self.cell, self.arm = cell, ArmCapsules(robot)
+        self.need = cell.clearance + MARGIN
+        self._refuse_held()
+        rooms = [*self._to_the_floor(), *self._to_the_boxes()]
+        between = self._between_links()
+        apart = (self._measured(between, self.arm.sampled) >= self.need).any(axis=1) if between else ()
+        self._rooms = [*rooms, *(room for room, ever in zip(between, apart, strict=True) if ever)]
+
+    # -- at postures ---------------------------------------------------------------------------------------
+
+    def rooms(self, q: Array) -> Array:
+        """Return the room to everything at joint positions ``(n, joints)`` [m], ``(rooms, n)``; below zero they touch.
+
+        Parameters
+        ----------
+        q
+            Of the model [rad or m].
+        """
+        parts = [self._measured(self._rooms, self.arm.points(part)) for part in _parts(q)]
+        return np.concatenate([np.zeros((len(self._rooms), 0)), *parts], axis=1)
+
+    def room(self, q: Array) -> Array:
+        """Return the smallest room at joint positions ``(n, joints)`` [m], ``(n,)``; infinite if nothing is near."""
+        return np.asarray(self.rooms(q).min(axis=0, initial=np.inf))
+
+    def kept(self, q: Array) -> dict[str, NDArray[np.bool_]]:
+        """Return for the floor, each box and the links at which joint positions ``(n, joints)`` they are kept clear."""
+        rooms = self.rooms(q)
+        names = np.array([room.what for room in self._rooms], dtype=object)
+        return {str(name): np.asarray((rooms[names == name] >= self.need).all(axis=0)) for name in dict.fromkeys(names)}
+
+    def words(self, number: int) -> str:
+        """Say what comes near what."""
+        return self._rooms[number].words if self._rooms else "nothing"
+
+    # -- on ways -------------------------------------------------------------------------------------------
+
+    def ways(self, starts: Array, ends: Array) -> Checked:
+        """Look at ways from joint positions `starts` to `ends`, each ``(n, joints)``, all joints moving at once."""
+        count = len(starts)
+        if not self._rooms or not count:
+            return Checked(np.ones(count, bool), np.full(count, np.inf), np.zeros(count, np.intp))
+        at_start, at_end = self.rooms(starts), self.rooms(ends)
+        least, worst = _least(np.concatenate([at_start[None], at_end[None]]).min(axis=0))
+        way = np.arange(count)
+        while len(way):
+            # Ways that have failed are given up, and stretches that their ends answer for are done.
+            spread = self._speeds @ np.abs(ends - starts).T
+            sure = ((at_start + at_end - spread) / 2.0 >= self.cell.clearance) | (spread <= 2.0 * MARGIN)
+            left = np.flatnonzero(~sure.all(axis=0) & (least[way] >= self.need))
+            way, starts, ends = way[left], starts[left], ends[left]
+            middle = (starts + ends) / 2.0
+            at_middle = self.rooms(middle)
+            room, number = _least(at_middle)
+            order = np.argsort(-room, kind="stable")
+            nearer = order[room[order] < least[way[order]]]
+            least[way[nearer]], worst[way[nearer]] = room[nearer], number[nearer]
+            at_start, at_end = (
+                np.concatenate([at_start[:, left], at_middle], axis=1),
+                np.concatenate([at_middle, at_end[:, left]], axis=1),
+            )
+            starts, ends = np.concatenate([starts, middle]), np.concatenate([middle, ends])
+            way = np.concatenate([way, way])
+        return Checked(least >= self.need, least, worst)
+
+    @cached_property
+    def _speeds(self) -> Array:
+        """How fast each room changes at most with each joint [m per rad, or m per m], ``(rooms, joints)``."""
+        speeds = np.zeros((len(self._rooms), self.arm.joints))
+        for k, room in enumerate(self._rooms):
+            if room.piece is None:
+                speeds[k] = self._speed_of(room.point, 0)
+                if self._upright:
+                    speeds[k, 0] = 0.0
+            elif room.other is None:
+                speeds[k] = self._speed_of(room.piece.capsule.end, 0)
+            else:
+                # Joints up to the start of the one move both alike.
+                speeds[k] = self._speed_of(room.other.capsule.end, room.piece.capsule.start)
+        return speeds
+
+    def _speed_of(self, point: int, beyond: int) -> Array:
+        """Return how fast a point moves with each joint, seen from the link that begins at point `beyond`."""
+        arm, speed = self.arm, np.zeros(self.arm.joints)
+        for j, joint in enumerate(arm.robot.joints):
+            if beyond < j + 1 <= min(point, arm.flange):
+                speed[j] = 1.0 if joint.kind == "prismatic" else arm.along[point] - arm.along[j + 1]
+        return speed
+
+    @cached_property
+    def _upright(self) -> bool:
+        """Whether the first joint turns about the vertical, so that it changes no height."""
+        if self.arm.robot.joints[0].kind != "revolute":
+            return False
+        at = self.arm.sample[:40]
+        turned = at + np.eye(self.arm.joints)[0]
+        return bool(np.abs(self.arm.points(turned)[:, 2] - self.arm.points(at)[:, 2]).max() < _UPRIGHT)
+
+    # -- what is kept clear of what -------------------------------------------------------------------------
+
+    def _measured(self, rooms: list[_Room], points: Array) -> Array:
+        found = np.empty((len(rooms), points.shape[2]))
+        pairs: list[tuple[int, _Piece, _Piece]] = []
+        for k, room in enumerate(rooms):
+            if room.piece is None:
+                assert self.cell.floor is not None
+                found[k] = points[room.point, 2] - room.radius - self.cell.floor
+            elif room.other is None:
+                box = self.cell.boxes[room.box]
+                found[k] = box_distance(*room.piece.ends(points), box.low, box.high) - room.piece.capsule.radius
+            else:
+                pairs.append((k, room.piece, room.other))
+        if pairs:
+            rows, one, other = zip(*pairs, strict=True)
+            radii = np.array([a.capsule.radius + b.capsule.radius for a, b in zip(one, other, strict=True)])
+            found[list(rows)] = segment_distance(*_ends(one, points), *_ends(other, points)) - radii[:, None]
+        return found
+
+    def _moving(self) -> list[Capsule]:
+        """Return the capsules that move."""
+        fixed = self.arm.fixed
+        return [c for c in (*self.arm.links, *self.arm.tools) if not (c.start in fixed and c.end in fixed)]
+
+    def _to_the_floor(self) -> list[_Room]:
+        if self.cell.floor is None:
+            return []
+        radius: dict[int, float] = {}
+        for capsule in (*self.arm.links, *self.arm.tools):
+            for point in (capsule.start, capsule.end):
+                radius[point] = max(radius.get(point, 0.0), capsule.radius)
+        # What no joint raises or lowers is where it was mounted.
+        level = np.ptp(self.arm.sampled[:, 2], axis=1) < 1e-3
+        return [
+            _Room(FLOOR, f"{self._point(k)} comes near the floor", point=k, radius=r)
+            for k, r in sorted(radius.items())
+            if not level[k]
+        ]
+
+    def _to_the_boxes(self) -> list[_Room]:
+        rooms = []
+        for number, box in enumerate(self.cell.boxes):
+            for capsule in self._moving():
+                first = 0.0
+                if capsule.start in self.arm.fixed:
+                    first = min(1.0, (capsule.radius + self.need) / self._length(capsule))
+                words = f"{self._name(capsule)} comes near the box '{box.name}'"
+                rooms.append(_Room(f"keep_out {box.name}", words, _Piece(capsule, first), box=number))
+        return rooms
+
+    def _between_links(self) -> list[_Room]:
+        links, rooms = self.arm.links, []
+        for i, one in enumerate(links):
+            for other in (*links[i + 1 :], *self.arm.tools):
+                between = self.arm.along[self.arm.flange if other.tool else other.start] - self.arm.along[one.end]
+                surplus = APART * (one.radius + other.radius + self.need) - float(between)
+                pieces = self._without_connection(one, other, max(surplus, 0.0))
+                if pieces is not None:
+                    words = f"{self._name(one)} and {self._name(other)} come near each other"
+                    rooms.append(_Room(LINKS, words, *pieces))
+        return rooms
+
+    def _without_connection(self, one: Capsule, other: Capsule, length: float) -> tuple[_Piece, _Piece] | None:
+        """Take away a length where two links are connected, half of each, all of the longer if one is too short."""
+        long, far = self._length(one), self._length(other)
+        taken = length / 2.0, length / 2.0
+        if min(long, far) <= length / 2.0:
+            taken = (length, 0.0) if long > far else (0.0, length)
+        if taken[0] >= long or taken[1] >= far:
+            return None
+        return _Piece(one, 0.0, 1.0 - taken[0] / long), _Piece(other, taken[1] / far)
+
+    def _length(self, capsule: Capsule) -> float:
+        """Return how long a capsule is at most [m]."""
+        return float(self.arm.along[capsule.end] - self.arm.along[capsule.start])
+
+    def _name(self, capsule: Capsule) -> str:
+        if capsule.tool:
+            return f"what holds target '{self.arm.targets[capsule.end - self.arm.flange - 1]}'"
+        start = "the base" if capsule.start == 0 else f"joint {capsule.start}"
+        return f"the link from {start} to {self._point(capsule.end)}"
+
+    def _point(self, point: int) -> str:
+        if point == 0:
+            return "the base"
+        if point > self.arm.flange:
+            return f"target '{self.arm.targets[point - self.arm.flange - 1]}'"
+        return "the flange" if point == self.arm.flange else f"joint {point}"
+
+    def _refuse_held(self) -> None:
+        """Refuse a box that the base of the robot would stand in."""
+        fixed = self.arm.sampled[list(self.arm.fixed), :, 0]
+        column = fixed[0] + np.linspace(0.0, 1.0, 50)[:, None] * (fixed[-1] - fixed[0])
+        for box in self.cell.boxes:
+            inside = (column > box.low + 1e-3) & (column < box.high - 1e-3)
+            if inside.all(axis=1).any():
+                raise InputError(
+                    "a box to keep out of holds the base of the robot",
+                    parameter="constraints",
+                    where=f"keep_out, {box.name}",
+                    came=", ".join(
+                        f"{axis} {low * 1e3:g} to {high * 1e3:g}"
+                        for axis, low, high in zip("xyz", box.low, box.high, strict=True)
+                    )
+                    + " mm",
+                    allowed="a box beside the base, or below it: in the base frame",
+                    cure="Check its unit, and that it is in the base frame of the robot.",
+                )
+
+
+def _ends(pieces: Sequence[_Piece], points: Array) -> tuple[Array, Array]:
+    """Return both ends of pieces, each ``(pieces, 3, n)``."""
+    start = points[[piece.capsule.start for piece in pieces]]
+    along = points[[piece.capsule.end for piece in pieces]] - start
+    first, last = (np.array(share)[:, None, None] for share in zip(*((p.first, p.last) for p in pieces), strict=True))
+    return start + first * along, start + last * along
+
+
+def _least(rooms: Array) -> tuple[Array, NDArray[np.intp]]:
+    number = np.argmin(rooms, axis=0) if len(rooms) and rooms.shape[1] else np.zeros(rooms.shape[1], np.intp)
+    return np.asarray(np.take_along_axis(rooms, number[None], axis=0)[0]), number
+
+
+def _parts(q: Array) -> list[Array]:
+    return [q[k : k + _AT_ONCE] for k in range(0, len(q), _AT_ONCE)]

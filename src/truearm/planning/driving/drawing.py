@@ -1,0 +1,58 @@
+"""Configurations drawn where an arm can be driven."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.modeling.chain import Array
+from truearm.planning.driving.ways import WayFinder
+
+#: So many times as many as are wanted are drawn at most.
+_TIMES = 40
+
+
+def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.Generator) -> Array:
+    """Return configurations that keep clear, and from which the arm comes straight to the safe one, ``(n, joints)``.
+
+    They are drawn evenly. Where fewer than half of those that are clear have a straight way, all that are clear count.
+
+    Parameters
+    ----------
+    finder
+        What is kept clear, the safe configuration and the limits.
+    count
+        How many are wanted; there are fewer if the cell leaves little room.
+    approach
+        How far before a configuration each joint stops, to come to it moving forward, ``(joints,)`` [rad or m].
+
+    Raises
+    ------
+    InputError
+        If none was found that is clear.
+    """
+    low, high = finder.low, finder.high
+    first = np.minimum(low + approach, (low + high) / 2.0)
+    lost: dict[str, int] = {}
+    straight, clear = np.zeros((0, len(low))), np.zeros((0, len(low)))
+    drawn = 0
+    while drawn < _TIMES * count and len(straight) < count:
+        q = rng.uniform(first, high, (count, len(low)))
+        drawn += count
+        kept = finder.check.kept(q)
+        for name, keeps in kept.items():
+            lost[name] = lost.get(name, 0) + int(np.sum(~keeps))
+        q = q[np.all([*kept.values(), np.ones(count, bool)], axis=0)]
+        q = q[finder.check.ways(np.maximum(q - approach, low), q).clear]
+        home = np.broadcast_to(finder.home, q.shape)
+        ways = finder.check.ways(q, home).clear
+        straight, clear = np.concatenate([straight, q[ways]]), np.concatenate([clear, q])
+    if not len(clear):
+        cost = ", ".join(f"{name} {number}" for name, number in lost.items() if number)
+        raise InputError(
+            "there is no configuration in which the arm keeps clear",
+            parameter="clearance",
+            came=f"{drawn} drawn; rejected by {cost}",
+            cure="Lower `clearance`, or see that the limits, the floor and boxes to keep out of leave the arm room.",
+        )
+    return straight[:count] if 2 * len(straight) >= len(clear) else clear[:count]

@@ -1,0 +1,50 @@
+"""A tour as CSV, and in words."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+
+from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
+from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
+from truearm.modeling.robot import Robot
+from truearm.planning.driving.cell import stands
+from truearm.planning.driving.tour import Tour
+from truearm.shown import counted
+
+
+def tour_csv(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> str:
+    """Return every stop of a tour as CSV, one row a stop in driving order, joints in deg or mm.
+
+    ``stop`` says why the arm stops: ``home``, ``via``, ``approach`` or ``measure``; ``configuration`` is what is
+    measured there. Joints are ``joint_i``, or ``axis_i`` as the controller shows them.
+    """
+    controller = counting(robot, joints_are)
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["stop", "configuration", *joint_headings(robot.joints, controller)])
+    for stop, cells in zip(tour.stops, joint_cells(tour.joints, robot.joints, controller), strict=True):
+        writer.writerow([stop.kind, stop.label or "", *cells])
+    return stream.getvalue()
+
+
+def home_shown(home: Array, robot: Robot, joints_are: JointsOf = "model") -> list[float]:
+    """Return the safe configuration ``(joints,)`` of the model in deg or mm, as a person reads it."""
+    return [float(cell) for cell in joint_cells(home[None], robot.joints, counting(robot, joints_are))[0]]
+
+
+def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list[str]:
+    """Return what is to know about a tour: where it starts and ends, and how near the arm comes to what."""
+    home = ", ".join(f"{round(value, 1) + 0.0:g}" for value in home_shown(tour.home, robot, joints_are))
+    vias = sum(stop.kind == "via" for stop in tour.stops)
+    over = f", {counted(vias, 'via point')} among them" if vias else ""
+    text = [f"Driven from home ({home}) and back in {counted(len(tour.stops) - 1, 'move')}{over}."]
+    near = "its own links and boxes" if tour.floor is None else f"the floor at {tour.floor * 1e3:g} mm, boxes and links"
+    if math.isfinite(tour.room):
+        # Down to a tenth of a millimetre: never more than there is.
+        text.append(f"All the way the arm stays {math.floor(tour.room * 1e4) / 10:g} mm or more from {near}.")
+    if tour.floor is None and not stands(robot):
+        text.append("No floor is kept clear: by its gravity the robot does not stand on one.")
+    return text

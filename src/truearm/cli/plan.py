@@ -151,7 +151,12 @@ def plan(
     if device == INCLINOMETERS:
         from truearm.jobs.plan_inclinometers import plan_inclinometers
 
-        beside = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
+        beside: dict[str, object] = {
+            "objective": objective,
+            "accurate_at": accurate_at,
+            "region": region,
+            "tools": tools,
+        }
         beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
         beside |= {"floor": floor, "no_floor": no_floor or None, "clearance": clearance, "home": home}
         beside |= {"program": program, "approach": approach or None, "speed": speed, "dwell": dwell, "wait": wait}

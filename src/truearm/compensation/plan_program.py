@@ -48,6 +48,8 @@ _STEP: Final = math.radians(3.0)
 #: The lowest share that a program says.
 _LOWEST: Final = 0.01
 _FIRST_JOINTS: Final = 3
+#: Share, speed of the tip, time and angular velocity of a joint motion.
+_Pace = tuple[float, float, float | None, float]
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ def _stand(label: str, driving: Driving) -> list[ProgramStep]:
     return stands
 
 
-def _first_move(robot: Robot, language: str, driving: Driving) -> tuple[float, float, None, float]:
+def _first_move(robot: Robot, language: str, driving: Driving) -> _Pace:
     """Return share, speed, time and angular velocity of the move to the safe configuration, from nobody knows where.
 
     As if all joints turned the outstretched arm.
@@ -157,9 +159,7 @@ def _first_move(robot: Robot, language: str, driving: Driving) -> tuple[float, f
     return _whole(share, language), driving.speed, None, turning
 
 
-def _move(
-    robot: Robot, language: str, driving: Driving, joints: Array, shown: Array
-) -> tuple[float, float, float, float]:
+def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: Array) -> _Pace:
     """Return share, speed of the tip, time and angular velocity of a move of all joints ``(2, joints)``.
 
     The angular velocity is of no meaning where the time is said.

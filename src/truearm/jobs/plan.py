@@ -32,7 +32,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.driving import cell_argument, finder_argument
-from truearm.jobs.plan_programs import program_wanted, with_program
+from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
@@ -277,6 +277,8 @@ def plan(
         weighed = payload is not None or carrying.payload != NO_PAYLOAD
         planned = with_program(planned, wanted_program, carrying, weighed=weighed)
     if table is not None:
+        if planned.program is not None:
+            refuse_other_programs(table, planned.program.files, *read)
         progress("writing the files")
         planned.save(table)
     return planned

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Final, Literal
 
 from truearm.compensation.plan_program import MEASURED, Driving, joint_rates, plan_program
@@ -13,14 +14,14 @@ from truearm.compensation.programs.motion_program import LONGEST_COMMENT, LONGES
 from truearm.compensation.programs.program import Language
 from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.errors import InputError
-from truearm.jobs.arguments import choice_argument, flag_argument, numbers_argument
+from truearm.jobs.arguments import choice_argument, flag_argument, folder_for, numbers_argument
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES
-from truearm.manifest import hash_of
+from truearm.manifest import hash_of, sets_in
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.results.plan import Plan
-from truearm.results.plan_program import PlanProgram
+from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.units import as_number
 
 #: What the languages are called as arguments.
@@ -153,6 +154,31 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed:
     texts = dict(language.motion(program))
     written = PlanProgram(language.name, texts, tour, wanted.driving, program.carried, tuple(notices))
     return replace(planned, program=written)
+
+
+def refuse_other_programs(folder: Path, names: Collection[str], *read: object) -> None:
+    """Refuse a folder with programs that are not of this plan: they would be lost, or stay beside it.
+
+    Parameters
+    ----------
+    folder
+        In which the plan is written.
+    names
+        Of the files of its program.
+    read
+        What the job was given.
+    """
+    folder_for(names, folder, *read, ours=True)
+    for one in sets_in(folder):
+        others = [name for name in one.files if name not in (TABLE, PLAN_PAGE, WAYS, SHEET, *names)]
+        if TABLE in one.files and others:
+            raise InputError(
+                "the program of another plan is there, and would stay beside this one",
+                parameter="out",
+                where=str(folder),
+                came=others[0],
+                cure="Choose another folder, or remove that plan.",
+            )
 
 
 def _speed(value: Any) -> tuple[float, float]:

@@ -38,7 +38,7 @@ def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_
     [
         (
             ("--program", "krl"),
-            "--program: irb120: the controllers of ABB do not speak KRL; got 'krl'; allowed: rapid.",
+            "irb120: the controllers of ABB do not speak KRL; got 'krl'; allowed: rapid.",
         ),
         (("--program", "krl"), "Take --program rapid"),
         (("--program", "rapidd"), "Did you mean"),

@@ -12,8 +12,8 @@ import pytest
 from tests.plan_tours import a_tour
 
 from truearm.compensation.path_program import BY_NAME
-from truearm.compensation.plan_program import Driving, joint_rates, plan_program
-from truearm.compensation.programs.motion_program import JointMove, MotionProgram, Wait
+from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program
+from truearm.compensation.programs.motion_program import LONGEST_COMMENT, JointMove, MotionProgram, Wait
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.library import load_robot
@@ -79,7 +79,7 @@ def visited(found: Program) -> list[str]:
             next(
                 m[1]
                 for line in reversed(lines)
-                if (m := re.search(r"(Measure \S+|Home|On the way|Approach from below)", line))
+                if (m := re.search(r"(Measure \S+|Home|On the way|Approach)", line))
             )
         )
     return called
@@ -98,7 +98,7 @@ def test_the_own_reader_finds_the_planned_joint_positions_under_their_labels(nam
     shown = robot.controller.from_model(tour.joints)
     assert np.abs(commanded(found, len(robot.joints)) - shown).max() <= digit * (1 + 1e-9)
     assert np.abs(went - tour.joints).max() <= 2.1 * digit  # one joint may count another
-    expected = {"home": "Home", "via": "On the way", "approach": "Approach from below"}
+    expected = {"home": "Home", "via": "On the way", "approach": "Approach"}
     assert visited(found) == [expected.get(stop.kind, f"Measure {stop.label}") for stop in tour.stops]
 
 
@@ -206,6 +206,17 @@ def test_the_robot_stops_stands_and_waits_in_every_configuration(name: str) -> N
             expected = 1 if other == wait and "P001" in STANDS[name][other] else count if other == wait else 0
             assert len(re.findall(STANDS[name][other], text)) == expected, (wait, other)
     assert ("BasicIO-1\\%I3" in text_of(name, made(name)[2])) == (name == "val3")
+
+
+@pytest.mark.parametrize("name", ["fanuc-ls", "inform"])
+def test_comments_are_no_longer_than_controllers_take_them(name: str) -> None:
+    robot, tour = a_tour(load_robot(ROBOTS[name]), labels=tuple(f"{k}" * LONGEST_LABEL for k in range(4)))
+    for wait in WAITS:
+        driving = Driving(wait=wait, input="12345")  # type: ignore[arg-type]
+        text = text_of(name, plan_program(tour, robot, BY_NAME[name].name, driving, "0123456789ab"))
+        comments = re.findall(r"^ *\d+:  !(.*)    ;$|^'(.*)$", text, re.M)
+        assert len(comments) > 15
+        assert max(len(fanuc + inform) for fanuc, inform in comments) <= LONGEST_COMMENT
 
 
 @pytest.mark.parametrize("name", BY_NAME)

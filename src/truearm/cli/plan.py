@@ -118,7 +118,7 @@ def plan(
         ),
     ] = None,
     approach: Annotated[
-        bool, typer.Option("--approach", help="It comes to every configuration from below, by a stop before it.")
+        bool, typer.Option("--approach", help="Every joint comes to each configuration from one side, by a stop before it.")
     ] = False,
     speed: Annotated[
         str | None,

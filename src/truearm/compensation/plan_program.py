@@ -34,6 +34,8 @@ from truearm.planning.driving.tour import Stop, Tour
 PROGRAM: Final = "MEASURE"
 #: What stands before the label of a configuration in its comment.
 MEASURED: Final = "Measure"
+#: Labels of as many characters fit into every comment of every language.
+LONGEST_LABEL: Final = 21
 #: At 100 % no joint of an arm is faster than this: of the first three, and of the others [rad/s], nor do they turn the
 #: stretched arm faster [m/s].
 _FAST: Final = ((math.radians(600.0), 12.0), (math.radians(1500.0), math.radians(2500.0)))
@@ -134,7 +136,7 @@ def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark
 def _called(stop: Stop) -> str:
     if stop.kind == "measure":
         return f"{MEASURED} {stop.label}"
-    return {"home": "Home", "via": "On the way", "approach": "Approach from below"}[stop.kind]
+    return {"home": "Home", "via": "On the way", "approach": "Approach"}[stop.kind]
 
 
 def _stand(label: str, driving: Driving) -> list[ProgramStep]:

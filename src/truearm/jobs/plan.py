@@ -142,7 +142,7 @@ def plan(
         Language of a program that drives the plan: ``rapid``, ``krl``, ``fanuc``, ``urscript``, ``inform`` or ``val3``;
         None writes none.
     approach
-        Whether it comes to every configuration from below, by a stop a little before it.
+        Whether every joint comes to each configuration from one side, by a stop a little before it.
     speed
         Of no target and of the flange it is higher [m/s], and the largest share of the joints' speed; None for
         (0.25, 0.1).

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from truearm.compensation.plan_program import MEASURED, Driving, joint_rates, plan_program
-from truearm.compensation.programs.motion_program import LONGEST_COMMENT, LONGEST_WAIT
+from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program
+from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.compensation.programs.program import Language
 from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.errors import InputError
@@ -54,7 +54,7 @@ class ProgramWanted:
     driving
         How fast it goes, and for what it waits.
     approach
-        Whether every configuration is approached from below.
+        Whether every joint comes to each configuration from one side.
     """
 
     name: str
@@ -91,14 +91,13 @@ class ProgramWanted:
 
     def check_labels(self, labels: Sequence[str]) -> None:
         """Refuse labels that comments of a program cannot have."""
-        most = LONGEST_COMMENT - len(MEASURED) - 1
         for label in labels:
-            if len(label) > most or not _LABEL.fullmatch(label):
+            if len(label) > LONGEST_LABEL or not _LABEL.fullmatch(label):
                 raise InputError(
                     "a configuration cannot be called so in a program",
                     parameter="candidates_from",
                     came=label,
-                    allowed=f"up to {most} letters, digits, blanks and _ . + -",
+                    allowed=f"up to {LONGEST_LABEL} letters, digits, blanks and _ . + -",
                     cure="Rename it in the file.",
                 )
 
@@ -268,12 +267,13 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
                 "robot file.",
             )
         )
-    slow, fast = (math.degrees(rate) for rate in (joint_rates(robot)[0].min(), joint_rates(robot)[1].max()))
-    words = f"shares are so low that the tip keeps to its speed with joints of up to {fast:.0f} deg/s"
+    slow, fast = joint_rates(robot)
+    highest = " and ".join(dict.fromkeys(f"{math.degrees(rate):.0f}" for rate in (fast[0], fast[-1])))
+    words = f"shares are so low that the tip keeps to its speed with joints of up to {highest} deg/s"
     if language.name == "URScript":
         words = f"100 % is taken for {math.degrees(FASTEST):.0f} deg/s"
     elif language.name == "RAPID":
-        words = f"moves take so long that joints of {slow:.0f} deg/s and more keep to the share"
+        words = f"moves take so long that joints of {math.degrees(slow.min()):.0f} deg/s and more keep to the share"
     found.append(
         Notice(
             "joint-speed-assumed",

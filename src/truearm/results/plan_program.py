@@ -24,6 +24,8 @@ _WAITS: Final = {
     "input": ", then for input {} up to {} s",
     "operator": ", then until the operator starts it again",
 }
+#: Where languages have the load that do not set it themselves.
+_BY_HAND: Final = {"FANUC LS": "Payload schedule 1", "INFORM": "Tool file 0", "VAL3": "The tool flange"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,20 +58,28 @@ class PlanProgram:
     @property
     def answer(self) -> tuple[str, ...]:
         """What it does, in words."""
-        driving, carried = self.driving, self.carried
+        driving = self.driving
         approached = any(stop.kind == "approach" for stop in self.tour.stops)
         waits = _WAITS[driving.wait].format(driving.input, number(driving.longest, 2))
-        tip = f"target {carried.name}" if carried.name else "the flange"
         way = [f"{counted(len(self.tour.measured), 'configuration')} from Home and back"]
-        way += ["each approached from below"] if approached else []
+        way += ["each approached from one side"] if approached else []
         return (
             f"Measuring program in {self.language}: {', '.join(way)}.",
             f"At most {number(1e3 * driving.speed, 1)} mm/s and {number(100 * driving.share, 2)} % of the joints' "
             f"speed; it stands for {number(driving.dwell, 2)} s{waits}.",
-            f"It tells the controller of {tip} at ({', '.join(carried.tip_mm)}) mm and of {number(carried.mass, 3)} kg "
-            f"at ({', '.join(carried.cog_mm)}) mm.",
+            self._told,
             "It is not verified and no safety function: run it step by step first, at reduced speed, nobody near.",
         )
+
+    @property
+    def _told(self) -> str:
+        """What the controller is told of the tool, or has to be told by hand."""
+        carried = self.carried
+        load = f"{number(carried.mass, 3)} kg at ({', '.join(carried.cog_mm)}) mm"
+        if self.language in _BY_HAND:
+            return f"{_BY_HAND[self.language]} on the controller must hold {load}: programs do not set it."
+        tip = f"target {carried.name}" if carried.name else "the flange"
+        return f"It tells the controller of {tip} at ({', '.join(carried.tip_mm)}) mm and of {load}."
 
     def lines(self) -> list[str]:
         """Return what it does, and what to know about it."""

@@ -119,7 +119,7 @@ def plan(
     if device == INCLINOMETERS:
         from truearm.jobs.plan_inclinometers import plan_inclinometers
 
-        beside = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
+        beside: dict[str, object] = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
         beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
         beside |= {"floor": floor, "no_floor": no_floor or None, "clearance": clearance, "home": home}
         refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})

@@ -119,8 +119,8 @@ def plan(
     if device == INCLINOMETERS:
         from truearm.jobs.plan_inclinometers import plan_inclinometers
 
-        beside: dict[str, object] = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
-        beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
+        beside: dict[str, object] = {"objective": objective, "accurate_at": accurate_at, "region": region}
+        beside |= {"tools": tools, "frames": frames, "candidates_from": candidates_from, "constraints": constraints}
         beside |= {"floor": floor, "no_floor": no_floor or None, "clearance": clearance, "home": home}
         refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
         with progress() as say:

@@ -118,7 +118,8 @@ def plan(
         ),
     ] = None,
     approach: Annotated[
-        bool, typer.Option("--approach", help="Every joint comes to each configuration from one side, by a stop before it.")
+        bool,
+        typer.Option("--approach", help="Every joint comes to each configuration from one side, by a stop before it."),
     ] = False,
     speed: Annotated[
         str | None,
@@ -151,13 +152,8 @@ def plan(
     if device == INCLINOMETERS:
         from truearm.jobs.plan_inclinometers import plan_inclinometers
 
-        beside: dict[str, object] = {
-            "objective": objective,
-            "accurate_at": accurate_at,
-            "region": region,
-            "tools": tools,
-        }
-        beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
+        beside: dict[str, object] = {"objective": objective, "accurate_at": accurate_at, "region": region}
+        beside |= {"tools": tools, "frames": frames, "candidates_from": candidates_from, "constraints": constraints}
         beside |= {"floor": floor, "no_floor": no_floor or None, "clearance": clearance, "home": home}
         beside |= {"program": program, "approach": approach or None, "speed": speed, "dwell": dwell, "wait": wait}
         refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})

@@ -130,7 +130,7 @@ def plan(
         Height of the floor in the base frame [m], 0 or less; None for 0, and for none where the robot's gravity says
         that it does not stand. With a clearance it is kept by all that moves, as are the boxes of the constraints and
         the arm's own links: in every configuration, and on the ways from the safe one to the first, on to each other
-        and back. Configurations that are given or that a device finds are checked if one of these four is said.
+        and back. Configurations that are given were reached once: they are checked if one of these four is said.
     no_floor
         Whether there is no floor.
     clearance
@@ -218,9 +218,9 @@ def plan(
         wanted_program.check(carrying)
     where = str(constraints) if isinstance(constraints, str | Path) else "constraints"
     cell = cell_argument(carrying, rules, where, floor, no_floor, clearance)
-    # What a device touches stands where the arm may not be; what was measured was reached.
-    driven = wanted_program is not None or (candidates_from is None and instrument is None)
-    driven = driven or no_floor or any(given is not None for given in (floor, clearance, home))
+    # What was measured was reached: such configurations are checked where that is asked for.
+    driven = candidates_from is None or wanted_program is not None or no_floor
+    driven = driven or any(given is not None for given in (floor, clearance, home))
     labels, readings, own, finder = None, None, bool(carrying.targets), None
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)

@@ -26,7 +26,7 @@ from truearm.planning.choosing.prediction import Prediction, There, model_error,
 from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
 from truearm.planning.constraints.constraints import Constraints, allowed
 from truearm.planning.driving.drawing import drawn_clear
-from truearm.planning.driving.joint_window import joint_window
+from truearm.planning.driving.joint_window import joint_window, on_principal_turn
 from truearm.planning.driving.ways import WayFinder
 from truearm.simulation.devices import Device, in_view_of
 from truearm.simulation.truths import carrying_targets
@@ -168,8 +168,8 @@ def device_candidates(
     """
     seen = in_view_of(device, robot)
     readings = device.campaign(seen, _AsSaid(seen.rigid), count, 0.0, rng)
-    at = Postures(readings.joints, approach=np.ones_like(readings.joints), number=np.zeros(count))
-    return seen, readings, at
+    readings = replace(readings, joints=on_principal_turn(seen, readings.joints))
+    return seen, readings, _forward(readings.joints)
 
 
 def plan_measurements(

@@ -99,8 +99,8 @@ class CollisionCheck:
         self._refuse_held()
         rooms = [*self._to_the_floor(), *self._to_the_boxes()]
         between = self._between_links()
-        apart = (self._measured(between, self.arm.sampled) >= self.need).any(axis=1) if between else ()
-        self._rooms = [*rooms, *(room for room, ever in zip(between, apart, strict=True) if ever)]
+        ever = np.flatnonzero((self._measured(between, self.arm.sampled) >= self.need).any(axis=1))
+        self._rooms = [*rooms, *(between[k] for k in ever)]
 
     # -- at postures ---------------------------------------------------------------------------------------
 

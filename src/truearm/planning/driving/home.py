@@ -57,11 +57,11 @@ def safe_configuration(check: CollisionCheck, low: Array, high: Array) -> Array:
     if room < check.need:
         number = int(np.argmin(check.rooms(best[None])[:, 0]))
         raise InputError(
-            "no safe configuration was found to start and to end in",
+            "no configuration was found in which the arm keeps clear, to start and to end in",
             parameter="home",
             came=f"{len(at) + _DRAWN} tried; in the best of them {check.words(number)}",
             allowed=f"{check.cell.clearance * 1e3:g} mm of room to everything",
-            cure="Give one (`home`), or lower `clearance`, or see that boxes and limits leave the arm room.",
+            cure="See that limits, floor and boxes leave the arm room; lower `clearance`, or give one (`home`).",
         )
     return best
 

@@ -44,3 +44,11 @@ def joint_window(
             low[k] = float(np.clip(-math.pi, low[k], max(low[k], high[k] - 2.0 * math.pi)))
             high[k] = min(high[k], low[k] + 2.0 * math.pi)
     return low, high
+
+
+def on_principal_turn(robot: Robot, joints: Array) -> Array:
+    """Return joint positions ``(n, joints)`` with every joint that turns on its turn of :func:`joint_window`."""
+    low, high = joint_window(robot)
+    turned = low + np.mod(joints - low, 2.0 * math.pi)
+    turns = np.array([joint.kind == "revolute" for joint in robot.joints])
+    return np.where(turns & (turned <= high) & ((joints < low) | (joints > high)), turned, joints)

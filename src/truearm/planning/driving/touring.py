@@ -69,7 +69,7 @@ def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Arr
 
 def _refuse_near(finder: WayFinder, entered: Array, joints: Array, labels: Sequence[str]) -> None:
     looked = finder.check.ways(entered, joints)
-    for k in np.flatnonzero(looked.room < finder.check.cell.clearance):
+    for k in np.flatnonzero(looked.room < finder.check.cell.clearance).tolist():
         raise InputError(
             "a configuration is too near to what the arm keeps clear of",
             where=f"configuration {labels[k]}",

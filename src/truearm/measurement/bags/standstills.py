@@ -203,7 +203,8 @@ def _refuse_motion(
                 came=f"{100 * off:.0f} % of the samples far from the others, the rest scattered by "
                 f"{1e3 * scatter:.3g} mm",
                 cure="If the clocks of the two topics differ, take the recorder's times: `times=bag`. If the arm "
-                "still shakes, leave out more of each standstill (`settle`). Record it again if somebody touched the target.",
+                "still shakes, leave out more of each standstill (`settle`). Record it again if somebody "
+                "touched the target.",
             )
 
 

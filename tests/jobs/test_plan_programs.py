@@ -6,14 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.plan_tours import a_tour
+from tests.simulated import campaign
 
 import truearm
 from truearm.errors import InputError
 from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
 from truearm.manifest import MANIFEST
-from truearm.measurement.dataset import Dataset
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.plan import Plan
@@ -205,8 +206,26 @@ def test_joints_of_a_short_arm_are_driven() -> None:
     assert "PTP {A1 " in planned.program.files["MEASURE.src"]
 
 
-def renamed(data: Dataset, name: str) -> Dataset:
-    return replace(data, labels=(name, *data.labels[1:]))
+def test_a_program_never_drives_the_arm_to_what_it_touches() -> None:
+    for device in ("ballbar", "hexapod", "plane", "two-sockets", "touch-up"):
+        with pytest.raises(InputError, match="brought to what it touches by hand, not by a program; got") as refusal:
+            truearm.plan("irb120", poses=10, candidates=30, device=device, program="rapid")
+        assert refusal.value.parameter == "program, device"
+    _, data = campaign("irb120", 12, 0.05e-3, 1)
+    touched = replace(data, fixtures=("plate",), against=np.zeros(len(data.target), dtype=np.intp))
+    with pytest.raises(InputError, match="readings against plate") as refusal:
+        wanted().check_readings(touched)
+    assert refusal.value.parameter == "program, candidates_from"
+    wanted().check_readings(data)
+
+
+def test_what_a_device_reads_stands_on_the_sheet(planned: Plan, tmp_path: Path) -> None:
+    reads = tuple(f"ball from anchor {k}" for k in range(10))
+    planned = replace(planned, made=replace(planned.made, reads=reads))
+    planned.save(tmp_path)
+    sheet = (tmp_path / "sheet.html").read_text()
+    assert "<th>Reads</th>" in sheet
+    assert "<td>ball from anchor 9</td>" in sheet
 
 
 @pytest.mark.parametrize("label", ["a;PAUSE", 'a"b', "x" * 22, "P\u00e9", " a", "a\nb", ""])
@@ -234,7 +253,7 @@ def test_a_folder_of_another_result_or_a_file_is_no_place(planned: Plan, folder:
 
 
 def test_programs_of_two_plans_never_stand_in_one_folder(folder: Path, planned: Plan) -> None:
-    with pytest.raises(InputError, match="the program of another plan is there.*got 'MEASURE.mod'") as refusal:
+    with pytest.raises(InputError, match=r"the program of another plan is there.*got 'MEASURE\.mod'") as refusal:
         refuse_other_programs(folder, ["MEASURE.src"])
     assert refusal.value.parameter == "out"
     refuse_other_programs(folder, ["MEASURE.mod"])

@@ -215,7 +215,7 @@ def plan(
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
     if wanted_program is not None:
-        wanted_program.check(carrying)
+        wanted_program.check(carrying, None if instrument is None else instrument.name)
     where = str(constraints) if isinstance(constraints, str | Path) else "constraints"
     cell = cell_argument(carrying, rules, where, floor, no_floor, clearance)
     # What was measured was reached: such configurations are checked where that is asked for.
@@ -227,6 +227,8 @@ def plan(
         own = True
     elif candidates_from is not None:
         data = readings_argument(carrying, candidates_from, "candidates_from")
+        if wanted_program is not None:
+            wanted_program.check_readings(data)
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
         own = own or bool(data.has_position.any())
     else:

@@ -17,6 +17,7 @@ from truearm.errors import InputError
 from truearm.jobs.arguments import choice_argument, flag_argument, folder_for, numbers_argument
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES
 from truearm.manifest import hash_of, sets_in
+from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
@@ -37,6 +38,17 @@ _WAITS: Final = "time; input N or input N,SECONDSs; operator"
 _INPUT: Final = re.compile(r"([0-9]{1,5}|[A-Za-z][A-Za-z0-9_]{0,31})")
 #: Languages whose inputs have names.
 _NAMED_INPUTS: Final = ("RAPID",)
+#: Devices that see the arm, or are fixed to it, while it is driven.
+_SEEN: Final = (
+    "tracker",
+    "measurement-arm",
+    "optical-cmm-planar",
+    "optical-cmm-spatial",
+    "markers",
+    "strings",
+    "stereo",
+    "five-lasers",
+)
 #: What labels may be made of in every language's comments and messages.
 _LABEL: Final = re.compile(r"[A-Za-z0-9_.+-]([A-Za-z0-9 _.+-]*[A-Za-z0-9_.+-])?")
 
@@ -62,13 +74,13 @@ class ProgramWanted:
     driving: Driving
     approach: bool
 
-    def check(self, robot: Robot) -> None:
-        """Refuse a robot that this language's programs cannot drive.
+    def check(self, robot: Robot, device: str | None = None) -> None:
+        """Refuse a robot that this language's programs cannot drive, and a device to which it is not driven.
 
         Raises
         ------
         InputError
-            If the maker's controllers do not speak it, or the arm has more than six joints.
+            If the maker's controllers do not speak it, the arm has more than six joints, or the device is touched.
         """
         if robot.maker and not self.language.runs_on(robot.maker):
             known = [name for name in _NAMES if PROGRAM_LANGUAGES[name].runs_on(robot.maker)]
@@ -87,6 +99,25 @@ class ProgramWanted:
                 where=robot.name,
                 came=f"{len(robot.joints)} joints",
                 cure="Plan without it, and drive the rows of plan.csv.",
+            )
+        if device is not None and device not in _SEEN:
+            raise InputError(
+                "an arm is brought to what it touches by hand, not by a program",
+                parameter="program, device",
+                came=device,
+                allowed=", ".join(_SEEN),
+                cure="Plan without a program.",
+            )
+
+    def check_readings(self, data: Dataset) -> None:
+        """Refuse configurations at which something was touched."""
+        if data.fixtures:
+            raise InputError(
+                "an arm is brought to what it touches by hand, not by a program",
+                parameter="program, candidates_from",
+                where=data.source,
+                came=f"readings against {', '.join(data.fixtures)}",
+                cure="Plan without a program.",
             )
 
     def check_labels(self, labels: Sequence[str]) -> None:

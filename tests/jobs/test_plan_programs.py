@@ -17,7 +17,9 @@ from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, wi
 from truearm.manifest import MANIFEST
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.planning.choosing.measurement_plan import device_candidates
 from truearm.results.plan import Plan
+from truearm.simulation.devices import named_device
 
 #: Enough for a plan, and quick.
 QUICK: dict[str, Any] = {"poses": 10, "candidates": 60, "clearance": 0.02, "seed": 1}
@@ -211,12 +213,13 @@ def test_a_program_never_drives_the_arm_to_what_it_touches() -> None:
         with pytest.raises(InputError, match="brought to what it touches by hand, not by a program; got") as refusal:
             truearm.plan("irb120", poses=10, candidates=30, device=device, program="rapid")
         assert refusal.value.parameter == "program, device"
-    _, data = campaign("irb120", 12, 0.05e-3, 1)
-    touched = replace(data, fixtures=("plate",), against=np.zeros(len(data.target), dtype=np.intp))
-    with pytest.raises(InputError, match="readings against plate") as refusal:
+    _, touched, _ = device_candidates(truearm.load_robot("irb120"), named_device("plane"), 20, np.random.default_rng(0))
+    with pytest.raises(
+        InputError, match="the arm may touch what these readings are against, and is brought there by hand; got 'plane"
+    ) as refusal:
         wanted().check_readings(touched)
     assert refusal.value.parameter == "program, candidates_from"
-    wanted().check_readings(data)
+    wanted().check_readings(campaign("irb120", 12, 0.05e-3, 1)[1])
 
 
 def test_what_a_device_reads_stands_on_the_sheet(planned: Plan, tmp_path: Path) -> None:

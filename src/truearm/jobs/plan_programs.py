@@ -113,10 +113,10 @@ class ProgramWanted:
         """Refuse configurations at which something was touched."""
         if data.fixtures:
             raise InputError(
-                "an arm is brought to what it touches by hand, not by a program",
+                "the arm may touch what these readings are against, and is brought there by hand",
                 parameter="program, candidates_from",
                 where=data.source,
-                came=f"readings against {', '.join(data.fixtures)}",
+                came=", ".join(data.fixtures),
                 cure="Plan without a program.",
             )
 

@@ -76,11 +76,7 @@ def visited(found: Program) -> list[str]:
     for move in found.moves:
         lines = found.sources[move.source].text.splitlines()[: move.line - 1]
         called.append(
-            next(
-                m[1]
-                for line in reversed(lines)
-                if (m := re.search(r"(Measure \S+|Home|On the way|Approach)", line))
-            )
+            next(m[1] for line in reversed(lines) if (m := re.search(r"(Measure \S+|Home|On the way|Approach)", line)))
         )
     return called
 

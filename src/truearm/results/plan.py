@@ -171,6 +171,8 @@ class Plan(Record):
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
         if self.tour is not None:
             text += tour_words(self.tour, made.robot, self.joints_are)
+            if made.fixtures:
+                text.append("The fixtures of the device are not kept clear of.")
         return [*text, *self.answer, *joints_lines(self.joints_are)]
 
     def save(self, file: str | Path) -> tuple[Path, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -23,7 +23,7 @@ def sampled_room(robot: Robot, q: np.ndarray, cell: Cell, points: int = _POINTS)
     places.append(robot.world_poses(q)[0])
     tips = [robot.world_poses(q, target.name)[0] for target in robot.targets]
     places, tips = ([(p - world.translation) @ world.rotation for p in row] for row in (places, tips))
-    steps = [np.linalg.norm(b - a, axis=1).max() for a, b in zip(places[:-1], places[1:], strict=True)]
+    steps = [np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(places)]
     long = sum(steps)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     links = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -163,7 +164,7 @@ def test_no_room_for_a_safe_configuration_is_refused() -> None:
     robot = arm()
     low, high = joint_window(robot)
     lid = KeepOut("lid", np.array([-2.0, -2.0, 0.32]), np.array([2.0, 2.0, 3.0]))
-    with pytest.raises(InputError, match="no configuration was found in which the arm keeps clear.*the box 'lid'"):
+    with pytest.raises(InputError, match=r"no configuration was found in which the arm keeps clear.*the box 'lid'"):
         safe_configuration(CollisionCheck(robot, Cell(boxes=(lid,))), low, high)
 
 
@@ -195,7 +196,7 @@ def test_a_way_goes_around_a_wall() -> None:
     assert "via" in kinds[kinds.index("measure") :]
     stops = tour.joints
     share = np.linspace(0.0, 1.0, 40)[:-1, None]
-    along = np.concatenate([a + share * (b - a) for a, b in zip(stops[:-1], stops[1:], strict=True)])
+    along = np.concatenate([a + share * (b - a) for a, b in pairwise(stops)])
     brute = sampled_room(robot, along, find.check.cell)
     assert brute.min() >= find.check.cell.clearance
     assert tour.room == pytest.approx(brute.min(), abs=0.02)
@@ -217,7 +218,7 @@ def test_a_configuration_behind_walls_is_refused_by_its_name() -> None:
     find = finder(robot, Cell(boxes=walls, clearance=0.01))
     q = np.array([find.home, find.home])
     q[1, 0] = np.deg2rad(80.0)
-    with pytest.raises(InputError, match="too near to what the arm keeps clear of.*the box 'left'") as refusal:
+    with pytest.raises(InputError, match=r"too near to what the arm keeps clear of.*the box 'left'") as refusal:
         tour_of(find, q, ["first", "second"])
     assert refusal.value.where == "configuration second"
     assert unreached(find, q, None) == [1]
@@ -234,7 +235,7 @@ def test_a_pair_without_a_way_is_named() -> None:
     check = CollisionCheck(robot, Cell(boxes=walls))
     left, right = np.deg2rad([[90.0, 60, -30, 0, 0, 0], [-90, 60, -30, 0, 0, 0]])
     find = WayFinder(check, left, low, high)
-    with pytest.raises(InputError, match="no way was found on which the arm keeps clear.*the box '(front|rear)'") as no:
+    with pytest.raises(InputError, match=r"no way was found on which the arm keeps clear.*the box '(front|rear)'") as no:
         tour_of(find, right[None], ["other side"])
     assert no.value.where == "from home to other side"
     assert unreached(find, np.array([left, right]), None) == [1]
@@ -245,6 +246,6 @@ def test_a_joint_that_would_be_wound_up_is_refused() -> None:
     find = finder(robot, Cell())
     q = np.zeros((2, 6))
     q[:, 5] = np.deg2rad([390.0, -10.0])
-    with pytest.raises(InputError, match="joint 6 is turned further than a cable follows.*400.0 deg") as refusal:
+    with pytest.raises(InputError, match=r"joint 6 is turned further than a cable follows.*400.0 deg") as refusal:
         tour_of(find, q, ["one", "two"])
     assert refusal.value.where == "between two and one"

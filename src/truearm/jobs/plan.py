@@ -229,6 +229,7 @@ def plan(
             seen_from_the_origin=own,
             readings=None if readings is None else readings.of_configurations(left),
             finder=finder,
+            without_way=len(choice) - len(left),
         )
         if finder is None:
             tour = None
@@ -239,10 +240,7 @@ def plan(
             tour = tour_of(finder, made.joints, made.labels, made.before)
             break
         left = np.delete(left, made.chosen[lost])
-    without = len(choice) - len(left)
-    if without:
-        rejected = {**made.rejected, "ways": without}
-        made = replace(made, chosen=left[made.chosen], candidates=len(choice), rejected=rejected)
+    made = replace(made, chosen=left[made.chosen])
     words = "" if goal is None else goal.words
     planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
     if table is not None:

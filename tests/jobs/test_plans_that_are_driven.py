@@ -170,12 +170,12 @@ def test_configurations_without_a_way_are_left_out_and_counted() -> None:
             "keep_out": {"front": {"x": [80, 5000], "y": [-20, 20]}, "rear": {"x": [-5000, -80], "y": [-20, 20]}},
         }
     )
-    _, data = campaign("irb120", 700, 0.05e-3, 1)
+    _, data = campaign("irb120", 200, 0.05e-3, 1)
     home = np.deg2rad([90.0, 60, -30, 0, 0, 0])
-    plan = partial(truearm.plan, "irb120", poses=8, candidates_from=data)
+    plan = partial(truearm.plan, "irb120", poses=4, candidates_from=data, floor=-1.0)
     planned = plan(constraints=rules, home=home, clearance=0.02)
     assert planned.made.rejected["ways"] > 0
-    assert planned.made.candidates == 700
+    assert planned.made.candidates == 200
     assert planned.tour is not None
     assert planned.joints[:, :5] == pytest.approx(data.joints[planned.made.chosen, :5])
     assert np.abs(planned.joints[:, 5]).max() <= np.pi

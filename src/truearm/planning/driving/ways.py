@@ -17,7 +17,7 @@ from truearm.modeling.chain import Array
 from truearm.planning.driving.collisions import CollisionCheck
 
 #: Of the ways around, how many are looked at together, the shortest first.
-_TOGETHER: Final = 16
+_TOGETHER: Final = 64
 #: How many configurations with much room are gone over at most.
 _ROOMY: Final = 48
 _DRAWN: Final = 600

@@ -47,6 +47,7 @@ from truearm.planning.choosing.measurement_plan import (
 )
 from truearm.planning.choosing.observability import INDICES
 from truearm.planning.constraints.constraints import Constraints, read_constraints
+from truearm.planning.driving.joint_window import on_principal_turn
 from truearm.planning.driving.touring import tour_of, unreached
 from truearm.results.plan import PAGE, Plan, ways_beside
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS
@@ -130,7 +131,8 @@ def plan(
         Height of the floor in the base frame [m], 0 or less; None for 0, and for none where the robot's gravity says
         that it does not stand. With a clearance it is kept by all that moves, as are the boxes of the constraints and
         the arm's own links: in every configuration, and on the ways from the safe one to the first, on to each other
-        and back. Configurations that are given were reached once: they are checked if one of these four is said.
+        and back. Configurations that are given were reached once: they are checked if one of these four is said, with
+        joints that can turn further than once on the turn from -180 to 180 deg.
     no_floor
         Whether there is no floor.
     clearance
@@ -236,8 +238,10 @@ def plan(
     if driven:
         progress("looking where the arm keeps clear")
         finder = finder_argument(seen, rules, where, cell, home)
-    if finder is not None and instrument is None and candidates_from is None:
-        choice = driven_candidates(seen, number, rng, finder)
+        if candidates_from is not None:
+            choice = replace(choice, joints=on_principal_turn(seen, choice.joints))
+        elif instrument is None:
+            choice = driven_candidates(seen, number, rng, finder)
     progress("looking where the robot shall be accurate")
     goal = accuracy_goal(seen, accurate_at, region, tools, frames, np.random.default_rng(seed))
     left = np.arange(len(choice))
@@ -258,6 +262,7 @@ def plan(
             seen_from_the_origin=own,
             readings=None if readings is None else readings.of_configurations(left),
             finder=finder,
+            without_way=len(choice) - len(left),
         )
         if finder is None:
             tour = None
@@ -269,10 +274,7 @@ def plan(
             tour = tour_of(finder, made.joints, made.labels, stops)
             break
         left = np.delete(left, made.chosen[lost])
-    without = len(choice) - len(left)
-    if without:
-        rejected = {**made.rejected, "ways": without}
-        made = replace(made, chosen=left[made.chosen], candidates=len(choice), rejected=rejected)
+    made = replace(made, chosen=left[made.chosen])
     words = "" if goal is None else goal.words
     planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
     if wanted_program is not None:

@@ -288,14 +288,15 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
                 "the robot file how it counts.",
             )
         )
-    if not (weighed and given.targets):
-        unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
+    unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
+    if unsaid:
+        cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []
+        cures += [] if given.targets else ["State the targets in the robot file."]
         found.append(
             Notice(
                 "tool-assumed",
                 f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is "
-                "assumed. A wrong load can stop the robot or let it give way. State `payload`, and the targets in the "
-                "robot file.",
+                f"assumed. {' '.join(cures)}",
             )
         )
     slow, fast = joint_rates(robot)

@@ -176,6 +176,8 @@ class Plan(Record):
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
         if self.tour is not None:
             text += tour_words(self.tour, made.robot, self.joints_are)
+            if made.fixtures:
+                text.append("The fixtures of the device are not kept clear of.")
         driven = [] if self.program is None else self.program.lines()
         return [*text, *self.answer, *joints_lines(self.joints_are), *driven]
 

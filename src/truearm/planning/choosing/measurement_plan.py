@@ -188,6 +188,7 @@ def plan_measurements(
     seen_from_the_origin: bool = True,
     readings: Dataset | None = None,
     finder: WayFinder | None = None,
+    without_way: int = 0,
 ) -> MeasurementPlan:
     """Choose configurations to measure.
 
@@ -220,6 +221,8 @@ def plan_measurements(
         at each.
     finder
         What the arm keeps clear of, at the candidates and where its accuracy is predicted; None for nothing.
+    without_way
+        How many candidates were left out because no way to them was found.
 
     Raises
     ------
@@ -233,10 +236,12 @@ def plan_measurements(
     if finder is not None:
         kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
+    rejected |= {"ways": without_way} if without_way else {}
+    total = len(candidates) + without_way
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
     given = "candidates" if labels is None else "candidates_from"
     count = FIRST if poses is None else poses
-    _refuse_too_few(count, len(usable), len(candidates), rejected, given)
+    _refuse_too_few(count, len(usable), total, rejected, given)
     if readings is None:
         free = model.free(seen)
         gauge: tuple[str, ...] = ()
@@ -299,7 +304,7 @@ def plan_measurements(
         joints=joints,
         before=before(seen, joints, None if finder is None else finder.low),
         indices=observability(known + chosen_rows.T @ chosen_rows, len(chosen)),
-        candidates=len(candidates),
+        candidates=total,
         rejected=rejected,
         usable=len(usable),
         left_out=tuple(name for k, name in enumerate(derivatives.free.names) if k not in among),

@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm.modeling.chain import Array
 
-_HALVINGS: Final = 30
+_HALVINGS: Final = 18
 
 
 def segment_distance(p1: Array, q1: Array, p2: Array, q2: Array) -> Array:
@@ -40,7 +40,7 @@ def segment_distance(p1: Array, q1: Array, p2: Array, q2: Array) -> Array:
 
 
 def box_distance(p: Array, q: Array, low: Array, high: Array) -> Array:
-    """Return the distance of segments ``p q``, each end ``(3, n)``, from a box with faces along the axes, ``(n,)``.
+    """Return the distance of segments ``p q``, each end ``(..., 3, n)``, from a box along the axes, ``(..., n)``.
 
     The square of the distance of a point from a box is convex along a line, so the nearest one is found by halving.
 
@@ -50,14 +50,15 @@ def box_distance(p: Array, q: Array, low: Array, high: Array) -> Array:
         Corners of the box, ``(3,)``; infinite where it does not end.
     """
     along = q - p
-    first, last = np.zeros(p.shape[-1]), np.ones(p.shape[-1])
+    shape = (*p.shape[:-2], p.shape[-1])
+    first, last = np.zeros(shape), np.ones(shape)
     for _ in range(_HALVINGS):
         middle = (first + last) / 2.0
-        point = p + middle * along
+        point = p + middle[..., None, :] * along
         rising = _dot(along, point - np.clip(point, low[:, None], high[:, None])) > 0
         first, last = np.where(rising, first, middle), np.where(rising, middle, last)
-    ends = (p + part * along for part in (0.0, 1.0, (first + last) / 2.0))
-    apart = [np.linalg.norm(point - np.clip(point, low[:, None], high[:, None]), axis=0) for point in ends]
+    ends = (p, q, p + ((first + last) / 2.0)[..., None, :] * along)
+    apart = [np.linalg.norm(point - np.clip(point, low[:, None], high[:, None]), axis=-2) for point in ends]
     return np.asarray(np.min(apart, axis=0))
 
 

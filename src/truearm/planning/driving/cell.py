@@ -58,7 +58,7 @@ def stands(robot: Robot) -> bool:
     """Return whether a robot stands on a floor: on a wall or a ceiling free fall points another way."""
     fall = np.array(robot.gravity)
     size = float(np.linalg.norm(fall))
-    return size > 0.0 and -fall[2] >= _STANDING * size
+    return bool(size > 0.0 and -fall[2] >= _STANDING * size)
 
 
 def refuse_floor_above_base(floor: float) -> None:

@@ -42,10 +42,6 @@ class _Piece:
     first: float = 0.0
     last: float = 1.0
 
-    def ends(self, points: Array) -> tuple[Array, Array]:
-        start, end = points[self.capsule.start], points[self.capsule.end]
-        return start + self.first * (end - start), start + self.last * (end - start)
-
 
 @dataclass(frozen=True)
 class _Room:
@@ -197,15 +193,20 @@ class CollisionCheck:
     def _measured(self, rooms: list[_Room], points: Array) -> Array:
         found = np.empty((len(rooms), points.shape[2]))
         pairs: list[tuple[int, _Piece, _Piece]] = []
+        boxed: dict[int, list[tuple[int, _Piece]]] = {}
         for k, room in enumerate(rooms):
             if room.piece is None:
                 assert self.cell.floor is not None
                 found[k] = points[room.point, 2] - room.radius - self.cell.floor
             elif room.other is None:
-                box = self.cell.boxes[room.box]
-                found[k] = box_distance(*room.piece.ends(points), box.low, box.high) - room.piece.capsule.radius
+                boxed.setdefault(room.box, []).append((k, room.piece))
             else:
                 pairs.append((k, room.piece, room.other))
+        for number, near in boxed.items():
+            box = self.cell.boxes[number]
+            thick = np.array([piece.capsule.radius for _, piece in near])
+            apart = box_distance(*_ends([piece for _, piece in near], points), box.low, box.high)
+            found[[k for k, _ in near]] = apart - thick[:, None]
         if pairs:
             rows, one, other = zip(*pairs, strict=True)
             radii = np.array([a.capsule.radius + b.capsule.radius for a, b in zip(one, other, strict=True)])

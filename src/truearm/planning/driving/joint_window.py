@@ -31,12 +31,14 @@ def joint_window(
         lowest, highest = joint.range
         low[k], high[k] = max(lowest, first[k]), min(highest, last[k])
         if low[k] > high[k]:
+            assert constraints is not None
             unit, size = ("deg", math.degrees(1.0)) if joint.kind == "revolute" else ("mm", 1e3)
+            as_given = constraints.units.angle if joint.kind == "revolute" else constraints.units.length
             raise InputError(
                 f"the limits of joint {k + 1} leave nothing of what the robot has",
                 parameter="constraints",
                 where=f"{where}, limits",
-                came=f"{size * first[k]:.6g} to {size * last[k]:.6g} {unit}",
+                came="{:g} to {:g} {}".format(*constraints.limits[k + 1], as_given),
                 allowed=f"within {size * lowest:.6g} to {size * highest:.6g} {unit}",
                 cure="Check the number of the joint, and the sign and the unit of its limits.",
             )

@@ -16,11 +16,11 @@ from truearm.planning.driving.ways import Way, WayFinder
 def unreached(finder: WayFinder, joints: Array, before: Array | None) -> list[int]:
     """Return the numbers of configurations ``(n, joints)`` to which no way from the safe one was found."""
     entered = joints if before is None else before
-    clear = np.flatnonzero(finder.check.ways(entered, joints).clear)
-    there, back = finder.home_from(entered[clear]), finder.home_from(joints[clear])
-    ways = zip(clear.tolist(), there, back, strict=True)
-    reached = {k for k, one, other in ways if one is not None and other is not None}
-    return [k for k in range(len(joints)) if k not in reached]
+    left = np.flatnonzero(finder.check.ways(entered, joints).clear)
+    for at in (joints, entered):
+        ways = finder.home_from(at[left])
+        left = left[[way is not None for way in ways]]
+    return sorted(set(range(len(joints))) - set(left.tolist()))
 
 
 def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Array | None = None) -> Tour:

@@ -17,7 +17,7 @@ from truearm.modeling.chain import Array
 from truearm.planning.driving.collisions import CollisionCheck
 
 #: Of the ways around, how many are looked at together, the shortest first.
-_TOGETHER: Final = 16
+_TOGETHER: Final = 64
 #: How many configurations with much room are gone over at most.
 _ROOMY: Final = 48
 _DRAWN: Final = 600
@@ -108,7 +108,7 @@ class WayFinder:
         return None
 
     def _over_roomy(self, start: Array) -> Way | None:
-        """Return a way home over a configuration with much room, from which the way home is known."""
+        """Return a way home over a configuration with much room, from which the way home is straight."""
         roomy, ways = self._with_room()
         if not len(roomy):
             return None
@@ -128,11 +128,7 @@ class WayFinder:
             most = most[room[most] >= self.check.need]
             at = drawn[most]
             ways = self._straight(at, np.broadcast_to(self.home, at.shape))
-            known: list[tuple[int, Way]] = []
-            for k, way in enumerate(ways):
-                way = way or self._around(at[k], self.home)
-                if way is not None:
-                    known.append((k, way))
+            known = [(k, way) for k, way in enumerate(ways) if way is not None]
             self._roomy = at[[k for k, _ in known]], [way for _, way in known]
         return self._roomy
 

@@ -1,0 +1,265 @@
+"""Plans that an arm can drive: floor, boxes and its own links are kept clear, at every stop and on every way."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.sampled_arm import sampled_room
+from tests.simulated import campaign
+
+import truearm
+from truearm.errors import InputError
+from truearm.library import library
+from truearm.modeling.robot import Robot
+from truearm.planning.choosing import prediction
+from truearm.planning.constraints.constraints import Constraints
+from truearm.planning.driving.cell import Cell, boxes_of
+from truearm.results.plan import Plan
+
+HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
+TABLE = {"table": {"x": [300, 700], "y": [-300, 300], "z": [-1000, 150]}}
+
+
+def of_every_maker() -> list[str]:
+    """One arm of each maker in the library, ten at most."""
+    arms: dict[str, str] = {}
+    for name in library():
+        arms.setdefault(truearm.load_robot(name).maker or name, name)
+    return [*arms.values()][:10]
+
+
+def on_the_ways(planned: Plan, steps: int = 12) -> np.ndarray:
+    """Joint positions on all ways of a plan, each joint moving evenly from stop to stop."""
+    assert planned.tour is not None
+    stops = planned.tour.joints
+    share = np.linspace(0.0, 1.0, steps)[:, None]
+    return np.concatenate([a + share * (b - a) for a, b in pairwise(stops)])
+
+
+def window(robot: Robot) -> np.ndarray:
+    """Limits, and -180 to 180 deg for joints that can turn so far both ways."""
+    limits = np.array([joint.range for joint in robot.joints])
+    for k, joint in enumerate(robot.joints):
+        if joint.kind == "revolute" and limits[k, 0] <= -np.pi and limits[k, 1] >= np.pi:
+            limits[k] = -np.pi, np.pi
+    return limits
+
+
+def a_quarter(robot: Robot) -> Constraints:
+    """Limits of a quarter of what each joint has, in its middle."""
+    size = [np.degrees(1.0) if joint.kind == "revolute" else 1e3 for joint in robot.joints]
+    limits = {
+        k: ((low + high) / 2 + (high - low) / 8 * np.array([-1.0, 1.0])) * by
+        for k, ((low, high), by) in enumerate(zip(window(robot), size, strict=True), 1)
+    }
+    return Constraints.model_validate({**HEAD, "limits": {k: tuple(v.tolist()) for k, v in limits.items()}})
+
+
+@pytest.mark.parametrize("name", of_every_maker())
+def test_thirty_poses_are_driven(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prediction, "NUMBERS", (30,))  # what other numbers would do takes most of the time
+    planned = truearm.plan(name, poses=30, candidates=400)
+    robot, tour = planned.made.robot, planned.tour
+    assert tour is not None
+    assert [stop.label for stop in tour.measured] == [str(k + 1) for k in range(30)]
+    assert np.array_equal(np.array([stop.joints for stop in tour.measured]), planned.joints)
+    assert [tour.stops[k].kind for k in (0, -1)] == ["home", "home"]
+    assert np.array_equal(tour.stops[0].joints, tour.stops[-1].joints)
+    low, high = window(robot).T
+    assert ((tour.joints >= low - 1e-9) & (tour.joints <= high + 1e-9)).all()
+    assert robot.forward(planned.joints)[0][:, 2].min() > 0.05
+    room = sampled_room(robot, on_the_ways(planned), Cell(), points=7)
+    assert room.min() >= 0.05
+    assert 0.05 <= tour.room <= sampled_room(robot, tour.joints, Cell()).min() + 1e-5
+
+
+@pytest.mark.parametrize("name", ["irb120", "ur5e", "fr3"])
+def test_limits_of_a_quarter_leave_as_many_to_choose_from(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prediction, "NUMBERS", (30,))
+    robot = truearm.load_robot(name)
+    rules = a_quarter(robot)
+    planned = truearm.plan(robot, poses=30, candidates=400, constraints=rules)
+    assert planned.made.usable == 400
+    assert not any(planned.made.rejected.values())
+    assert planned.tour is not None
+    for number, (low, high) in rules.limits.items():
+        there = np.rad2deg(planned.tour.joints[:, number - 1])
+        assert ((there >= low - 1e-9) & (there <= high + 1e-9)).all()
+
+
+def test_boxes_of_the_cell_are_kept_out_of() -> None:
+    rules = Constraints.model_validate({**HEAD, "keep_out": TABLE})
+    free, kept = (truearm.plan("irb120", poses=20, candidates=150, constraints=one) for one in (None, rules))
+    box = TABLE["table"]
+    low, high = 1e-3 * np.array([box[axis] for axis in "xyz"]).T
+    cell = Cell(boxes=boxes_of({"table": (low, high)}))
+    robot = kept.made.robot
+    assert sampled_room(robot, on_the_ways(free), cell, points=9).min() < 0.05
+    assert sampled_room(robot, on_the_ways(kept), cell, points=9).min() >= 0.05
+
+
+def test_a_lower_floor_and_more_room() -> None:
+    low = truearm.plan("irb120", poses=20, candidates=150, floor=-0.4, clearance=0.1)
+    assert low.tour is not None
+    assert (low.tour.floor, low.tour.clearance) == (-0.4, 0.1)
+    room = sampled_room(low.made.robot, on_the_ways(low), Cell(-0.4, clearance=0.1), points=9)
+    assert room.min() >= 0.1
+    assert low.made.robot.forward(low.joints)[0][:, 2].min() < 0.0
+    assert "floor at -400 mm, boxes and links." in low.lines()[3]
+
+
+def test_a_file_with_a_floor_below_the_base_lowers_it() -> None:
+    rules = Constraints.model_validate({**HEAD, "floor": -300})
+    planned = truearm.plan("irb120", poses=12, candidates=60, constraints=rules)
+    assert planned.tour is not None
+    assert planned.tour.floor == pytest.approx(-0.3)
+    above = truearm.plan("irb120", poses=12, candidates=60, constraints=rules.model_copy(update={"floor": 80.0}))
+    assert above.tour is not None
+    assert above.tour.floor == 0.0
+
+
+def test_a_robot_that_hangs_has_no_floor() -> None:
+    planned = truearm.plan("irb120", poses=12, candidates=60, gravity=(0.0, 0.0, 9.81))
+    assert planned.tour is not None
+    assert planned.tour.floor is None
+    assert "No floor is kept clear: by its gravity the robot does not stand on one." in planned.lines()
+    mounted = truearm.plan("irb120", poses=12, candidates=60, gravity=(0.0, 0.0, 9.81), floor=0.0)
+    assert mounted.tour is not None
+    assert mounted.tour.floor == 0.0
+    without = truearm.plan("irb120", poses=12, candidates=60, no_floor=True)
+    assert without.tour is not None
+    assert without.tour.floor is None
+    assert not any("gravity" in line for line in without.lines())
+    assert without.made.robot.forward(without.joints)[0][:, 2].min() < 0.0
+
+
+def test_a_safe_configuration_that_is_given_is_driven_from() -> None:
+    home = np.deg2rad([10.0, -20, 10, 0, 30, 0])
+    planned = truearm.plan("irb120", poses=12, candidates=60, home=home)
+    assert planned.tour is not None
+    assert np.array_equal(planned.tour.home, home)
+    assert any(line.startswith("Driven from home (10, -20, 10, 0, 30, 0) and back in ") for line in planned.lines())
+    assert planned.summary()["ways"]["home"] == pytest.approx([10, -20, 10, 0, 30, 0])
+
+
+def test_given_configurations_are_checked_where_that_is_asked_for() -> None:
+    _, data = campaign("irb120", 40, 0.05e-3, 1)
+    plain = truearm.plan("irb120", poses=12, candidates_from=data)
+    assert plain.tour is None
+    assert plain.made.usable == 40
+    assert "ways" not in plain.summary()
+    driven = truearm.plan("irb120", poses=12, candidates_from=data, clearance=0.05)
+    assert driven.tour is not None
+    assert driven.made.usable < 40
+    assert driven.made.rejected["floor"] > 0
+    below = driven.made.robot.forward(data.joints)[0][:, 2] < 0.0
+    assert not set(np.array(data.labels)[below]) & set(driven.labels)
+
+
+def test_configurations_without_a_way_are_left_out_and_counted() -> None:
+    """Of two sides of a wall with a gap too narrow for the upper arm one is out of reach."""
+    rules = Constraints.model_validate(
+        {
+            **HEAD,
+            "keep_out": {"front": {"x": [80, 5000], "y": [-20, 20]}, "rear": {"x": [-5000, -80], "y": [-20, 20]}},
+        }
+    )
+    _, data = campaign("irb120", 200, 0.05e-3, 1)
+    home = np.deg2rad([90.0, 60, -30, 0, 0, 0])
+    plan = partial(truearm.plan, "irb120", poses=4, candidates_from=data, floor=-1.0)
+    planned = plan(constraints=rules, home=home, clearance=0.02)
+    assert planned.made.rejected["ways"] > 0
+    assert planned.made.candidates == 200
+    assert planned.tour is not None
+    assert planned.joints[:, :5] == pytest.approx(data.joints[planned.made.chosen, :5])
+    assert np.abs(planned.joints[:, 5]).max() <= np.pi
+    assert (planned.made.robot.forward(planned.joints)[0][:, 1] > 0.0).all()
+
+
+def test_a_device_that_winds_no_cable() -> None:
+    planned = truearm.plan("irb120", poses=12, candidates=150, device="ballbar")
+    assert planned.tour is not None
+    assert np.abs(planned.joints[:, 5]).max() <= np.pi
+    assert "The fixtures of the device are not kept clear of." in planned.lines()
+
+
+@pytest.mark.parametrize(
+    ("given", "parameter", "words"),
+    [
+        ({"floor": 0.1}, "floor", "the floor is above the base of the robot; got '100 mm'; allowed: 0 mm or less"),
+        ({"floor": -0.1, "no_floor": True}, "floor, no_floor", "a floor is given and denied; got '-100 mm'"),
+        ({"floor": "0"}, "floor", "number"),
+        ({"no_floor": 1}, "no_floor", "yes or no belongs here"),
+        ({"clearance": -0.01}, "clearance", "the length is out of range"),
+        ({"clearance": 0.9}, "home", "no configuration was found in which the arm keeps clear"),
+        ({"home": [0.0] * 5}, "home", "6 numbers belong here"),
+        ({"home": [0.0, 0, 0, 0, 0, 6.5]}, "home", "joint 6 of the safe configuration is not where"),
+        ({"home": [0.0, 1.5, 0, 0, 0, 0]}, "home", "the safe configuration is not clear"),
+    ],
+)
+def test_what_cannot_be_driven_is_refused(given: dict[str, object], parameter: str, words: str) -> None:
+    with pytest.raises(InputError, match=words) as refusal:
+        truearm.plan("irb120", poses=12, candidates=60, **given)  # type: ignore[arg-type]
+    assert refusal.value.parameter == parameter
+
+
+@pytest.mark.parametrize(
+    ("entries", "words"),
+    [
+        ({"keep_out": {"table": {}}}, "keep_out, table: a box to keep out of that has no end leaves no room"),
+        ({"keep_out": {"table": {"x": [5, 1]}}}, "keep_out, table, x: the range is empty"),
+        ({"keep_out": {"cage": {"x": [-900, 900], "y": [-900, 900], "z": [-100, 1500]}}}, "holds the base"),
+        ({"keep_out": {"block": {"x": [250, 500], "y": [-200, 200], "z": [500, 900]}}}, "is not clear.*box 'block'"),
+        ({"limits": {2: [200, 300]}}, "the limits of joint 2 leave nothing.*'200 to 300 deg'.*-110 to 110"),
+        ({"limits": {2: [100, 110], 3: [60, 70]}}, "no configuration was found|is not clear|not where the plan"),
+    ],
+)
+def test_cells_without_room_are_refused(entries: dict[str, object], words: str) -> None:
+    rules = Constraints.model_validate({**HEAD, **entries})
+    with pytest.raises(InputError, match=words):
+        truearm.plan("irb120", poses=12, candidates=60, constraints=rules, home=[0.0] * 6)
+
+
+def test_all_stops_are_written(tmp_path: Path) -> None:
+    out = tmp_path / "plan.csv"
+    planned = truearm.plan("irb120", poses=12, candidates=60, out=out)
+    assert planned.tour is not None
+    with (tmp_path / "plan-ways.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["stop"] for row in rows] == [stop.kind for stop in planned.tour.stops]
+    assert [row["configuration"] for row in rows if row["configuration"]] == [*planned.labels]
+    joints = np.array([[float(row[f"joint_{k} [deg]"]) for k in range(1, 7)] for row in rows])
+    assert np.deg2rad(joints) == pytest.approx(planned.tour.joints)
+    with out.open(newline="") as file:
+        first = next(csv.DictReader(file))
+    approach = rows[[row["stop"] for row in rows].index("measure") - 1]
+    assert approach["stop"] == "approach"
+    assert [approach[f"joint_{k} [deg]"] for k in range(1, 7)] == [first[f"approach_{k} [deg]"] for k in range(1, 7)]
+    (tmp_path / "other-ways.csv").mkdir()
+    with pytest.raises(InputError, match="this is a folder"):
+        truearm.plan("irb120", poses=12, candidates=60, out=tmp_path / "other.csv")
+
+
+def test_a_plan_is_as_good_as_one_that_hits_the_floor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By what the priors and the readings tell of the parameters, all over the reach."""
+    monkeypatch.setattr(prediction, "NUMBERS", (30,))
+    driven = truearm.plan("irb120", poses=30, candidates=600)
+    anywhere = truearm.plan("irb120", poses=30, candidates=600, no_floor=True, clearance=0.0)
+    assert driven.made.prediction.planned < 1.02 * anywhere.made.prediction.planned
+
+
+def test_a_calibrated_robot_is_looked_at_where_its_table_says() -> None:
+    robot = truearm.load_robot("irb120")
+    moved = robot.with_values({"base_x": 0.5, "base_z": 0.7})
+    here, there = (truearm.plan(one, poses=12, candidates=60) for one in (robot, moved))
+    assert here.tour is not None
+    assert there.tour is not None
+    assert np.array_equal(here.tour.home, there.tour.home)
+    assert there.made.robot.forward(there.joints)[0][:, 2].min() > 0.05
+    assert replace(here.tour.stops[0], label=None).kind == "home"

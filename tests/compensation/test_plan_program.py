@@ -137,70 +137,94 @@ STOPS = {
     "inform": r"MOVJ C\d{5} VJ=\d+\.00 PL=0",
     "val3": r"  movej\(jPath\[\d+\],flange,mJoint\)",
 }
+#: How long it stands, and how it waits for the operator.
 STANDS = {
-    "rapid": {
-        "time": r"WaitTime \\InPos,2;",
-        "input": (
-            r"WaitDI di3,1\\MaxTime:=300\\TimeFlag:=late;\n    IF late THEN\n"
-            r"      TPWrite \"P001: no signal\";\n      Stop;\n    ENDIF"
-        ),
-        "operator": r'TPWrite "P001: measure, then start again";\n    Stop;',
-    },
-    "krl": {
-        "time": r"WAIT SEC 2\n",
-        "input": (
-            r"\$TIMER\[20\] = -300000\n.*\n  WAIT FOR \$IN\[3\] OR \$TIMER_FLAG\[20\]\n"
-            r"  IF \$TIMER_FLAG\[20\] THEN\n    ; P001: no signal\n    HALT\n  ENDIF"
-        ),
-        "operator": r"; P001: measure, then start again\n  HALT",
-    },
-    "fanuc-ls": {
-        "time": r"WAIT   2\.00\(sec\)",
-        "input": (
-            r"\$WAITTMOUT=30000    ;\n.*WAIT DI\[3\]=ON TIMEOUT,LBL\[1\]    ;\n.*JMP LBL\[2\]    ;\n"
-            r".*LBL\[1\]    ;\n.*!P001: no signal    ;\n.*PAUSE    ;\n.*LBL\[2\]"
-        ),
-        "operator": r"!Measure, then start again    ;\n.*PAUSE    ;",
-    },
-    "urscript": {
-        "time": r"sleep\(2\)",
-        "input": (
-            r"looks = 15000\n  while \(looks > 0 and get_standard_digital_in\(3\) == False\):\n"
-            r"    sleep\(0\.02\)\n    looks = looks - 1\n  end\n  if \(looks <= 0\):\n"
-            r"    popup\(\"P001: no signal\", blocking=True\)\n  end"
-        ),
-        "operator": r'popup\("P001: measure, then go on", blocking=True\)',
-    },
-    "inform": {
-        "time": r"TIMER T=2\n",
-        "input": r"WAIT IN#\(3\)=ON T=300\.00\n'P001: no signal\nPAUSE IF IN#\(3\)=OFF",
-        "operator": r"'Measure, then start again\nPAUSE\n",
-    },
-    "val3": {
-        "time": r"waitEndMove\(\)\n  delay\(2\)",
-        "input": (
-            r"if watch\(diMeasure==true,300\)==false\n    userPage\(\)\n"
-            r'    putln\("P001: no signal, press a key"\)\n    nKey=get\(\)\n  endIf'
-        ),
-        "operator": r'userPage\(\)\n  putln\("P001: measure, press a key"\)\n  nKey=get\(\)',
-    },
+    "rapid": (r"WaitTime \\InPos,2;", r'TPWrite "P\d+: measure, then start again";\n    Stop;'),
+    "krl": (r"WAIT SEC 2\n", r"; P\d+: measure, then start again\n  HALT"),
+    "fanuc-ls": (r"WAIT   2\.00\(sec\)", r"!Measure, then start again    ;\n.*PAUSE    ;"),
+    "urscript": (r"sleep\(2\)", r'popup\("P\d+: measure, then go on", blocking=True\)'),
+    "inform": (r"TIMER T=2\n", r"'Measure, then start again\nPAUSE\n"),
+    "val3": (
+        r"waitEndMove\(\)\n  delay\(2\)",
+        r'userPage\(\)\n  putln\("P\d+: measure, press a key"\)\n  nKey=get\(\)',
+    ),
+}
+#: How it waits for input 3 in P001: until it is off, then until it is on; lines without their numbers and blanks.
+INPUTS = {
+    "rapid": """
+WaitDI di3,0\\MaxTime:=300\\TimeFlag:=late;
+IF NOT late WaitDI di3,1\\MaxTime:=300\\TimeFlag:=late;
+IF late THEN
+TPWrite "P001: no signal";
+Stop;
+ENDIF""",
+    "krl": """
+$TIMER_STOP[20] = TRUE
+$TIMER[20] = -300000
+$TIMER_STOP[20] = FALSE
+WAIT FOR (NOT $IN[3]) OR $TIMER_FLAG[20]
+WAIT FOR $IN[3] OR $TIMER_FLAG[20]
+IF $TIMER_FLAG[20] THEN
+; P001: no signal
+HALT
+ENDIF""",
+    "fanuc-ls": """
+$WAITTMOUT=30000    ;
+WAIT DI[3]=OFF TIMEOUT,LBL[1]    ;
+WAIT DI[3]=ON TIMEOUT,LBL[1]    ;
+JMP LBL[2]    ;
+LBL[1]    ;
+!P001: no signal    ;
+PAUSE    ;
+LBL[2]    ;""",
+    "urscript": """
+looks = 15000
+while (looks > 0 and get_standard_digital_in(3) == True):
+sleep(0.02)
+looks = looks - 1
+end
+while (looks > 0 and get_standard_digital_in(3) == False):
+sleep(0.02)
+looks = looks - 1
+end
+if (looks <= 0):
+popup("P001: no signal", blocking=True)
+end""",
+    "inform": """
+WAIT IN#(3)=OFF T=300.00
+'P001: no signal
+PAUSE IF IN#(3)=ON
+WAIT IN#(3)=ON T=300.00
+'P001: no signal
+PAUSE IF IN#(3)=OFF""",
+    "val3": """
+if watch(diMeasure==false,300)==false
+userPage()
+putln("P001: no signal, press a key")
+nKey=get()
+endIf
+if watch(diMeasure==true,300)==false
+userPage()
+putln("P001: no signal, press a key")
+nKey=get()
+endIf""",
 }
 
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_the_robot_stops_stands_and_waits_in_every_configuration(name: str) -> None:
+    stands, operator = STANDS[name]
     for wait in WAITS:
         _, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
         text = text_of(name, program)
-        assert len(re.findall(STOPS[name], text)) == len(tour.stops)
+        plain = re.sub(r"^ *(\d+:)? *", "", text, flags=re.M)
         count = len(tour.measured)
+        assert len(re.findall(STOPS[name], text)) == len(tour.stops)
         assert sum(isinstance(step, Wait) for step in program.steps) == count
-        assert len(re.findall(STANDS[name]["time"], text)) == count
-        label = tour.measured[0].label
-        assert label == "P001"
-        for other in WAITS[1:]:
-            expected = 1 if other == wait and "P001" in STANDS[name][other] else count if other == wait else 0
-            assert len(re.findall(STANDS[name][other], text)) == expected, (wait, other)
+        assert len(re.findall(stands, text)) == count
+        assert len(re.findall(operator, text)) == (count if wait == "operator" else 0)
+        assert plain.count(INPUTS[name]) == (1 if wait == "input" else 0)
+        assert text.count("no signal") == (INPUTS[name].count("no signal") * count if wait == "input" else 0)
     assert ("BasicIO-1\\%I3" in text_of(name, made(name)[2])) == (name == "val3")
 
 

@@ -38,7 +38,7 @@ MEASURED: Final = "Measure"
 LONGEST_LABEL: Final = 21
 #: At 100 % no joint of an arm is faster than this: of the first three, and of the others [rad/s], nor do they turn the
 #: stretched arm faster [m/s].
-_FAST: Final = ((math.radians(600.0), 12.0), (math.radians(1500.0), math.radians(2500.0)))
+_FAST: Final = ((math.radians(600.0), 12.0), (math.radians(1600.0), math.radians(2500.0)))
 #: At 100 % no joint is slower, of an arm that is no longer than this stretched [m], and of longer ones [rad/s].
 _SLOW: Final = (2.0, math.radians(100.0), math.radians(50.0))
 #: The same of sliding joints: the slowest and the fastest [m/s].

@@ -114,7 +114,9 @@ class Remark:
 
 @dataclass(frozen=True, slots=True)
 class InputWait:
-    """The robot stands still until a digital input is on; where it stays off too long, the program pauses.
+    """The robot stands still until a digital input was off and is on; where that takes too long, the program pauses.
+
+    An input that is still on from the time before does not count.
 
     Attributes
     ----------

@@ -51,6 +51,7 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
                 late += 1
                 steps += [
                     f"  $WAITTMOUT={round(100.0 * step.seconds)}    ;",
+                    f"  WAIT DI[{step.input}]=OFF TIMEOUT,LBL[{2 * late - 1}]    ;",
                     f"  WAIT DI[{step.input}]=ON TIMEOUT,LBL[{2 * late - 1}]    ;",
                     f"  JMP LBL[{2 * late}]    ;",
                     f"  LBL[{2 * late - 1}]    ;",

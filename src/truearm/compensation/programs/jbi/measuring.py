@@ -64,8 +64,9 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
             case Remark():
                 steps.append(f"'{step.text}")
             case InputWait():
-                steps.append(f"WAIT IN#({step.input})=ON T={step.seconds:.2f}")
-                steps += [f"'{step.label}: no signal", f"PAUSE IF IN#({step.input})=OFF"]
+                for state, other in (("OFF", "ON"), ("ON", "OFF")):
+                    steps.append(f"WAIT IN#({step.input})={state} T={step.seconds:.2f}")
+                    steps += [f"'{step.label}: no signal", f"PAUSE IF IN#({step.input})={other}"]
             case Pause():
                 steps += ["'Measure, then start again", "PAUSE"]
         arc = isinstance(step, CircleMove)

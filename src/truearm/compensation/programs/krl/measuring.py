@@ -67,6 +67,7 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
                     f"  $TIMER_STOP[{_TIMER}] = TRUE",
                     f"  $TIMER[{_TIMER}] = -{round(1e3 * step.seconds)}",
                     f"  $TIMER_STOP[{_TIMER}] = FALSE",
+                    f"  WAIT FOR (NOT $IN[{step.input}]) OR $TIMER_FLAG[{_TIMER}]",
                     f"  WAIT FOR $IN[{step.input}] OR $TIMER_FLAG[{_TIMER}]",
                     f"  IF $TIMER_FLAG[{_TIMER}] THEN",
                     f"    ; {step.label}: no signal",

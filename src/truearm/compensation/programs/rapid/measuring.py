@@ -61,7 +61,8 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
                 steps.append(f"    ! {step.text}")
             case InputWait():
                 signal = f"di{step.input}" if step.input.isdigit() else step.input
-                steps.append(f"    WaitDI {signal},1\\MaxTime:={number(step.seconds, 2)}\\TimeFlag:=late;")
+                wait, limit = f"WaitDI {signal}", f"\\MaxTime:={number(step.seconds, 2)}\\TimeFlag:=late;"
+                steps += [f"    {wait},0{limit}", f"    IF NOT late {wait},1{limit}"]
                 steps += ["    IF late THEN", f'      TPWrite "{step.label}: no signal";', "      Stop;", "    ENDIF"]
             case Pause():
                 steps += [f'    TPWrite "{step.label}: measure, then start again";', "    Stop;"]

@@ -56,10 +56,8 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
             case InputWait():
                 lines += [
                     f"  looks = {round(step.seconds / _LOOKING)}",
-                    f"  while (looks > 0 and get_standard_digital_in({step.input}) == False):",
-                    f"    sleep({_LOOKING})",
-                    "    looks = looks - 1",
-                    "  end",
+                    *_looked(step.input, "True"),
+                    *_looked(step.input, "False"),
                     "  if (looks <= 0):",
                     f'    popup("{step.label}: no signal", blocking=True)',
                     "  end",
@@ -74,3 +72,13 @@ def _carried(carried: Carried | None) -> list[str]:
         return ["  set_tcp(p[0, 0, 0, 0, 0, 0])"]
     tip, cog = (", ".join(number(v, 6) for v in point) for point in (carried.tip, carried.cog))
     return [f"  set_tcp(p[{tip}, 0, 0, 0])", f"  set_payload({number(carried.mass, 3)}, [{cog}])"]
+
+
+def _looked(signal: str, state: str) -> list[str]:
+    """Return a loop that ends when an input has left a state, or there are no more looks."""
+    return [
+        f"  while (looks > 0 and get_standard_digital_in({signal}) == {state}):",
+        f"    sleep({_LOOKING})",
+        "    looks = looks - 1",
+        "  end",
+    ]

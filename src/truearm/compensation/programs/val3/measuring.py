@@ -76,8 +76,10 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
             case Remark():
                 lines.append(f"  // {step.text}")
             case InputWait():
-                lines += ["  waitEndMove()", f"  if watch(diMeasure==true,{number(step.seconds, 2)})==false"]
-                lines += [f"  {line}" for line in _asked(f"{step.label}: no signal, press a key")] + ["  endIf"]
+                lines.append("  waitEndMove()")
+                for state in ("false", "true"):
+                    lines.append(f"  if watch(diMeasure=={state},{number(step.seconds, 2)})==false")
+                    lines += [f"  {line}" for line in _asked(f"{step.label}: no signal, press a key")] + ["  endIf"]
             case Pause():
                 lines += ["  waitEndMove()", *_asked(f"{step.label}: measure, press a key")]
     return application(program.name, data, lines)

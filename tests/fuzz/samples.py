@@ -61,6 +61,9 @@ visibility:
   instrument: [2500, 0, 500]
   targets: {"1": [0, 0, 1]}
 clearance: 60
+keep_out:
+  table: {x: [600, 900], y: [-300, 300], z: [-100, 20]}
+  wall: {x: [-2000, -700]}
 """
 FLEET = """\
 truearm: truearm-fleet/1

@@ -2,8 +2,8 @@
 
 A way is driven with all joints moving at once, each from one value to the other. It is looked at where it is needed:
 how fast the distance of two bodies changes at most follows from the lengths between the joints that move one against
-the other, so that two postures with much room answer for what lies between them (conservative advancement: Mirtich,
-"Impulse-based dynamic simulation of rigid body systems", 1996, chapter 2).
+the other, so that two postures with much room answer for what lies between them (conservative advancement: Mirtich
+1996, "Impulse-based dynamic simulation of rigid body systems").
 """
 
 from __future__ import annotations

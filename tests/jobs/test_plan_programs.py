@@ -153,6 +153,16 @@ def test_what_is_asked_of_a_program_is_taken(planned: Plan) -> None:
     assert [notice.code for notice in named.program.warnings] == ["joint-speed-assumed"]
 
 
+def test_a_speed_below_the_lowest_share_of_a_language_is_told(planned: Plan) -> None:
+    for program, codes in (("krl", ["faster-than-asked", "joint-speed-assumed"]), ("val3", ["joint-speed-assumed"])):
+        slow = with_program(planned, wanted(program=program, speed=(0.01,)), planned.made.robot, weighed=True).program
+        assert slow is not None
+        assert [notice.code for notice in slow.warnings] == codes
+        assert (slow.fastest > 0.011) == (program == "krl")
+        assert slow.summary()["speed_mm_s"] == 1e3 * slow.fastest
+    assert "KRL says no share below 1 %" not in "\n".join(planned.lines())
+
+
 @pytest.mark.parametrize(
     ("robot", "program", "message"),
     [

@@ -47,8 +47,9 @@ _SLIDING: Final = (0.2, 5.0)
 _RAMPS: Final = 0.5
 #: Ways are looked at in steps of no more [rad or m].
 _STEP: Final = math.radians(3.0)
-#: The lowest share that a program says.
-_LOWEST: Final = 0.01
+#: The finest share that a language says; URScript says a speed instead.
+_FINEST: Final = {"KRL": 0.01, "FANUC LS": 0.01, "URScript": 1e-6}
+_FINEST_ELSEWHERE: Final = 1e-4
 _FIRST_JOINTS: Final = 3
 #: Share, speed of the tip, time and angular velocity of a joint motion.
 _Pace = tuple[float, float, float | None, float]
@@ -89,8 +90,10 @@ class Driving:
         return self.wait
 
 
-def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark: str) -> MotionProgram:
-    """Return the program that drives a tour.
+def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark: str) -> tuple[MotionProgram, float]:
+    """Return the program that drives a tour, and the highest speed of a target or the flange in it [m/s].
+
+    That is higher than was asked for where a language has no share low enough for the fastest joints.
 
     Parameters
     ----------
@@ -106,8 +109,11 @@ def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark
         By which the plan is known, for a comment.
     """
     shown = robot.controller.from_model(tour.joints)
-    moves = [_first_move(robot, language, driving)]
-    moves += [_move(robot, language, driving, tour.joints[k : k + 2], shown[k : k + 2]) for k in range(len(shown) - 1)]
+    moves, fastest = [_first_move(robot, language, driving)], driving.speed
+    for k in range(len(shown) - 1):
+        move, speed = _move(robot, language, driving, tour.joints[k : k + 2], shown[k : k + 2])
+        moves.append(move)
+        fastest = max(fastest, speed)
     targets: list[Array] = []
     numbers: dict[bytes, int] = {}
     steps: list[ProgramStep] = []
@@ -120,17 +126,18 @@ def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark
         if stop.kind == "measure":
             steps += _stand(str(stop.label), driving)
     carried = _carried(robot)
-    return MotionProgram(
+    program = MotionProgram(
         PROGRAM,
         robot.name,
         np.array(targets),
         tuple(joint.kind == "prismatic" for joint in robot.joints),
         None,
         None,
-        _notes(robot, carried, driving, mark),
+        _notes(robot, carried, driving, fastest, mark),
         tuple(steps),
         carried,
     )
+    return program, fastest
 
 
 def _called(stop: Stop) -> str:
@@ -158,11 +165,11 @@ def _first_move(robot: Robot, language: str, driving: Driving) -> _Pace:
     rate = FASTEST if language == "URScript" else float(fast.max())
     share = min(driving.share, driving.speed / (rate * far))
     turning = min(driving.share * float(slow.min()), driving.speed / far)
-    return _whole(share, language), driving.speed, None, turning
+    return _said(share, language), driving.speed, None, turning
 
 
-def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: Array) -> _Pace:
-    """Return share, speed of the tip, time and angular velocity of a move of all joints ``(2, joints)``.
+def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: Array) -> tuple[_Pace, float]:
+    """Return the pace of a move of all joints ``(2, joints)``, and the highest speed of a point of the arm [m/s].
 
     The angular velocity is of no meaning where the time is said.
     """
@@ -174,14 +181,15 @@ def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: A
     leading = float((turned / fast).max())
     share = driving.share if rate <= 0 else min(driving.share, driving.speed * leading / rate)
     seconds = max(float((turned / slow).max()) / driving.share, rate / driving.speed) + _RAMPS
-    return _whole(share, language), driving.speed, math.ceil(100.0 * seconds) / 100.0, driving.share * float(slow.min())
+    said = _said(share, language)
+    speed = rate * said / leading if language != "RAPID" and leading > 0 else 0.0
+    return (said, driving.speed, math.ceil(100.0 * seconds) / 100.0, driving.share * float(slow.min())), speed
 
 
-def _whole(share: float, language: str) -> float:
-    """Return a share in whole percent and no larger, as most languages have it; URScript has a speed instead."""
-    if language == "URScript":
-        return share
-    return max(math.floor(100.0 * share + 1e-9) / 100.0, _LOWEST)
+def _said(share: float, language: str) -> float:
+    """Return a share as a language says it: no larger, unless it has none so small."""
+    finest = _FINEST.get(language, _FINEST_ELSEWHERE)
+    return max(math.floor(share / finest + 1e-9), 1) * finest
 
 
 def joint_rates(robot: Robot) -> tuple[Array, Array]:
@@ -196,6 +204,11 @@ def joint_rates(robot: Robot) -> tuple[Array, Array]:
     slow = [slowest if turning else _SLIDING[0] for turning in turns]
     fast = [fastest[k >= _FIRST_JOINTS] if turning else _SLIDING[1] for k, turning in enumerate(turns)]
     return np.array(slow), np.array(fast)
+
+
+def shown_speed(speed: float) -> str:
+    """Return a speed in mm/s, rounded up."""
+    return number(math.ceil(1e4 * speed - 1e-6) / 10.0, 1)
 
 
 def _fastest_point(robot: Robot, joints: Array) -> float:
@@ -224,7 +237,7 @@ def _carried(robot: Robot) -> Carried:
     return Carried(name, tip, robot.payload.mass, of_controller(np.array(robot.payload.cog)))
 
 
-def _notes(robot: Robot, carried: Carried, driving: Driving, mark: str) -> tuple[str, ...]:
+def _notes(robot: Robot, carried: Carried, driving: Driving, fastest: float, mark: str) -> tuple[str, ...]:
     def at(point: tuple[str, ...]) -> str:
         return "X {} Y {} Z {} mm".format(*point)
 
@@ -236,7 +249,7 @@ def _notes(robot: Robot, carried: Carried, driving: Driving, mark: str) -> tuple
         at(carried.tip_mm),
         f"Load {number(carried.mass, 3)} kg at",
         at(carried.cog_mm),
-        f"At most {number(1e3 * driving.speed, 1)} mm/s and {number(100 * driving.share, 2)} %",
+        f"At most {shown_speed(fastest)} mm/s and {number(100 * driving.share, 2)} %",
         f"Dwell {number(driving.dwell, 2)} s, wait: {driving.words}",
         "Not verified, no safety function",
         "First run: step by step,",

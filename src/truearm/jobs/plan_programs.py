@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program
+from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program, shown_speed
 from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.compensation.programs.program import Language
 from truearm.compensation.programs.urscript.measuring import FASTEST
@@ -29,6 +29,8 @@ from truearm.units import as_number
 _NAMES: Final = ("rapid", "krl", "fanuc", "urscript", "inform", "val3")
 #: Programs have no more axes.
 _AXES: Final = 6
+#: A speed that is higher by less is the same.
+_CLOSE: Final = 1.005
 #: Characters of the plan's hash by which the program names it.
 _MARK: Final = 12
 #: No lower and no higher speed of a tip is meant [m/s].
@@ -177,12 +179,21 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed:
     assert tour is not None
     wanted.check_labels([str(stop.label) for stop in tour.measured])
     mark = hash_of(plan_csv(planned.made, planned.joints_are).encode())[:_MARK]
-    program = plan_program(tour, robot, language.name, wanted.driving, mark)
+    program, fastest = plan_program(tour, robot, language.name, wanted.driving, mark)
     assert language.motion is not None
     assert program.carried is not None
     notices = _notices(language, robot, given, weighed=weighed)
+    if fastest > _CLOSE * wanted.driving.speed:
+        notices.insert(
+            0,
+            Notice(
+                "faster-than-asked",
+                f"{language.name} says no share below 1 %: where joints are as fast as any, a target goes at up to "
+                f"{shown_speed(fastest)} mm/s. Set the override of the controller lower, or state a higher `speed`.",
+            ),
+        )
     texts = dict(language.motion(program))
-    written = PlanProgram(language.name, texts, tour, wanted.driving, program.carried, tuple(notices))
+    written = PlanProgram(language.name, texts, tour, wanted.driving, program.carried, fastest, tuple(notices))
     return replace(planned, program=written)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from truearm.compensation.plan_program import Driving
+from truearm.compensation.plan_program import Driving, shown_speed
 from truearm.compensation.programs.motion_program import Carried, number
 from truearm.notices import Notice
 from truearm.planning.driving.tour import Tour
@@ -44,6 +44,8 @@ class PlanProgram:
         How fast, and for what it waits.
     carried
         What it tells the controller of the tool.
+    fastest
+        Highest speed of a target or the flange [m/s].
     warnings
         What to know about it.
     """
@@ -53,6 +55,7 @@ class PlanProgram:
     tour: Tour
     driving: Driving
     carried: Carried
+    fastest: float
     warnings: tuple[Notice, ...] = ()
 
     @property
@@ -65,7 +68,7 @@ class PlanProgram:
         way += ["each approached from one side"] if approached else []
         return (
             f"Measuring program in {self.language}: {', '.join(way)}.",
-            f"At most {number(1e3 * driving.speed, 1)} mm/s and {number(100 * driving.share, 2)} % of the joints' "
+            f"At most {shown_speed(self.fastest)} mm/s and {number(100 * driving.share, 2)} % of the joints' "
             f"speed; it stands for {number(driving.dwell, 2)} s{waits}.",
             self._told,
             "It is not verified and no safety function: run it step by step first, at reduced speed, nobody near.",
@@ -93,7 +96,7 @@ class PlanProgram:
             "files": list(self.files),
             "order": [stop.label for stop in self.tour.measured],
             "approached": any(stop.kind == "approach" for stop in self.tour.stops),
-            "speed_mm_s": 1e3 * driving.speed,
+            "speed_mm_s": 1e3 * self.fastest,
             "joint_speed_percent": 100.0 * driving.share,
             "dwell_s": driving.dwell,
             "wait": driving.words,

@@ -19,7 +19,6 @@ from truearm.compensation.programs.motion_program import (
     StraightMove,
     Wait,
     number,
-    percent,
 )
 
 
@@ -48,7 +47,7 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
         end = "" if near else " PL=0"
         match step:
             case JointMove():
-                steps.append(f"MOVJ {position('joints', step.target)} VJ={percent(step.share)}.00{end}")
+                steps.append(f"MOVJ {position('joints', step.target)} VJ={max(100.0 * step.share, 0.01):.2f}{end}")
             case StraightMove():
                 steps.append(f"MOVL {position('pose', step.target)} V={_speed(step.speed)}{end}")
             case CircleMove():

@@ -18,7 +18,6 @@ from truearm.compensation.programs.motion_program import (
     StraightMove,
     Wait,
     number,
-    percent,
 )
 from truearm.compensation.programs.val3.new import JOINT, NAMES, POINT, SAME, application, element, variable
 
@@ -58,7 +57,7 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     for step, near in program.zoned():
         match step:
             case JointMove():
-                say("mJoint.vel", str(percent(step.share)))
+                say("mJoint.vel", number(max(100.0 * step.share, 0.01), 2))
                 lines.append(f"  movej(jPath[{keys['joints', step.target]}],flange,mJoint)")
             case StraightMove() | CircleMove():
                 motion = "mBlend" if near else "mStop"

@@ -2,8 +2,8 @@
 
 Each arm is planned three times with 30 poses of 5000 candidates: anywhere within its limits as drawn, where it keeps
 clear with ways checked, and the same with limits of a quarter in the middle of each joint. Times are processor seconds
-of one run, after a first one that is not counted; compare them within a line. Argument: arms of the library (one of each
-maker, twelve at most). Writes benchmarks/driven_plans.json.
+of one run, after a first one that is not counted; compare them within a line. Argument: arms of the library (one of
+each maker, twelve at most). Writes benchmarks/driven_plans.json.
 """
 
 from __future__ import annotations

@@ -345,6 +345,19 @@ def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Dri
         assert (joints <= driving.share * slow * (1 + 1e-6)).all()
 
 
+def test_the_rates_of_known_arms_lie_within_their_bounds() -> None:
+    known = {  # deg/s at 100 %, of the makers' data sheets
+        "irb120": (250, 250, 250, 320, 320, 420),
+        "kr5": (154, 154, 228, 343, 384, 721),
+        "lrmate200ic": (350, 350, 400, 450, 450, 720),
+        "ur5e": (180,) * 6,
+    }
+    for name, rates in known.items():
+        slow, fast = joint_rates(load_robot(name))
+        assert (slow < np.radians(rates)).all()
+        assert (fast > np.radians(rates)).all()
+
+
 def test_a_language_of_whole_percent_says_how_fast_that_is() -> None:
     robot, tour = toured("krl", approach=True)
     program, fastest = plan_program(tour, robot, "KRL", Driving(speed=0.02), "abc")

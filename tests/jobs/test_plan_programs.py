@@ -232,6 +232,14 @@ def test_a_program_never_drives_the_arm_to_what_it_touches() -> None:
     wanted().check_readings(campaign("irb120", 12, 0.05e-3, 1)[1])
 
 
+def test_many_targets_are_ticked_together(planned: Plan, tmp_path: Path) -> None:
+    robot = planned.made.robot
+    crowd = robot.with_frames(robot.base, {f"t{k}": (0.0, 0.0, 0.001 * k) for k in range(1, 30)})
+    planned = replace(planned, made=replace(planned.made, robot=crowd))
+    planned.save(tmp_path)
+    assert 'all 29<span class="box">' in (tmp_path / "sheet.html").read_text()
+
+
 def test_what_a_device_reads_stands_on_the_sheet(planned: Plan, tmp_path: Path) -> None:
     reads = tuple(f"ball from anchor {k}" for k in range(10))
     planned = replace(planned, made=replace(planned.made, reads=reads))

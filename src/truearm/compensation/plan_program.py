@@ -40,7 +40,7 @@ LONGEST_LABEL: Final = 21
 #: stretched arm faster [m/s]. Above what ROS-Industrial's packages have for some of the fastest: KUKA KR 3 R540, FANUC
 #: LR Mate 200iD, Yaskawa GP7, Staubli TX2-60.
 _FAST: Final = ((math.radians(600.0), 12.0), (math.radians(1600.0), math.radians(2500.0)))
-#: At 100 % no joint is slower, of an arm that is no longer than this stretched [m], and of longer ones [rad/s]: assumed.
+#: At 100 % no joint is slower, of an arm of this length stretched [m] and of longer ones [rad/s]: assumed.
 _SLOW: Final = (2.0, math.radians(100.0), math.radians(50.0))
 #: The same of sliding joints: the slowest and the fastest [m/s].
 _SLIDING: Final = (0.2, 5.0)

@@ -26,6 +26,9 @@ _NOTED: Final = (
     "First run step by step at reduced speed: when, by whom",
 )
 
+#: A row has no more boxes for targets.
+_MOST_TICKED: Final = 8
+
 
 @dataclass(frozen=True)
 class _Row:
@@ -52,10 +55,15 @@ def plan_sheet(planned: Plan) -> str:
         headings=[
             f"J{k} [{'deg' if joint.kind == 'revolute' else 'mm'}]" for k, joint in enumerate(made.robot.joints, 1)
         ],
-        targets=[target.name for target in made.robot.targets],
+        targets=_ticked([target.name for target in made.robot.targets]),
         reads=bool(reads),
         rows=_rows(planned, program, reads),
     )
+
+
+def _ticked(targets: list[str]) -> list[str]:
+    """Return what is ticked in a row: each target, or all together where they are many."""
+    return targets if len(targets) <= _MOST_TICKED else [f"all {len(targets)}"]
 
 
 def _rows(planned: Plan, program: PlanProgram, reads: dict[str, str]) -> list[_Row]:

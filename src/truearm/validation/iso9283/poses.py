@@ -151,11 +151,9 @@ def _cloud(one: Cycles) -> PoseCloud:
 
 
 def _conditions(test: PlannedTest, cycles: list[Cycles], *, robots: bool = True) -> list[Conditions]:
-    """Return the conditions that were planned, and others that were measured."""
+    """Return the conditions that were planned, of each robot that was measured."""
     names = list(dict.fromkeys(one.robot for one in cycles)) if robots else [""]
-    planned = [Conditions(v, load, name) for name in names or [""] for v in test.velocities for load in test.loads]
-    seen = [Conditions(one.velocity, one.load, one.robot if robots else "") for one in cycles]
-    return planned + [one for one in dict.fromkeys(seen) if not any(_same(one, other) for other in planned)]
+    return [Conditions(v, load, name) for name in names or [""] for v in test.velocities for load in test.loads]
 
 
 def _same(one: Conditions, other: Conditions) -> bool:

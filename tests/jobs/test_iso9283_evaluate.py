@@ -141,10 +141,10 @@ def test_the_worst_place_is_taken_at_the_fastest_velocity_and_loads_stay_apart()
         ]
     )
     assert [one.cells[:3] for one in found] == [
-        ("AD", "b, worst of 2", "-2.0000 mm"),
+        ("AD", "b, worst of 2 of 3", "-2.0000 mm"),
         ("AD", "a, load 10 %", "4.0000 mm"),
     ]
-    assert found[0].cells[4] == "50 %: 1.0000"
+    assert found[0].cells[4:] == ("50 %: 1.0000", "not-measured: c")
 
 
 def test_the_report_has_a_picture_of_every_test_and_stays_small(found: Iso9283Evaluation) -> None:

@@ -115,8 +115,8 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
     ------
     InputError
         For a test, a pose, an approach, a velocity or a load that the plan does not have, a robot without a name where
-        robots are compared, a robot that has a few rows alone, poses outside the cube or at another pose of the plan than they are called, orientations that no robot attains,
-        and a cycle that appears twice.
+        robots are compared, a robot that has a few rows alone, poses outside the cube or at another pose of the plan
+        than they are called, orientations that no robot attains, and a cycle that appears twice.
     """
     _check_names(plan, readings)
     position = alignment.in_base(readings.position)
@@ -185,8 +185,8 @@ def _planned_conditions(plan: PerformancePlan, readings: AttainedPoses) -> Array
             if len(other):
                 row = int(rows[other[0]])
                 raise InputError(
-                    f"{len(other)} row{'s' * (len(other) != 1)} of the test {planned.id} at a {name} that the plan does "
-                    "not have in it",
+                    f"{len(other)} row{'s' * (len(other) != 1)} of the test {planned.id} at a {name} that it does not "
+                    "have in the plan",
                     where=f"{readings.source}, line {int(readings.line[row])}, column {name}",
                     came=f"{100.0 * read[row]:g} %",
                     allowed=", ".join(f"{100.0 * share:g} %" for share in known),

@@ -167,28 +167,26 @@ class _Rows:
         """Return wild rows that are in no second place of rest, and second places that are seen by them."""
         chosen = self._furthest()
         rows = np.array([row for row in np.flatnonzero(chosen) if self.group[row] not in places], dtype=np.intp)
-        offset = self.numbers[rows] - self._means(chosen)[self.group[rows]]
+        means, offset = self._means(chosen), self._offsets()
+        keys = [_key(one) for one in self.groups]
         named: list[WildRow] = []
         alike: dict[tuple[object, ...], TwoPlaces] = {}
-        for k, row in enumerate(rows):
+        for row in rows:
             group = self.groups[self.group[row]]
-            same = [m for m, other in enumerate(rows) if self._place(other) == self._place(row)]
-            near = np.linalg.norm(offset[same] - offset[k], axis=1) < _ALIKE * np.linalg.norm(offset[k])
-            away = float(np.linalg.norm(offset[k]))
-            if near.sum() >= _ALIKE_ROWS:
-                whole = sum(int(n) for one, n in zip(self.groups, self.counts, strict=True) if _key(one) == _key(group))
-                counts = (int(near.sum()), whole - int(near.sum()))
-                alike.setdefault(self._place(row), TwoPlaces(group, self.kind, away, counts))
+            key = keys[self.group[row]]
+            same = offset[[keys[number] == key for number in self.group]]
+            near = int((np.linalg.norm(same - offset[row], axis=1) < _ALIKE * np.linalg.norm(offset[row])).sum())
+            if near >= _ALIKE_ROWS:
+                apart = float(np.linalg.norm(offset[row]))
+                alike.setdefault(key, TwoPlaces(group, self.kind, apart, (near, len(same) - near)))
                 continue
+            away = float(np.linalg.norm(self.numbers[row] - means[self.group[row]]))
             others = self.numbers[(self.group == self.group[row]) & ~chosen]
             about = others - others.mean(axis=0) if len(others) else np.zeros((1, 3))
             scatter = float(np.sqrt((about**2).sum() / max(len(others) - 1, 1)))
             number = row - self.begin[self.group[row]]
             named.append(WildRow(group.rows(slice(number, number + 1)), self.kind, away, scatter))
         return named, list(alike.values())
-
-    def _place(self, row: np.intp) -> tuple[object, ...]:
-        return _key(self.groups[self.group[row]])
 
     def _furthest(self) -> NDArray[np.bool_]:
         """Return which rows are further than all others by more than tails do."""
@@ -205,17 +203,21 @@ class _Rows:
 
     def _from_medians(self) -> Array:
         """Return the distance of each row from the median of its group over what the nearest four fifths scatter by."""
-        away = np.empty(len(self.numbers))
+        away = np.linalg.norm(self._offsets(), axis=1)
         scale = np.empty(len(self.groups))
         for k, (begin, n) in enumerate(zip(self.begin, self.counts, strict=True)):
-            mine = self.numbers[begin : begin + n]
-            distance = np.linalg.norm(mine - np.median(mine, axis=0), axis=1)
-            away[begin : begin + n] = distance
-            scale[k] = np.sqrt((np.sort(distance)[: max(1, int(0.8 * n))] ** 2).mean())
+            nearest = np.sort(away[begin : begin + n])[: max(1, int(0.8 * n))]
+            scale[k] = np.sqrt((nearest**2).mean())
         for family in np.unique(self.family[self.small]):
             those = self.small & (self.family == family)
             scale[those] = np.median(away[those[self.group]])
         return np.asarray(away / np.maximum(scale, self.floor)[self.group])
+
+    def _offsets(self) -> Array:
+        """Return each row from the median of its group, ``(n, 3)``."""
+        ends = zip(self.begin, self.begin + self.counts, strict=True)
+        medians = np.array([np.median(self.numbers[a:b], axis=0) for a, b in ends])
+        return np.asarray(self.numbers - medians[self.group])
 
     def _means(self, chosen: NDArray[np.bool_]) -> Array:
         """Return the mean of the rows of each group that are not chosen, ``(groups, 3)``."""

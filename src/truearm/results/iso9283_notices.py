@@ -63,7 +63,7 @@ def _wild_words(row: WildRow) -> str:
     what = "The orientation of cycle" if row.kind == "orientation" else "Cycle"
     changes = "; ".join(_change_words(*pair) for pair in row.changes[:_VALUES])
     return (
-        f"{what} {int(row.of.cycle[0])} of {_under_words(row.of)} on line {int(row.of.line[0])} lies {away} from the "
+        f"{what} {int(row.of.cycle[0])} of {_under_words(row.of)}, on line {int(row.of.line[0])} lies {away} from the "
         f"others, which scatter by {scatter}{': ' if changes else ''}{changes}."
     )
 
@@ -82,7 +82,7 @@ def _places_words(one: TwoPlaces) -> str:
 def _under_words(one: Cycles) -> str:
     robot = f" of {one.robot}" if one.robot else ""
     approach = f" from {one.approach}" if one.approach else ""
-    return f"{one.test} {one.pose}{approach}{robot}, {100 * one.velocity:g} %, load {100 * one.load:g} %,"
+    return f"{one.test} {one.pose}{approach}{robot}, {100 * one.velocity:g} %, load {100 * one.load:g} %"
 
 
 def _size(number: float, kind: Kind) -> str:

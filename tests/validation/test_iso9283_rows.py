@@ -7,9 +7,11 @@ import math
 import re
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from tests.performance_plan import small_plan
 
 from truearm.errors import InputError
@@ -28,6 +30,7 @@ from truearm.validation.iso9283.pose_rows import cycles_of
 from truearm.validation.iso9283.values import Instrument
 from truearm.validation.iso9283.wild_rows import UnusualRows, unusual_rows
 
+Rows = NDArray[np.intp]
 TIE = Alignment("base-features", Transform(), 1e-5, 1e-5)
 TRACKER = Instrument(1e-6, 1e-6)
 TESTS = ("AP", "vAP", "AD", "dAP", "E")
@@ -77,23 +80,24 @@ def campaign(seed: int = 1, tests: tuple[str, ...] = TESTS) -> tuple[Performance
     )
 
 
-def in_order(read: AttainedPoses, order: Array) -> AttainedPoses:
+def in_order(read: AttainedPoses, order: Rows) -> AttainedPoses:
     """Return rows in another order, or some of them, with names met in that order."""
-    names = {
+    names: dict[str, Any] = {
         name: Names.of([column.names[code] for code in column.code[order]])
         for name in ("criterion", "robot", "pose", "approach")
         for column in [getattr(read, name)]
     }
-    arrays = ("cycle", "velocity", "load", "time", "position", "rotation", "line")
-    return dataclasses.replace(read, **names, **{name: getattr(read, name)[order] for name in arrays})
+    columns = ("cycle", "velocity", "load", "time", "position", "rotation", "line")
+    arrays: dict[str, Any] = {name: getattr(read, name)[order] for name in columns}
+    return dataclasses.replace(read, **names, **arrays)
 
 
-def rows_of(read: AttainedPoses, **named: str | int | float) -> Array:
+def rows_of(read: AttainedPoses, **named: Any) -> Rows:
     """Return which rows are of a test, pose, cycle .."""
     here = np.ones(len(read.cycle), dtype=bool)
     for name, value in named.items():
         column = getattr(read, name)
-        here &= column.are(value) if isinstance(column, Names) else column == value
+        here &= column.are(str(value)) if isinstance(column, Names) else column == value
     return np.flatnonzero(here)
 
 
@@ -105,7 +109,7 @@ def unusual(plan: PerformancePlan, read: AttainedPoses) -> UnusualRows:
     return unusual_rows(cycles_of(plan, read, TIE), TRACKER)
 
 
-def moved(read: AttainedPoses, rows: Array, by: Array | list[float]) -> AttainedPoses:
+def moved(read: AttainedPoses, rows: Rows, by: Array | list[float]) -> AttainedPoses:
     position = read.position.copy()
     position[rows] += by
     return dataclasses.replace(read, position=position)
@@ -141,8 +145,13 @@ def test_clean_campaigns_are_silent() -> None:
 )
 def test_a_wild_row_is_named_with_what_it_changes(test: str, criteria: tuple[str, ...]) -> None:
     plan, read = campaign(1, (test,))
-    where = {"AP": {"pose": "P3", "velocity": 0.5}, "AD": {"pose": "P4"}, "E": {"pose": "P2", "robot": "r3"}}
-    row = int(rows_of(read, criterion=test, cycle=4, **where.get(test, {}))[0])
+    where: dict[str, dict[str, Any]] = {
+        "AP": {"pose": "P3", "velocity": 0.5},
+        "AD": {"pose": "P4"},
+        "E": {"pose": "P2", "robot": "r3"},
+    }
+    of: dict[str, Any] = {"criterion": test, "cycle": 4} | where.get(test, {})
+    row = int(rows_of(read, **of)[0])
     spoilt = moved(read, np.array([row]), [0, 5e-3, 0])
     (wild,) = found(plan, spoilt).unusual.wild
     assert (wild.of.test, wild.kind, int(wild.of.cycle[0]), int(wild.of.line[0])) == (test, "position", 4, row + 2)
@@ -211,10 +220,12 @@ def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> Att
     if isinstance(column, Names):
         texts = [column.names[code] for code in column.code]
         texts[row] = str(value)
-        return dataclasses.replace(read, **{name: Names.of(texts)})
+        new: dict[str, Any] = {name: Names.of(texts)}
+        return dataclasses.replace(read, **new)
     column = column.copy()
     column[row] = value
-    return dataclasses.replace(read, **{name: column})
+    new = {name: column}
+    return dataclasses.replace(read, **new)
 
 
 @pytest.mark.parametrize(
@@ -271,7 +282,7 @@ def test_quaternions_in_another_order_are_refused() -> None:
     tie = dataclasses.replace(TIE, T_base_instrument=Transform.from_matrix(tilt, np.zeros(3)))
     turned = dataclasses.replace(read, position=read.position @ tilt, rotation=tilt.T @ read.rotation)
     assert len(found(plan, turned, tie).values) > 50
-    wrong = rotation_from_quaternion(np.roll(quaternion_from_rotation(turned.rotation), -1, axis=1))
+    wrong = rotation_from_quaternion(np.roll(quaternion_from_rotation(tilt.T @ read.rotation), -1, axis=1))
     with pytest.raises(InputError, match="in the order x, y, z, w"):
         found(plan, dataclasses.replace(turned, rotation=wrong), tie)
 

@@ -10,6 +10,7 @@ from truearm.shown import counted
 from truearm.validation.iso9283.evaluation import Evaluation
 from truearm.validation.iso9283.pose_rows import Cycles
 from truearm.validation.iso9283.values import Value
+from truearm.validation.iso9283.wild_pushes import WildPush
 from truearm.validation.iso9283.wild_rows import Kind, TwoPlaces, WildRow
 
 #: So many rows, poses and places are told one by one.
@@ -33,6 +34,15 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
                 "wild-row",
                 f"{told} The standard excludes no row, and none was left out. Look at the record, and measure the "
                 "pose again if the reading was at fault.",
+            )
+        )
+    if found.wild_pushes:
+        told = " ".join(_push_words(one) for one in found.wild_pushes)
+        notices.append(
+            Notice(
+                "wild-push",
+                f"{told} The standard excludes no reading, and none was left out. Look at the record, and push again "
+                "if the reading was at fault.",
             )
         )
     if places:
@@ -65,6 +75,15 @@ def _wild_words(row: WildRow) -> str:
     return (
         f"{what} {int(row.of.cycle[0])} of {_under_words(row.of)}, on line {int(row.of.line[0])} lies {away} from the "
         f"others, which scatter by {scatter}{': ' if changes else ''}{changes}."
+    )
+
+
+def _push_words(one: WildPush) -> str:
+    unit, per_si = UNITS["compliance"]
+    return (
+        f"The push of {one.force:g} N along {one.direction} in cycle {one.cycle}, on line {one.line}, lies "
+        f"{1e3 * one.away:.3g} mm from the line of the others: compliance is {one.value * per_si:.6f} {unit}, "
+        f"without it {one.without * per_si:.6f}."
     )
 
 

@@ -25,6 +25,7 @@ from truearm.validation.iso9283.settling import SettlingCurve, settling_values
 from truearm.validation.iso9283.values import Conditions, Instrument, Quantity, Value
 from truearm.validation.iso9283.velocity import VelocityCurves, velocity_values
 from truearm.validation.iso9283.weaving import WeaveCurves, weaving_values
+from truearm.validation.iso9283.wild_pushes import WildPush, wild_pushes
 from truearm.validation.iso9283.wild_rows import UnusualRows
 
 #: What kind of number each criterion is; a length if it is not here.
@@ -70,6 +71,8 @@ class Evaluation:
         For pictures.
     unusual
         Rows of poses far from the others, and poses with two places of rest.
+    wild_pushes
+        Pushes far from the line of the others.
     missing
         Places that have no value in tests that were measured, in words.
     """
@@ -85,6 +88,7 @@ class Evaluation:
     settling: tuple[SettlingCurve, ...] = ()
     pushes: tuple[PushLine, ...] = ()
     unusual: UnusualRows = field(default_factory=UnusualRows)
+    wild_pushes: tuple[WildPush, ...] = ()
     missing: tuple[str, ...] = ()
 
 
@@ -190,6 +194,7 @@ def evaluated(
         tuple(settling),
         pushes,
         unusual,
+        wild_pushes(pushes, instrument),
         (*missing, *dict.fromkeys(one.words for one in absent)),
     )
 

@@ -18,6 +18,7 @@ from tests.performance_plan import small_plan
 import truearm
 from truearm.errors import InputError
 from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
 from truearm.planning.iso9283.criteria import TEST_OF
 from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
 from truearm.results.iso9283_evaluation import Iso9283Evaluation
@@ -242,6 +243,24 @@ def test_a_wild_row_is_said_with_the_value_without_it(small: Arguments) -> None:
         r"0\.\d+ mm: RP is \d\.\d{4} mm, without it 0\.\d{4}; AP is \d\.\d{4} mm, without it \d\.\d{4}\. ",
         said.message,
     )
+
+
+def test_orientations_that_are_degrees_off_are_said(small: Arguments) -> None:
+    given = {"poses": small["poses"], "noise_rot": 1e-5}
+    clean = truearm.iso9283_evaluate(small["plan"], **given, alignment=small["alignment"])
+    assert "orientation-far-off" not in {notice.code for notice in clean.warnings}
+    header, *rows = [line.split(",") for line in small["poses"].read_text().splitlines()]
+    place = header.index("qw")
+    q = np.array([row[place : place + 4] for row in rows], dtype=float)
+    turned = quaternion_from_rotation(rotation_from_quaternion(q) @ rotation_from_vector(np.array([0, 0, 0.1])))
+    lines = [",".join([*row[:place], *map(str, one)]) for row, one in zip(rows, turned, strict=True)]
+    small["poses"].write_text("\n".join([",".join(header), *lines]) + "\n")
+    off = truearm.iso9283_evaluate(small["plan"], **given, alignment=small["alignment"])
+    (said,) = [notice for notice in off.warnings if notice.code == "orientation-far-off"]
+    off_by = re.search(r"up to -?(\d\.\d+) deg \(AP c of P\d\)", said.message)
+    assert said.level == "warning"
+    assert off_by
+    assert float(off_by[1]) == pytest.approx(5.73, abs=0.5)
 
 
 def test_a_pose_without_a_row_is_said_and_stands_in_the_table(small: Arguments) -> None:

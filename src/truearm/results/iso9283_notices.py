@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from truearm.notices import Notice
@@ -18,6 +19,8 @@ _TOLD: Final = 3
 _TOLD_PLACES: Final = 8
 #: So many values are told with and without a row.
 _VALUES: Final = 2
+#: Mean orientations further off than this are told [rad].
+_FAR_TURNED: Final = math.radians(2.0)
 
 
 def row_notices(found: Evaluation) -> tuple[Notice, ...]:
@@ -53,6 +56,17 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
                 "two-places",
                 f"The tip comes to rest in two places: {told}{more}. The values stand, but the intervals of RP and RD "
                 "may not hold. Look for play, or for something that changed during the test.",
+            )
+        )
+    turned = [v for v in found.values if v.id == "AP" and v.quantity == "angle" and abs(v.value) > _FAR_TURNED]
+    if turned:
+        worst = max(turned, key=lambda value: abs(value.value))
+        notices.append(
+            Notice(
+                "orientation-far-off",
+                f"Orientations are off by up to {number_words(worst)} deg (AP {worst.component} of {worst.where}). "
+                "Robots are seldom off by a degree: check that they are those of the plan's tip, and the rotation of "
+                "the alignment.",
             )
         )
     if found.missing:

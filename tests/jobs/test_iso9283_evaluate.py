@@ -245,6 +245,28 @@ def test_a_wild_row_is_said_with_the_value_without_it(small: Arguments) -> None:
     )
 
 
+def test_two_places_of_rest_are_said_with_the_rows_of_the_fewer(tmp_path: Path) -> None:
+    plan = small_plan(["AP"], cycles={"AP": 24})
+    (tmp_path / PLAN).write_text(plan_text(plan))
+    (tmp_path / ROBOT).write_text(robot_text(plan.robot))
+    truearm.iso9283_simulate("irb120", plan, seed=1, noise=1e-6, out=tmp_path / "read")
+    poses = tmp_path / "read" / "poses.csv"
+    header, *rows = [line.split(",") for line in poses.read_text().splitlines()]
+    cycle, pose, z = (header.index(name) for name in ("cycle", "pose", "z [mm]"))
+    lines = []
+    for line, row in enumerate(rows, 2):
+        if row[pose] == "P4" and int(row[cycle]) % 4 == 0:
+            row[z] = str(float(row[z]) + 0.3)
+            lines.append(str(line))
+    poses.write_text("\n".join(",".join(row) for row in (header, *rows)) + "\n")
+    tie = tmp_path / "read" / "alignment.yaml"
+    made = truearm.iso9283_evaluate(tmp_path / PLAN, poses=poses, alignment=tie)
+    (said,) = [notice for notice in made.warnings if notice.code in ("two-places", "wild-row")]
+    assert (said.code, said.level) == ("two-places", "warning")
+    assert "AP P4, 100 %, load 100 % (6 and 18 cycles, 0.3" in said.message
+    assert f"the 6 on lines {', '.join(lines)})" in said.message
+
+
 def test_orientations_that_are_degrees_off_are_said(small: Arguments) -> None:
     given = {"poses": small["poses"], "noise_rot": 1e-5}
     clean = truearm.iso9283_evaluate(small["plan"], **given, alignment=small["alignment"])

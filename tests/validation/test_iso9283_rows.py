@@ -204,6 +204,7 @@ def test_two_places_of_rest_are_told_and_their_rows_are_not_wild() -> None:
     (places,) = made.two_places
     assert (places.of.pose, places.rows, made.wild) == ("P2", (7, 23), ())
     assert places.apart == pytest.approx(15 * SCATTER, rel=0.1)
+    assert places.lines == tuple(sorted(read.line[rows].tolist()))
 
 
 def test_rows_of_several_groups_that_are_off_alike_are_a_second_place() -> None:
@@ -213,6 +214,7 @@ def test_rows_of_several_groups_that_are_off_alike_are_a_second_place() -> None:
     made = unusual(plan, moved(read, rows, [0, 40 * SCATTER, 0]))
     assert (len(made.two_places), made.wild) == (1, ())
     assert made.two_places[0].rows == (3, 21)
+    assert made.two_places[0].lines == tuple(read.line[rows].tolist())
 
 
 def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> AttainedPoses:

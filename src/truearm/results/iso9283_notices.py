@@ -28,7 +28,7 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
     notices = []
     wild, places = found.unusual.wild, found.unusual.two_places
     if wild:
-        told = " ".join(_wild_words(row) for row in wild[:_TOLD])
+        told = " ".join(_wild_words(row, "it" if len(wild) == 1 else "them") for row in wild[:_TOLD])
         if len(wild) > _TOLD:
             told += f" So do {counted(len(wild) - _TOLD, 'other row')}, on line "
             told += f"{', '.join(str(int(row.of.line[0])) for row in wild[_TOLD:])}."
@@ -82,10 +82,10 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
     return tuple(notices)
 
 
-def _wild_words(row: WildRow) -> str:
+def _wild_words(row: WildRow, without: str) -> str:
     away, scatter = (_size(number, row.kind) for number in (row.away, row.scatter))
     what = "The orientation of cycle" if row.kind == "orientation" else "Cycle"
-    changes = "; ".join(_change_words(*pair) for pair in row.changes[:_VALUES])
+    changes = "; ".join(_change_words(*pair, without) for pair in row.changes[:_VALUES])
     return (
         f"{what} {int(row.of.cycle[0])} of {_under_words(row.of)}, on line {int(row.of.line[0])} lies {away} from the "
         f"others, which scatter by {scatter}{': ' if changes else ''}{changes}."
@@ -101,15 +101,19 @@ def _push_words(one: WildPush) -> str:
     )
 
 
-def _change_words(value: Value, without: Value) -> str:
+def _change_words(value: Value, other: Value, without: str) -> str:
     part = "" if value.component == "position" else f" {value.component}"
-    left = number_words(without) if without.status != "not-measured" else "nothing"
-    return f"{value.id}{part} is {number_words(value)} {UNITS[value.quantity][0]}, without it {left}"
+    left = number_words(other) if other.status != "not-measured" else "nothing"
+    return f"{value.id}{part} is {number_words(value)} {UNITS[value.quantity][0]}, without {without} {left}"
 
 
 def _places_words(one: TwoPlaces) -> str:
     what = "orientations, " * (one.kind == "orientation")
-    return f"{_under_words(one.of)} ({what}{one.rows[0]} and {one.rows[1]} cycles, {_size(one.apart, one.kind)} apart)"
+    lines = ", ".join(map(str, one.lines[:_TOLD_PLACES])) + ", .." * (len(one.lines) > _TOLD_PLACES)
+    return (
+        f"{_under_words(one.of)} ({what}{one.rows[0]} and {one.rows[1]} cycles, {_size(one.apart, one.kind)} apart; "
+        f"the {one.rows[0]} on lines {lines})"
+    )
 
 
 def _under_words(one: Cycles) -> str:

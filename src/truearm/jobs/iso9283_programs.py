@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -49,7 +50,7 @@ def written_programs(
         record = slow_run_text(text, slow)
     else:
         with refusals_of("slow_run"):
-            check_slow_run(slow_run, text, slow)
+            check_slow_run(slow_run, text, slow, datetime.date.today())
     robot = plan.robot
     if robot.maker and not language.runs_on(robot.maker):
         warnings.append(

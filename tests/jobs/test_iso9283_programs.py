@@ -25,7 +25,7 @@ def cube(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def planned(cube: Path, **more: Any) -> Iso9283Plan:
-    given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [100.0, 10.0], "velocity": 0.5, "load": 3.0}
+    given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [100, 10], "velocity": 0.5, "load": 3.0}
     return truearm.iso9283_plan("irb120", **(given | more))
 
 

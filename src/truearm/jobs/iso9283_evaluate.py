@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from truearm.errors import refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
@@ -24,7 +26,7 @@ from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
 from truearm.shown import listed
-from truearm.validation.iso9283.alignment import Alignment, read_alignment
+from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
 from truearm.validation.iso9283.values import Instrument
@@ -104,6 +106,10 @@ def iso9283_evaluate(
         progress(f"reading {file.name}")
         with refusals_of(name):
             read[name] = _READERS[name](file)
+    if tie is not None and read:
+        positions = np.concatenate([one.position for one in read.values()])
+        with refusals_of("alignment"):
+            refuse_implausible(tie, planned.cube, positions, str(tie_path))
     instrument = Instrument(sigma, sigma_rot)
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
     made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found), inputs)

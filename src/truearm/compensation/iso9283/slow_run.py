@@ -10,8 +10,8 @@
     programs:
       programs/AP_10.mod: 8c1e...
 
-The operator fills in ``completed: yes``, who ran the programs, and the day on which they did (2026-11-23). Plan and programs are known by their hashes
-(SHA-256), so that a record is of this plan and these programs alone.
+The operator fills in ``completed: yes``, who ran the programs, and the day on which they did (2026-11-23). Plan and
+programs are known by their hashes (SHA-256), so that a record is of this plan and these programs alone.
 """
 
 from __future__ import annotations

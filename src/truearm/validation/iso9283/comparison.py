@@ -11,8 +11,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from truearm.errors import InputError
+from truearm.errors import InputError, Words
 from truearm.files import read_text
+from truearm.printable import shortened
 
 Verdict = Literal["smaller", "larger", "not told apart", "no interval"]
 
@@ -137,13 +138,7 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
     try:
         second = _Result.model_validate_json(text)
     except ValidationError as error:
-        fault = error.errors()[0]
-        raise InputError(
-            "this is no result of tests by ISO 9283",
-            where=f"{other}, {'.'.join(map(str, fault['loc']))}".rstrip(", "),
-            came=fault["msg"],
-            allowed="iso9283.json of an evaluation",
-        ) from error
+        raise _no_result(other, error.errors()[0]) from error
     first = _Result.model_validate_json(json.dumps(summary))
     if first.robot != second.robot:
         raise InputError(
@@ -172,6 +167,25 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
             cure="Evaluate the same criteria of both.",
         )
     return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)))
+
+
+def _no_result(other: Path, fault: Any) -> InputError:
+    """Return the refusal of a file that is no result, in words of a person who gave another file."""
+    entry = ".".join(map(str, fault["loc"]))
+    if fault["type"] == "json_invalid":
+        came = "a text that is not JSON"
+    elif entry in ("", "truearm"):
+        kind = fault["input"] if entry and isinstance(fault["input"], str) else None
+        came = "JSON of something else" if kind is None else f"a file of the kind {shortened(kind, 60)}"
+    else:
+        came = f"a result {'without' if fault['type'] == 'missing' else 'with another kind of'} {entry}"
+    return InputError(
+        "this is no result of tests by ISO 9283",
+        where=str(other),
+        came=Words(came),
+        allowed="the file iso9283.json that an evaluation has written",
+        cure="Evaluate the other tests first, and give the iso9283.json of that folder.",
+    )
 
 
 def _shown(name: str, value: float | str) -> str:

@@ -14,7 +14,9 @@ import truearm
 from truearm.errors import InputError
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
+from truearm.planning.iso9283.plan import performance_plan
 from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text, read_cube, read_plan
+from truearm.planning.poses.iso9283 import Cube
 from truearm.planning.poses.tip import Tip
 from truearm.results.iso9283_plan import Iso9283Plan
 
@@ -213,3 +215,16 @@ def test_a_plan_file_that_cannot_be_used_is_refused(
     with pytest.raises(InputError) as refusal:
         read_plan(tmp_path / PLAN)
     assert said in str(refusal.value)
+
+
+def test_the_largest_cube_is_that_of_the_robot_whichever_tests_are_planned(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = truearm.load_robot("irb120")
+    found = Cube([0.3036, 0.0, 0.3036], 0.4239)  # AP alone would be planned in it
+    monkeypatch.setattr("truearm.planning.iso9283.plan.largest_cube", lambda *_, **__: found)
+    sides = {
+        tests: performance_plan(robot, tests=tests, rated_load=3.0, rated_velocity=1.0).cube.side
+        for tests in (("AP",), ("AT", "vAP"))
+    }
+    assert sides["AP",] == sides["AT", "vAP"] < found.side
+    alone = performance_plan(robot, tests=("AP",), cube=found, rated_load=3.0, rated_velocity=1.0)
+    assert alone.cube.side == found.side

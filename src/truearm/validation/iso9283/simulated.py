@@ -70,10 +70,13 @@ class TrueRobot:
         Its truth, where it stands in the instrument's frame.
     tip
         Where the tip is on its flange.
+    compliance
+        As :class:`truearm.simulation.moving.arm.MovingArm` has it.
     """
 
     twin: Twin
     tip: Transform
+    compliance: tuple[float, ...] = ()
 
 
 def simulated_campaign(
@@ -265,7 +268,9 @@ class _Cell:
             mass = load * self.plan.rated_load
             payload = Payload(mass, true.tip.translation if mass else (0.0, 0.0, 0.0))
             nominal, target = self.plan.robot, self.plan.target
-            self.arms[key] = MovingArm(nominal, target, true.twin, true.tip, payload, self.drives, self.warming)
+            self.arms[key] = MovingArm(
+                nominal, target, true.twin, true.tip, payload, self.drives, self.warming, true.compliance
+            )
         return self.arms[key]
 
     # -- motions -------------------------------------------------------------------------------------------

@@ -74,7 +74,8 @@ def iso9283_plan(
     criteria
         Ids of criteria, in capitals or not (``ap``, ``rp``), or ``all``.
     cube
-        ``auto`` for the largest that the robot can be tested in, by all criteria, or a file with one (schema ``truearm-cube/1``).
+        ``auto`` for the largest that the robot can be tested in, by all criteria, or a file with one (schema
+        ``truearm-cube/1``).
     plane
         Which of the cube's diagonal planes: ``C1-C2-C7-C8``, ``C2-C3-C8-C5``, ``C3-C4-C5-C6`` or ``C4-C1-C6-C7``.
     target

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -48,6 +48,29 @@ class Compared:
 
 
 @dataclass(frozen=True)
+class Course:
+    """How far the other result is from its command along a path.
+
+    Attributes
+    ----------
+    along, distance
+        Arc length and distance of the barycentre [mm]; NaN where there is none.
+    """
+
+    along: tuple[float, ...]
+    distance: tuple[float, ...]
+
+
+#: A criterion, where, and under what, by which curves of two results are found.
+Key = tuple[str, str, tuple[tuple[str, float | str], ...]]
+
+
+def key_of(id_: str, where: str, conditions: Mapping[str, float | str]) -> Key:
+    """Return the key of a curve, conditions as files have them."""
+    return id_, where, tuple(sorted(conditions.items()))
+
+
+@dataclass(frozen=True)
 class Comparison:
     """A result beside another one.
 
@@ -59,11 +82,16 @@ class Comparison:
         All values that both have.
     left_out
         Ids of criteria that were not compared, because the two were tied to the base in different ways.
+    curves, offsets
+        What is drawn of the other one: deviations along paths, and how far barycentres are from their commands [mm].
+        Empty where it was written by an older version, or is tied in another way.
     """
 
     other: str
     rows: tuple[Compared, ...]
     left_out: tuple[str, ...] = ()
+    curves: Mapping[Key, Course] = field(default_factory=dict)
+    offsets: Mapping[Key, tuple[float, ...]] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -87,6 +115,9 @@ class Comparison:
         return text
 
 
+_Length = Annotated[float, Field(allow_inf_nan=False)] | None
+
+
 class _Entry(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
     id: str
@@ -104,12 +135,31 @@ class _Tie(BaseModel):
     kind: str
 
 
+class _Curve(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+    id: str
+    where: str
+    conditions: dict[str, float | str]
+    along_mm: tuple[_Length, ...]
+    distance_mm: tuple[_Length, ...]
+
+
+class _Offset(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+    id: str
+    where: str
+    conditions: dict[str, float | str]
+    offset_mm: tuple[_Length, _Length, _Length]
+
+
 class _Result(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
     truearm: Literal["truearm-iso9283-result/1"]
     robot: str
     alignment: _Tie
     criteria: tuple[_Entry, ...]
+    curves: tuple[_Curve, ...] = ()
+    offsets: tuple[_Offset, ...] = ()
 
 
 #: Criteria whose values depend on how the instrument was tied to the base.
@@ -166,7 +216,17 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
             where=str(other),
             cure="Evaluate the same criteria of both.",
         )
-    return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)))
+    curves = {
+        key_of(one.id, one.where, one.conditions): Course(_numbers(one.along_mm), _numbers(one.distance_mm))
+        for one in second.curves
+    }
+    offsets = {key_of(one.id, one.where, one.conditions): _numbers(one.offset_mm) for one in second.offsets}
+    drawn = (curves, offsets) if same_tie else ({}, {})
+    return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)), *drawn)
+
+
+def _numbers(lengths: Sequence[float | None]) -> tuple[float, ...]:
+    return tuple(math.nan if length is None else length for length in lengths)
 
 
 def _no_result(other: Path, fault: Any) -> InputError:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.cubes import Ahead, Floor, Nearest, TargetName, TipText
 from truearm.cli.loading import read_lengths, read_numbers
 from truearm.cli.options import Commands, command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
@@ -23,13 +24,8 @@ def plan(
     criteria: Annotated[str, typer.Option(metavar="ID,..|all", help="As ap,rp,at.")] = "all",
     cube: Annotated[str, typer.Option(metavar="auto|FILE", help="The largest one, or a file with one.")] = "auto",
     plane: Annotated[str, typer.Option(metavar="CORNERS", help="Diagonal plane of the cube.")] = "C1-C2-C7-C8",
-    target: Annotated[
-        str | None, typer.Option(metavar="NAME", help="What is measured.", show_default="the flange")
-    ] = None,
-    tip: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y,Z", help="What is measured, in the flange frame \\[mm].", show_default="the flange"),
-    ] = None,
+    target: TargetName = None,
+    tip: TipText = None,
     load: Annotated[
         float | None, typer.Option(metavar="KG", help="Rated load.", show_default="that of the robot file")
     ] = None,
@@ -41,9 +37,9 @@ def plan(
     loads: Annotated[str, typer.Option(metavar="%,..", help="Percent of the rated load.")] = "100",
     limit_band: Annotated[float, typer.Option(metavar="MM", help="Within which the tip is said to stand.")] = 0.1,
     hours: Annotated[float, typer.Option(metavar="H", help="How long the drift is watched.")] = 8.0,
-    ahead: Annotated[str, typer.Option(metavar="+x|-x|+y|-y", help="Where the largest cube is searched.")] = "+x",
-    nearest: Annotated[float, typer.Option(metavar="MM", help="How far ahead the largest cube begins.")] = 0.0,
-    floor: Annotated[float, typer.Option(metavar="MM", help="How high the largest cube begins.")] = 0.0,
+    ahead: Ahead = "+x",
+    nearest: Nearest = 0.0,
+    floor: Floor = 0.0,
     program: Annotated[
         str | None,
         typer.Option(

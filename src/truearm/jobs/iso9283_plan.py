@@ -17,12 +17,12 @@ from truearm.jobs.arguments import (
     folder_beside,
     folder_for,
     length_argument,
-    lengths_argument,
     numbers_argument,
     python_call,
     robot_argument,
 )
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, written_programs
+from truearm.jobs.tip import tip_argument
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
@@ -32,8 +32,6 @@ from truearm.planning.poses.iso9283 import PLANES
 from truearm.planning.poses.largest_cube import DIRECTIONS, Direction
 from truearm.results.iso9283_plan import PLAN_FILES, Iso9283Plan
 
-#: What the tip of a robot is called whose target is given by its place alone.
-TIP = "tip"
 #: Every criterion at once; the largest cube.
 ALL, AUTO = "all", "auto"
 #: No test is run at so little of the rated velocity or load: such a number is a share, 0 to 1.
@@ -155,14 +153,7 @@ def iso9283_plan(
         slow_run=slow_run,
     )
     arm = robot_argument(robot)
-    if target is not None and tip is not None:
-        raise InputError(
-            "only one of them can be measured", parameter="target, tip", came=target, cure="Leave one out."
-        )
-    if target is not None:
-        choice_argument(target, "target", {known.name: known for known in arm.targets})
-    if tip is not None:
-        arm, target = arm.with_frames(arm.base, {TIP: lengths_argument(tip, "tip", 3)}), TIP
+    arm, target = tip_argument(arm, target, tip, "be measured")
     warnings: list[Notice] = []
     rated = _rated_load(arm, load, warnings)
     speed = _ASSUMED_VELOCITY

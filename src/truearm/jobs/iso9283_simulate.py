@@ -36,7 +36,9 @@ from truearm.simulation.moving.stiffness import drawn_compliance
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
 from truearm.units import sized_si
-from truearm.validation.iso9283.simulated import ROBOTS, Corrected, TrueRobot, simulated_campaign
+from truearm.validation.iso9283.simulated import simulated_campaign
+from truearm.validation.iso9283.simulated_cell import Corrected, TrueRobot
+from truearm.validation.iso9283.simulated_poses import ROBOTS
 from truearm.validation.iso9283.simulated_readings import Tracker
 
 #: Readings in a second that an instrument can take.

@@ -34,6 +34,8 @@ from truearm.results.iso9283_plan import PLAN_FILES, Iso9283Plan
 
 #: Every criterion at once; the largest cube.
 ALL, AUTO = "all", "auto"
+#: Rated velocities of robots along a path [m/s]: another one is in another unit.
+_VELOCITIES: Final = (0.01, 20.0)
 #: No test is run at so little of the rated velocity or load: such a number is a share, 0 to 1.
 _LEAST_PERCENT: Final = 1.0
 #: Rated velocity along a path where none is stated [m/s].
@@ -167,7 +169,7 @@ def iso9283_plan(
             )
         )
     else:
-        speed = _positive(velocity, "velocity", "the rated velocity is above 0", "a velocity above 0 [m/s]")
+        speed = _rated_velocity(velocity)
     with refusals_of("cube"):
         whole = None if given_cube is None else read_cube(given_cube)
     with refusals_of("cube" if whole is not None else "robot"):
@@ -221,6 +223,21 @@ def _rated_load(arm: Robot, load: object, warnings: list[Notice]) -> float:
         allowed="a mass above 0 [kg]",
         cure="State it.",
     )
+
+
+def _rated_velocity(velocity: object) -> float:
+    speed = _positive(velocity, "velocity", "the rated velocity is above 0", "a velocity above 0 [m/s]")
+    least, most = _VELOCITIES
+    if not least <= speed <= most:
+        other = 1e3 if speed < least else 1e-3
+        raise InputError(
+            "no robot is rated for this velocity along a path",
+            parameter="velocity",
+            came=Words(f"{1e3 * speed:g} mm/s"),
+            allowed=f"{1e3 * least:g} to {1e3 * most:g} mm/s",
+            cure=f"Is it {1e3 * speed * other:g} mm/s? Check its unit." if least <= speed * other <= most else None,
+        )
+    return speed
 
 
 def _positive(value: object, parameter: str, what: str, allowed: str) -> float:

@@ -123,7 +123,7 @@ def test_the_rated_velocity_that_is_assumed_is_said(whole: Iso9283Plan, tmp_path
         ({"limit_band": 0.0}, "the limit band is above 0"),
         ({"hours": 0.0}, "watched for a time above 0"),
         ({"velocity": -1.0}, "the rated velocity is above 0; got -1"),
-        ({"velocity": 0.0005}, "no robot is rated for this velocity along a path; got 0.5 mm/s; allowed: 10 to 20000 mm"),
+        ({"velocity": 0.0005}, "along a path; got 0.5 mm/s; allowed: 10 to 20000 mm/s. Is it 500 mm/s?"),
         ({"velocity": 1000.0}, "got 1e+06 mm/s; allowed: 10 to 20000 mm/s. Is it 1000 mm/s? Check its unit."),
         ({"load": -3.0}, "the rated load is above 0; got -3; allowed: a mass above 0 [kg]"),
         ({"ahead": "+z"}, "ahead"),

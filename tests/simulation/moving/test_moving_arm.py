@@ -165,8 +165,8 @@ def test_a_truth_that_gives_way_keeps_its_own_compliance(arm: MovingArm) -> None
     force = np.array([[0.0, 0.0, 20.0]])
     still = np.zeros((1, 6))
     other = replace(arm, compliance=SOFT)
-    pushed = [one.at_rest(JOINTS[:1], still, EVER[:1], force) for one in (arm, other)]
-    np.testing.assert_array_equal(*pushed)
+    first, second = (one.at_rest(JOINTS[:1], still, EVER[:1], force) for one in (arm, other))
+    np.testing.assert_array_equal(first, second)
 
 
 def test_joints_give_way_as_those_of_real_robots_do() -> None:

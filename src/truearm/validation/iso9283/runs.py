@@ -14,8 +14,9 @@ from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.commanded import CommandedPath
 from truearm.validation.iso9283.streams import FoundStream, found_in
-from truearm.validation.iso9283.synchronise import Cycle, along_path
+from truearm.validation.iso9283.synchronise import Cycle, along_path, refuse_other_times
 from truearm.validation.iso9283.values import Conditions, Status
+from truearm.validation.iso9283.wild_samples import refuse_wild, wild_steps
 
 #: Fewer samples than this are no cycle.
 LEAST_SAMPLES = 20
@@ -165,6 +166,9 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                     cure="Sample faster, or leave the cycle out.",
                 )
             position = in_base(transform, samples.position[rows])
+            wild = wild_steps(samples.time[rows], position, velocity)
+            if wild.single:
+                refuse_wild(samples, rows, position, wild, number)
             here = found_in(test, path, samples.time[rows], position, velocity)
             spans = here.cycles
             if number:
@@ -185,6 +189,7 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                 place = f"{samples.source}, lines {samples.line[chosen[0]]} to {samples.line[chosen[-1]]}"
                 rotation = None if samples.rotation is None else transform[:3, :3] @ samples.rotation[chosen]
                 along = along_path(path, position[first : last + 1], place)
+                refuse_other_times(path, samples.time[chosen], along, velocity, place)
                 cycles.append(
                     Cycle(
                         number or count,
@@ -195,4 +200,5 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                         int(samples.line[chosen[0]]),
                     )
                 )
+            refuse_wild(samples, rows, position, wild, number)
         yield Run(test, path, velocity, part.conditions, tuple(cycles), planned.cycles, found)

@@ -16,6 +16,7 @@ from truearm.modeling.transform import rotation_vector
 from truearm.planning.iso9283.criteria import TEST_OF, TESTS
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.alignment import Alignment, best_fit
+from truearm.validation.iso9283.orientation_check import refuse_far_orientations
 
 #: How far outside the cube is rounding [m].
 _ROUNDING: Final = 1e-9
@@ -89,13 +90,18 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
     ------
     InputError
         For a test, a pose or an approach that the plan does not have, a robot without a name where robots are compared,
-        poses outside the cube or at another pose of the plan than they are called, and a cycle that appears twice.
+        poses outside the cube or at another pose of the plan than they are called, orientations that no robot attains,
+        and a cycle that appears twice.
     """
     _check_names(plan, readings)
     position = alignment.in_base(readings.position)
     _check_cube(plan, readings, position)
     _check_nearest(plan, readings, position)
     rotation = None if readings.rotation is None else alignment.turned_to_base(readings.rotation)
+    if rotation is not None:
+        commanded = np.array([plan.poses[name].rotation for name in readings.pose.names])[readings.pose.code]
+        turn = alignment.T_base_instrument.rotation
+        refuse_far_orientations(rotation, commanded, turn, readings.line, readings.source)
     approaches = readings.approach.code.copy()
     approaches[~readings.criterion.are("vAP")] = -1
     conditions = np.column_stack([np.round(readings.velocity, 9), np.round(readings.load, 9)])

@@ -156,4 +156,5 @@ def value_summary(value: Value) -> dict[str, Any]:
         "conditions": conditions,
         "status": value.status,
         **({} if least is None else {"range": [least, largest]}),
+        **({} if value.bandwidth is None else {"bandwidth_hz": value.bandwidth}),
     }

@@ -40,8 +40,8 @@ class Cycle:
         ``(n, 3, 3)``; None where there are no orientations.
     along
         Arc length of the foot of each sample on the commanded path [m], ``(n,)``. It swings with the noise.
-    line
-        Of the first sample in the file.
+    lines
+        Of the samples in the file, ``(n,)``.
     """
 
     number: int
@@ -49,7 +49,12 @@ class Cycle:
     position: Array
     rotation: Array | None
     along: Array
-    line: int
+    lines: NDArray[np.intp]
+
+    @property
+    def line(self) -> int:
+        """Of the first sample in the file."""
+        return int(self.lines[0])
 
 
 def along_path(path: CommandedPath, position: Array, where: str) -> Array:

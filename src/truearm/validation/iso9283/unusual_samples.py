@@ -1,4 +1,4 @@
-"""Samples that lie apart from those about them, as no other cycle does there: perhaps the robot, perhaps the instrument."""
+"""Samples that lie apart from those about them, as in no other cycle: perhaps the robot, perhaps the instrument."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Unusual:
 def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: Sequence[Array]) -> list[Unusual]:
     """Return samples that lie apart from those about them, as none does there in half of the cycles.
 
-    Each sample is compared with a cubic through the two before it and the two behind it. Where the tip turns a corner or
-    begins to move that is off in every cycle, and nothing is unusual.
+    Each sample is compared with a cubic through the two before it and the two behind it. Where the tip turns a corner
+    or begins to move that is off in every cycle, and nothing is unusual.
 
     Parameters
     ----------

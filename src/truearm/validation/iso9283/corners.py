@@ -23,8 +23,8 @@ from truearm.validation.iso9283.values import COARSE, Instrument, Value
 
 #: Up to this share of the side behind it the tip is said to come from the corner.
 _AFTER = 0.5
-#: Straight lines from sample to sample cut off at most a quarter of the least distance if samples are so many times that
-#: distance apart: on an arc that touches both sides, and on no arc at all.
+#: Straight lines from sample to sample cut off less than a quarter of the least distance if samples are no further
+#: apart than so many times that distance: on an arc that touches both sides, and on no arc at all.
 _SPARSE = 1.8
 #: Less beyond a side is rounding [m].
 _NOTHING = 1e-9

@@ -25,7 +25,7 @@ from truearm.validation.iso9283.wild_samples import refuse_wild, wild_steps
 
 #: The final pose is the mean of this last share of the samples.
 _FINAL = 0.1
-#: Share of the band that noise may have, and of the time over which it is taken away, where the final stay is read.
+#: Share of the band that noise may have where the final stay is read.
 _QUIET = 0.02
 #: Samples outside the band that show how far an overshoot goes.
 _LEAST_OUTSIDE = 4
@@ -37,7 +37,7 @@ _TOP = 1 / 6
 #: The begin of a motion is read between these distances, in shares of the band and of the way, and as many standard
 #: deviations of the noise: powers of the time that it may grow with.
 _EARLY, _LATE, _OF_WAY, _ABOVE_NOISE = 0.25, 4.0, 0.15, 5.0
-_POWERS = np.arange(1.75, 3.3, 0.25)
+_POWERS, _LEAST_ROWS = tuple(np.arange(1.75, 3.3, 0.25)), 6
 #: No tip is faster, and none that goes further than a millimetre is slower at its fastest [m/s]: times of other units.
 _FASTEST, _SLOWEST, _FAR = 20.0, 2e-3, 1e-3
 
@@ -63,7 +63,9 @@ class SettlingCurve:
     travelled
         From the first to the final pose [m].
     coarse
-        Whether samples come too slowly for the time, and for the overshoot.
+        Whether the instrument does not show the time, and the overshoot.
+    sparse
+        Whether that is because samples are too far apart.
     position
         In the base frame [m], ``(n, 3)``.
     lines
@@ -83,6 +85,7 @@ class SettlingCurve:
     overshoot: float
     travelled: float
     coarse: tuple[bool, bool]
+    sparse: tuple[bool, bool]
     position: Array
     lines: NDArray[np.intp]
 
@@ -194,27 +197,31 @@ def _cycle(
     entered = int(np.flatnonzero(passing[:, 0] <= 1.0)[0])
     entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
     stay = entry
-    if outside[entered + 1 :].any():
-        stay = _stay(time, position, band, sigma, 0.0)
-        stay = max(_stay(time, position, band, sigma, _window(time, stay - entry, sigma, band)), entry)
     later = distance[entered + 1 :]
-    settles = stay <= entry
-    overshoot, width = 0.0, np.inf
-    if not settles:
-        overshoot, width = _top(time, position - _final(position), entered + 1 + int(later.argmax()))
+    overshoot, width, open_ = 0.0, np.inf, 0.0
     step = float(np.median(np.diff(time)))
+    if outside[entered + 1 :].any():
+        overshoot, width = _top(time, position - _final(position), entered + 1 + int(later.argmax()))
+        window = _window(step, 2 * _TOP * width, sigma, band)
+        left = sigma * np.sqrt(step / max(window, step))
+        narrow, stay, wide = (_stay(time, position, band + off, sigma, window) for off in (-2 * left, 0.0, 2 * left))
+        stay, open_ = max(stay, entry), narrow - wide
+    settles = stay <= entry
+    overshoot = 0.0 if settles else overshoot
     speed = (distance[entered] - distance[entered + 1]) / (time[entered + 1] - time[entered])
     start = _start(time, position, band)
     settled = stay - entry
     posing = stay - start
     if test == "posing-time":
-        coarse = (step > COARSE * posing, False)
+        coarse = sparse = (step > COARSE * posing, False)
     else:
         crossing = 2 * band / max(float(speed), 1e-12)
         slow = step > COARSE * crossing if settles else _LEAST_SAMPLES * step > min(settled, 3 * width)
         few = not settles and _excursion(passing, entered + 1 + int(later.argmax())) < _LEAST_OUTSIDE
         blurred = not settles and overshoot - band < 3 * sigma
-        coarse = (slow, slow or few or blurred)
+        # noise may put an excursion inside the band, or outside of it
+        sparse = (slow, slow or few)
+        coarse = (slow or open_ > COARSE * settled, slow or few or blurred)
     where = part.place
     if test == "posing-time":
         planned = plan.test(test)
@@ -234,6 +241,7 @@ def _cycle(
         overshoot,
         float(np.linalg.norm(position[-last:].mean(axis=0) - position[:5].mean(axis=0))),
         coarse,
+        sparse,
         position,
         samples.line[rows],
     )
@@ -257,8 +265,8 @@ def _refuse_other_times(time: Array, position: Array, where: str) -> None:
 def _top(time: Array, away: Array, peak: int) -> tuple[float, float]:
     """Return how far an overshoot goes [m], and its width at half its height [s].
 
-    From a parabola through the samples about the largest: noise makes the largest of many too large, and the top may lie
-    between two samples.
+    From a parabola through the samples about the largest: noise makes the largest of many too large, and the top may
+    lie between two samples.
     """
     along = away @ (away[peak] / np.linalg.norm(away[peak]))
     half = 0.5 * along[peak]
@@ -306,14 +314,13 @@ def _excursion(passing: Array, peak: int) -> int:
     return (peak + int(after[0]) if len(after) else len(met)) - first + 1
 
 
-def _window(time: Array, settling: float, sigma: float, band: float) -> float:
+def _window(step: float, longest: float, sigma: float, band: float) -> float:
     """Return the window over which positions are smoothed before the final stay is read [s], 0 for none.
 
     Noise makes the tip leave the band later than it does. The window brings it to a fiftieth of the band, and takes a
-    fiftieth of the time at most, so that an oscillation stays as it is.
+    ninth of a period at most: that leaves 98 % of an oscillation.
     """
-    step = float(np.median(np.diff(time)))
-    window = min(step * (sigma / (_QUIET * band)) ** 2, _QUIET * settling)
+    window = min(step * (sigma / (_QUIET * band)) ** 2, longest)
     return window if window >= 3 * step else 0.0
 
 
@@ -328,7 +335,8 @@ def _stay(time: Array, position: Array, band: float, sigma: float, window: float
     """Return when the band is entered for good [s]."""
     smooth = local_lines(time, position, time, window / 2)[0] if window else position
     distance = np.linalg.norm(smooth - _final(position), axis=1)
-    return _crossing(time, distance, band, int(np.flatnonzero(_outside(distance, band, sigma))[-1]) + 1)
+    last = int(np.flatnonzero(_outside(distance, band, sigma))[-1])
+    return _crossing(time, distance, band, last + 1) if last + 1 < len(time) else float(time[-1])
 
 
 def _crossing(time: Array, distance: Array, band: float, first: int) -> float:
@@ -342,7 +350,8 @@ def _start(time: Array, position: Array, band: float) -> float:
 
     A tip moves off with a power of the time since then: the square with a constant acceleration, the cube where the
     jerk is limited, and between the two behind a servo that lags. A root of the distance is then a straight line over
-    time, which begins at the begin. Of several roots that is taken whose line fits the first millimetre best.
+    time, which begins at the begin. Of several roots that is taken whose line fits the first millimetre best; of a few
+    samples the square root.
     """
     away = np.linalg.norm(position - position[0], axis=1)
     gone = int((away > 10 * band).argmax()) or len(away)
@@ -354,12 +363,13 @@ def _start(time: Array, position: Array, band: float) -> float:
     travelled = np.linalg.norm(position - rest, axis=1)
     last = int((travelled > high).argmax()) or len(travelled) - 1
     inside = np.flatnonzero(travelled[:last] <= low)
-    first = min(int(inside[-1]) if len(inside) else 0, max(last - 2, 0))
+    first = int(inside[-1]) + 1 if len(inside) else 0
+    last = min(max(last, first + 1), len(travelled) - 1)
     rows = np.arange(first, last + 1)
     along = np.maximum((position[rows] - rest) @ (position[last] - rest) / travelled[last], 0.25 * low)
     since = time[rows] - time[first]
     begins = []
-    for power in _POWERS:
+    for power in _POWERS if len(rows) >= _LEAST_ROWS else (2.0,):
         root, weight = along ** (1 / power), along ** (2 - 2 / power)  # the weight takes its slope from the root
         at, value = np.average(since, weights=weight), np.average(root, weights=weight)
         slope = float((weight * (since - at) * (root - value)).sum() / (weight * (since - at) ** 2).sum())

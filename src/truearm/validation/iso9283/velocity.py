@@ -90,10 +90,10 @@ def velocity_values(
     Intervals: of AV by Student's t, of RV by chi-square with the degrees of freedom that a variance has whose samples
     have an excess kurtosis of 1.1, of the cycles' mean velocities. That of FV
     is of the expected largest range among so many cycles, by pivots of Gaussian ranges; noise widens every range, so
-    that the lower end is less what noise alone may give. Smoothing narrows it: the upper end is higher by what it takes from
-    a swing of the highest frequency that is told, and what fluctuates faster is not in FV. FV of which that is more than a quarter, and AV and RV of
-    which the noise of a cycle's mean is more than a quarter of RV, are ``instrument-too-coarse``. Fewer than five cycles
-    have no intervals.
+    that the lower end is less what noise alone may give. Smoothing narrows it: the upper end is higher by what it takes
+    from a swing of the highest frequency that is told, and what fluctuates faster is not in FV. FV of which that noise
+    is more than a quarter, and AV and RV of which the noise of a cycle's mean is more than a quarter of RV, are
+    ``instrument-too-coarse``. Fewer than five cycles have no intervals.
 
     Parameters
     ----------

@@ -152,8 +152,8 @@ def _aside(found: Evaluation) -> Notice | None:
     worst = max(there, key=lambda corner: corner.offset)
     return Notice(
         "corner-offset",
-        f"At {len(there)} of {len(found.corners)} corners the path as a whole lies beside its command by more than half "
-        f"of CR, which CR and CO contain. At {worst.where} it lies {1e3 * worst.offset:.3f} mm beside, and CR of "
+        f"At {len(there)} of {len(found.corners)} corners the path as a whole lies beside its command by more than "
+        f"half of CR, which CR and CO contain. At {worst.where} it lies {1e3 * worst.offset:.3f} mm beside, and CR of "
         f"{1e3 * float(worst.rounding.mean()):.3f} mm would be {1e3 * float(worst.own.mean()):.3f} mm from its own "
         "corner.",
         level="note",

@@ -23,9 +23,9 @@ from truearm.validation.iso9283.values import COARSE, Instrument, Value
 
 #: Up to this share of the side behind it the tip is said to come from the corner.
 _AFTER = 0.5
-#: Straight lines from sample to sample cut off less than a quarter of the least distance if samples are no further
+#: Straight lines from sample to sample cut off less than a tenth of the least distance if samples are no further
 #: apart than so many times that distance: on an arc that touches both sides, and on no arc at all.
-_SPARSE = 1.8
+_SPARSE = 1.2
 #: Less beyond a side is rounding [m].
 _NOTHING = 1e-9
 #: So many samples show how far the tip goes beyond a side.

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
-from truearm.validation.iso9283.streams import noise_of
+from truearm.validation.iso9283.wild_samples import scatter_of
 
 #: A sample is unusual if it lies so many times further from what the samples about it say than is usual in a cycle
 #: there, and so many standard deviations of noise further.
 _TIMES, _NOISE = 4.0, 7.0
 #: With what is the same in all cycles taken away it is besides so many times further than is usual with it.
-_OF_WHOLE = 1.5
+_OF_WHOLE = 3.0
 #: What is usual there is seen in stretches of so many samples, and of so much of the way at least.
 _STRETCH, _LEAST_STRETCH = 3.0, 0.0025
 #: Beside a longer gap than this many usual steps, samples say too little of one another.
@@ -65,7 +65,7 @@ def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: 
     if high <= low:
         return []
     stretches = _stretches(places, low, high)
-    noise = float(np.median([noise_of(position) for position in positions]))
+    noise = float(np.median([scatter_of(position) for position in positions]))
     away, usual = _apart_in_all(times, positions, stretches)
     other, usual_of_other = _apart_in_all(times, _without_common(positions, places, low, high), stretches)
     beyond = [one > np.maximum(_TIMES * there, there + _NOISE * noise) for one, there in zip(away, usual, strict=True)]

@@ -11,23 +11,22 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
-from truearm.validation.iso9283.streams import noise_of
 
-#: No tip is accelerated more [m/s^2]; and not more where it would have to be faster than :data:`_FASTER_SURELY` times
-#: what is commanded, too.
-_ACCELERATION, _ACCELERATION_OF_FAST = 500.0, 100.0
-#: Nor does its velocity change by more than so many times the commanded one, or the one about it, between two samples.
-_FASTER, _FASTER_SURELY = 3.0, 5.0
+#: No tip is accelerated so much [m/s^2] while its velocity changes by so many times the commanded one, or the one about
+#: it, between two samples.
+_IMPOSSIBLE = ((500.0, 3.0), (100.0, 5.0), (50.0, 20.0))
 #: No tip is faster [m/s].
 _FASTEST = 20.0
 #: So many standard deviations of noise are no wild sample.
 _NOISE = 14.0
 #: So many samples in a row may be wild and the tip be back where it was; and so many steps tell how fast it goes there.
 _GROUP, _ABOUT = 20, 7
+#: Median length of a vector of three standard normal numbers.
+_MEDIAN = 1.538
 #: So many places are named in a refusal.
 _NAMED = 3
 #: More steps than this share that no tip takes are no matter of single samples.
-_SINGLE = 0.02
+_SINGLE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +53,22 @@ class WildSteps:
         return len(self.before) <= max(4.0, _SINGLE * self.count)
 
 
+def scatter_of(position: Array) -> float:
+    """Return the standard deviation of the noise of each coordinate [m], whatever a few samples do.
+
+    From the median length of third differences, in which little of a motion is left.
+    """
+    if len(position) < 8:
+        return 0.0
+    return float(np.median(np.linalg.norm(np.diff(position, n=3, axis=0), axis=1)) / (_MEDIAN * np.sqrt(20.0)))
+
+
 def wild_steps(time: Array, position: Array, velocity: float | None) -> WildSteps:
     """Return the steps from one sample to the next for which the tip would have to do what no tip can.
 
     A step counts if it differs from what the steps about it say by so much that it takes an acceleration of
-    500 m/s^2 and a change of velocity by three times the commanded one; or of 100 m/s^2 and five times.
+    500 m/s^2 and a change of velocity by three times the commanded one; or of 100 m/s^2 and five times; or of 50 m/s^2
+    and twenty times.
 
     Parameters
     ----------
@@ -74,18 +84,19 @@ def wild_steps(time: Array, position: Array, velocity: float | None) -> WildStep
     step = np.diff(position, axis=0)
     # what is far beyond every tip is sought alone: medians about all of a million steps would take their time
     size = np.linalg.norm(step, axis=1)
-    noise = _NOISE * noise_of(position)
-    likely = np.flatnonzero((size > noise) & (size > 0.3 * _ACCELERATION_OF_FAST * lasts**2))
-    half = _ABOUT // 2
-    about = np.clip(likely[:, None] + np.r_[-half:0, 1 : half + 1], 0, len(step) - 1)
+    noise = _NOISE * scatter_of(position)
+    likely = np.flatnonzero((size > noise) & (size > 0.3 * _IMPOSSIBLE[-1][0] * lasts**2))
+    about = np.clip(likely - _ABOUT // 2, 0, len(step) - _ABOUT)[:, None] + np.arange(_ABOUT)
+    about = about[about != likely[:, None]].reshape(len(likely), _ABOUT - 1)
     pace = np.median(step[about] / lasts[about][..., None], axis=1)
     fast = np.linalg.norm(pace, axis=1)
     jump = np.linalg.norm(step[likely] - pace * lasts[likely, None], axis=1)
     change, force = jump / lasts[likely], jump / lasts[likely] ** 2
     usual = np.maximum(fast, velocity or 0.0)
-    surely = np.maximum(_FASTER_SURELY * usual, _FASTEST if velocity is None else 0.0)
-    impossible = (force > _ACCELERATION) & (change > _FASTER * usual)
-    impossible |= (force > _ACCELERATION_OF_FAST) & (change > surely)
+    impossible = np.zeros(len(likely), dtype=bool)
+    for row, (most, times) in enumerate(_IMPOSSIBLE):
+        least = _FASTEST if velocity is None and row else 0.0
+        impossible |= (force > most) & (change > np.maximum(times * usual, least))
     impossible &= jump > noise
     return WildSteps(likely[impossible], pace[impossible], len(step))
 

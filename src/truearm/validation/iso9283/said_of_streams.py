@@ -21,6 +21,8 @@ _NAMED = 5
 #: A path that is run at less than this share of the commanded velocity is said: on circles and weaves the robot slows
 #: down by itself.
 _SLOW = {"polyline": 0.5, "circle": 0.1, "weave": 0.1}
+#: Samples of a cycle on the way, its ends left aside, among which a corner is not taken for a wild sample.
+_LEAST_MOVING, _END = 90, 0.02
 #: A corner that lies as far beside as this share of CR is said.
 _ASIDE = 0.5
 
@@ -54,6 +56,8 @@ def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
     records = []
     for run in runs:
         cycles = run.cycles
+        if _angular(run) and min(_moving(cycle.along, run.path.length) for cycle in cycles) < _LEAST_MOVING:
+            continue
         numbers, lines = tuple(c.number for c in cycles), tuple(c.lines for c in cycles)
         times, positions = tuple(c.time for c in cycles), tuple(c.position for c in cycles)
         name = f"{run.test} on {run.path.path.name}"
@@ -76,6 +80,15 @@ def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
             )
         )
     return records
+
+
+def _angular(run: Run) -> bool:
+    return run.path.path.kind == "weave" or len(run.path.vertices) > 2
+
+
+def _moving(along: Array, length: float) -> int:
+    """Return how many samples a cycle has between its ends."""
+    return int(((along > _END * length) & (along < (1 - _END) * length)).sum())
 
 
 def _unusual(records: Sequence[_Record]) -> Notice | None:

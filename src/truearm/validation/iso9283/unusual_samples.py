@@ -16,6 +16,9 @@ from truearm.validation.iso9283.wild_samples import scatter_of
 _TIMES, _NOISE = 4.0, 7.0
 #: With what is the same in all cycles taken away it is besides so many times further than is usual with it.
 _OF_WHOLE = 3.0
+#: Of so few cycles not each may have a sample in a corner: there it is besides further than this share of how much the
+#: steps before and behind it differ, of which a sharp corner makes a quarter.
+_FEW, _OF_TURN = 5, 0.3
 #: What is usual there is seen in stretches of so many samples, and of so much of the way at least.
 _STRETCH, _LEAST_STRETCH = 3.0, 0.0025
 #: Beside a longer gap than this many usual steps, samples say too little of one another.
@@ -72,6 +75,8 @@ def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: 
     for cycle, (one, there) in enumerate(zip(other, usual_of_other, strict=True)):
         least = np.maximum(_TIMES * there, there + _NOISE * noise)
         beyond[cycle] |= one > np.maximum(least, _OF_WHOLE * usual[cycle])
+        if len(positions) < _FEW:
+            beyond[cycle] &= np.maximum(away[cycle], one) > _OF_TURN * _turns(positions[cycle])
     found = []
     for cycle, rows in enumerate(np.flatnonzero(mask) for mask in beyond):
         if not len(rows):
@@ -116,6 +121,14 @@ def _without_common(positions: Sequence[Array], places: Sequence[Array], low: fl
         position - np.column_stack([np.interp(place, grid, common[axis]) for axis in range(3)])
         for position, place in zip(positions, places, strict=True)
     ]
+
+
+def _turns(position: Array) -> Array:
+    """Return by how much the last step before the neighbours of a sample and the first behind them differ, ``(n,)``."""
+    turns = np.zeros(len(position))
+    step = np.diff(position, axis=0)
+    turns[3:-3] = np.linalg.norm(step[5:] - step[:-5], axis=1)
+    return turns
 
 
 def _apart(time: Array, position: Array) -> Array:

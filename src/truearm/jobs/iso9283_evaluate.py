@@ -23,6 +23,7 @@ from truearm.measurement.readers.performance_samples import read_path_samples, r
 from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
+from truearm.results.iso9283_notices import row_notices
 from truearm.shown import listed
 from truearm.validation.iso9283.alignment import Alignment, read_alignment
 from truearm.validation.iso9283.comparison import compared
@@ -137,6 +138,7 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
                 "Tie the instrument to the base and give `alignment`.",
             )
         )
+    notices += row_notices(found)
     few = sorted({value.id for value in found.values if value.status == "too-few-cycles"})
     if few:
         notices.append(

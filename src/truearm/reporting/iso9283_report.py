@@ -29,7 +29,8 @@ _ANGLES: tuple[Component, ...] = ("a", "b", "c")
 def iso9283_report(found: Iso9283Evaluation) -> str:
     """Return the report: the criteria at their worst places, pictures, and every value."""
     measured = [value for value in found.values if value.status != "not-measured"]
-    tables = [Figures("Criteria at their worst places", HEADING, tuple(one.cells for one in worst_places(measured)))]
+    worst = tuple(one.cells for one in worst_places(found.values))
+    tables = [Figures("Criteria at their worst places", HEADING, worst)]
     if found.comparison is not None:
         tables.append(_compared(found.comparison))
     details: list[Figures] = []

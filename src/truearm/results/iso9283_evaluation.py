@@ -89,7 +89,7 @@ class Iso9283Evaluation(Record):
         criteria = len({value.id for value in measured})
         text = [f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {counted_criteria(criteria)}."]
         text.append(self.tied)
-        rows = [worst.cells for worst in worst_places(measured)]
+        rows = [worst.cells for worst in worst_places(self.values)]
         if rows:
             text.append(
                 "Each at its worst place and fastest velocity, with its 95 % interval or the range of its cycles."

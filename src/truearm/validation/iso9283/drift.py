@@ -7,7 +7,7 @@ robot warms up, each group has an AP and an RP, and dAP and dRP are the largest 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
@@ -65,11 +65,7 @@ def groups_of(one: Cycles) -> list[Cycles]:
     if len(between) and np.isfinite(between).all():
         begins = begins | (between > _PAUSE * max(float(np.median(between)), 1e-9))
     ends = [0, *(np.flatnonzero(begins) + 1).tolist(), len(one)]
-    made = []
-    for a, b in pairwise(ends):
-        angles = None if one.angles is None else one.angles[a:b]
-        made.append(replace(one, cycle=one.cycle[a:b], time=one.time[a:b], points=one.points[a:b], angles=angles))
-    return made
+    return [one.rows(slice(a, b)) for a, b in pairwise(ends)]
 
 
 def drift_values(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -22,6 +23,10 @@ from truearm.validation.iso9283.orientation_check import refuse_far_orientations
 _ROUNDING: Final = 1e-9
 #: A row is at another pose if that is nearer than this share of the distance to its own.
 _NEARER: Final = 0.5
+#: A velocity or load is the plan's if it differs by less, as a share: rounding in a table.
+_SAME_SHARE: Final = 5e-4
+#: A robot that has less than this share of the rows of another one was not measured, but its name mistyped.
+_FEW_ROWS: Final = 0.2
 _FILES: Final = {"paths": "paths", "settling": "poses over time", "forces": "pushes"}
 
 
@@ -44,6 +49,8 @@ class Cycles:
         3)``; None where no orientation was read.
     command
         [m], ``(3,)``.
+    line
+        In the file, ``(n,)``.
     """
 
     test: str
@@ -57,6 +64,7 @@ class Cycles:
     points: Array
     angles: Array | None
     command: Array
+    line: NDArray[np.intp]
 
     @property
     def barycentre(self) -> Array:
@@ -65,6 +73,17 @@ class Cycles:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def rows(self, chosen: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Cycles:
+        """Return some of the cycles."""
+        return replace(
+            self,
+            cycle=self.cycle[chosen],
+            time=self.time[chosen],
+            points=self.points[chosen],
+            angles=None if self.angles is None else self.angles[chosen],
+            line=self.line[chosen],
+        )
 
 
 def best_fit_of(plan: PerformancePlan, readings: AttainedPoses) -> Alignment:
@@ -78,20 +97,26 @@ def best_fit_of(plan: PerformancePlan, readings: AttainedPoses) -> Alignment:
     _check_names(plan, readings)
     rows = readings.criterion.are("AP")
     poses = [name for name in plan.poses if (rows & readings.pose.are(name)).any()]
-    attained = [readings.position[rows & readings.pose.are(name)].mean(axis=0) for name in poses]
+    # The exact sum, so that the order of the rows does not change the last digit.
+    attained = [
+        [math.fsum(column) / len(column) for column in readings.position[rows & readings.pose.are(name)].T]
+        for name in poses
+    ]
     commanded = [plan.poses[name].position for name in poses]
     return best_fit(np.reshape(attained, (-1, 3)), np.reshape(commanded, (-1, 3)))
 
 
 def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignment) -> tuple[Cycles, ...]:
-    """Return the rows of a file by test, robot, pose, approach, velocity and load.
+    """Return the rows of a file by test, robot, pose, approach, velocity and load, in the order of the plan.
+
+    The order of the rows does not matter, but for drift without times.
 
     Raises
     ------
     InputError
-        For a test, a pose or an approach that the plan does not have, a robot without a name where robots are compared,
-        poses outside the cube or at another pose of the plan than they are called, orientations that no robot attains,
-        and a cycle that appears twice.
+        For a test, a pose, an approach, a velocity or a load that the plan does not have, a robot without a name where
+        robots are compared, a robot that has a few rows alone, poses outside the cube or at another pose of the plan
+        than they are called, orientations that no robot attains, and a cycle that appears twice.
     """
     _check_names(plan, readings)
     position = alignment.in_base(readings.position)
@@ -104,7 +129,7 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
         refuse_far_orientations(rotation, commanded, turn, readings.line, readings.source)
     approaches = readings.approach.code.copy()
     approaches[~readings.criterion.are("vAP")] = -1
-    conditions = np.column_stack([np.round(readings.velocity, 9), np.round(readings.load, 9)])
+    conditions = _planned_conditions(plan, readings)
     _, condition = np.unique(conditions, axis=0, return_inverse=True)
     keys = np.column_stack(
         [readings.criterion.code, readings.robot.code, readings.pose.code, approaches, condition.reshape(-1)]
@@ -124,16 +149,50 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
                 robot=_name(readings.robot, row),
                 pose=pose,
                 approach=_name(readings.approach, row) if test == "vAP" else "",
-                velocity=float(readings.velocity[row]),
-                load=float(readings.load[row]),
+                velocity=float(conditions[row, 0]),
+                load=float(conditions[row, 1]),
                 cycle=readings.cycle[rows],
                 time=readings.time[rows],
                 points=position[rows],
                 angles=None if rotation is None else rotation_vector(rotation[rows] @ command.rotation.T),
                 command=command.position,
+                line=readings.line[rows],
             )
         )
-    return tuple(made)
+    return tuple(sorted(made, key=lambda one: _place_in(plan, one)))
+
+
+def _place_in(plan: PerformancePlan, one: Cycles) -> tuple[object, ...]:
+    """Return by what cycles are ordered: the plan, and names of robots."""
+    number, test = next((k, test) for k, test in enumerate(plan.tests) if test.id == one.test)
+    approach = test.approaches.index(one.approach) if one.approach else 0
+    return number, one.robot, test.places.index(one.pose), approach, -one.velocity, -one.load
+
+
+def _planned_conditions(plan: PerformancePlan, readings: AttainedPoses) -> Array:
+    """Return velocity and load of each row as the plan has them, ``(n, 2)``, or refuse others."""
+    made = np.empty((len(readings.cycle), 2))
+    for planned in plan.tests:
+        rows = np.flatnonzero(readings.criterion.are(planned.id))
+        pairs = (
+            ("velocity", readings.velocity, planned.velocities),
+            ("load", readings.load, planned.loads),
+        )
+        for column, (name, read, known) in enumerate(pairs):
+            apart = np.abs(read[rows, None] - np.array(known))
+            made[rows, column] = np.array(known)[apart.argmin(axis=1)]
+            other = np.flatnonzero(apart.min(axis=1) > _SAME_SHARE)
+            if len(other):
+                row = int(rows[other[0]])
+                raise InputError(
+                    f"{len(other)} row{'s' * (len(other) != 1)} of the test {planned.id} at a {name} that it does not "
+                    "have in the plan",
+                    where=f"{readings.source}, line {int(readings.line[row])}, column {name}",
+                    came=f"{100.0 * read[row]:g} %",
+                    allowed=", ".join(f"{100.0 * share:g} %" for share in known),
+                    cure="Correct it, or plan and measure the whole test under this condition too.",
+                )
+    return made
 
 
 def _name(names: Names, row: int) -> str:
@@ -163,6 +222,8 @@ def _check_names(plan: PerformancePlan, readings: AttainedPoses) -> None:
     """Refuse tests, poses, approaches and robots that do not fit the plan."""
     for test in readings.criterion.names:
         rows = readings.criterion.are(test)
+        if not rows.any():
+            continue
         planned = plan.test(test)
         if planned is None or TESTS[test].readings != "poses":
             raise _no_such_test(plan, readings, test)
@@ -182,10 +243,34 @@ def _check_names(plan: PerformancePlan, readings: AttainedPoses) -> None:
         if test == "E" and nameless.any():
             raise InputError(
                 "robots that are exchanged need names",
-                where=f"{readings.source}, line {int(readings.line[np.argmax(nameless)])}, column robot",
+                where=f"{readings.source}, line {_first(readings, nameless)}, column robot",
                 allowed="a name for each robot",
                 cure="Name the robot in every row of the test E.",
             )
+        _check_robots(readings, test, rows)
+
+
+def _check_robots(readings: AttainedPoses, test: str, rows: NDArray[np.bool_]) -> None:
+    """Refuse a robot that has a few rows of a test alone: its name is probably another's, mistyped."""
+    counted = {name: int((rows & readings.robot.are(name)).sum()) for name in readings.robot.names}
+    counts = {name: count for name, count in counted.items() if count}
+    if len(counts) == 1:
+        return
+    most = max((name for name in counts if name), key=lambda name: counts[name])
+    for name, count in counts.items():
+        if name != most and (not name or count < _FEW_ROWS * counts[most]):
+            raise InputError(
+                f"{'a robot has few rows' if name else 'rows have no robot'} in the test {test}: {count}, where {most} "
+                f"has {counts[most]}",
+                where=f"{readings.source}, line {_first(readings, rows & readings.robot.are(name))}, column robot",
+                came=name or None,
+                allowed=", ".join(other for other in counts if other not in (name, "")),
+                cure="Correct the name; or remove its rows, or measure it too.",
+            )
+
+
+def _first(readings: AttainedPoses, rows: NDArray[np.bool_]) -> int:
+    return int(readings.line[np.argmax(rows)])
 
 
 def _no_such_test(plan: PerformancePlan, readings: AttainedPoses, test: str) -> InputError:
@@ -217,7 +302,7 @@ def _refused(
     near = nearest_names(came, known, 1)
     return InputError(
         what,
-        where=f"{readings.source}, line {int(readings.line[np.argmax(rows)])}, column {column}",
+        where=f"{readings.source}, line {_first(readings, rows)}, column {column}",
         came=came or None,
         allowed=", ".join(known) or "nothing: the plan has no tests of poses",
         cure=cure or (f"Did you mean {near[0]}?" if near else "Correct it, or use the plan that was measured."),

@@ -154,7 +154,7 @@ def _bandwidth(found: Evaluation) -> Notice | None:
         "velocity-bandwidth",
         f"FV and its interval tell what fluctuates with up to {upto}: faster fluctuation is smoothed away together "
         "with the instrument's noise. Compare robots at the same bandwidth.",
-        level="note",
+        "note",
     )
 
 
@@ -169,5 +169,5 @@ def _aside(found: Evaluation) -> Notice | None:
         f"half of CR, which CR and CO contain. At {worst.where} it lies {1e3 * worst.offset:.3f} mm beside, and CR of "
         f"{1e3 * float(worst.rounding.mean()):.3f} mm would be {1e3 * float(worst.own.mean()):.3f} mm from its own "
         "corner.",
-        level="note",
+        "note",
     )

@@ -150,7 +150,7 @@ def _corner(run: Run, number: int, band: float) -> CornerCurves:
     reach = (_AFTER * (at - float(path.starts[number - 1])), _AFTER * (float(path.starts[number + 1]) - at))
     turns = [_cycle(cycle, run, at, before, after, reach, band) for cycle in run.cycles]
     rounding, overshoot = (np.array([getattr(turn, name) for turn in turns]) for name in ("rounding", "overshoot"))
-    far = float(np.median([turn.spacing for turn in turns])) > _SPARSE * float(rounding.mean())
+    far = float(np.mean([turn.spacing for turn in turns])) > _SPARSE * float(rounding.mean())
     highest = max(turns, key=lambda turn: turn.overshoot)
     return CornerCurves(
         f"{path.path.name} E{number + 1}",
@@ -206,7 +206,7 @@ def _cycle(
         stabilisation,
         own,
         float(_distance(smooth, corner + own).min()),
-        float(np.median(steps[max(nearest - _ABOUT, 0) : nearest + _ABOUT + 1])),
+        max(float(np.median(steps[max(nearest - _ABOUT, 0) : nearest + _ABOUT + 1])), float(steps[nearest])),
         highest[0][1] - highest[0][0] + 1 if highest else 0,
     )
 

@@ -175,6 +175,14 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
             here = found_in(test, path, samples.time[rows], position, velocity)
             spans = here.cycles
             if number:
+                if len(spans) > 1:
+                    raise InputError(
+                        f"cycle {number} of {part.place} runs the path {len(spans)} times",
+                        where=where,
+                        came=f"{len(spans)} cycles under one number",
+                        allowed="one run of the path",
+                        cure="Number the cycles, or leave the cells of the column cycle empty: then they are found.",
+                    )
                 spans = spans if len(spans) == 1 else ((0, len(rows) - 1),)
             else:
                 found = here

@@ -23,6 +23,8 @@ _NAMED = 5
 _SLOW = {"polyline": 0.5, "circle": 0.1, "weave": 0.1}
 #: Samples of a cycle on the way, its ends left aside, among which a corner is not taken for a wild sample.
 _LEAST_MOVING, _END = 90, 0.02
+#: Samples are missing where two are further apart than this share of the path, and than so many usual steps.
+_GAP, _GAP_STEPS = 0.06, 6.0
 #: A corner that lies as far beside as this share of CR is said.
 _ASIDE = 0.5
 
@@ -42,7 +44,14 @@ class _Record:
 def said_of_streams(found: Evaluation) -> tuple[Notice, ...]:
     """Return what is to be said of paths and settling."""
     runs = _runs(found)
-    notices = (_unusual(_records(found, runs)), _slow(runs), _sparse(found), _bandwidth(found), _aside(found))
+    notices = (
+        _unusual(_records(found, runs)),
+        _gaps(runs),
+        _slow(runs),
+        _sparse(found),
+        _bandwidth(found),
+        _aside(found),
+    )
     return tuple(notice for notice in notices if notice is not None)
 
 
@@ -60,8 +69,7 @@ def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
             continue
         numbers, lines = tuple(c.number for c in cycles), tuple(c.lines for c in cycles)
         times, positions = tuple(c.time for c in cycles), tuple(c.position for c in cycles)
-        name = f"{run.test} on {run.path.path.name}"
-        records.append(_Record(name, numbers, lines, times, positions, tuple(c.along for c in cycles)))
+        records.append(_Record(_called(run), numbers, lines, times, positions, tuple(c.along for c in cycles)))
     settling: dict[tuple[object, ...], list[int]] = {}
     for row, curve in enumerate(found.settling):
         settling.setdefault((curve.test, curve.where, curve.conditions), []).append(row)
@@ -100,13 +108,21 @@ def _unusual(records: Sequence[_Record]) -> Notice | None:
             named.append((one.distance, text))
     if not named:
         return None
-    shown = [text for _, text in sorted(named, key=lambda both: -both[0])[:_NAMED]]
-    more = f", and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
     return Notice(
         "unusual-samples",
-        f"Samples lie apart from those about them, as in no other cycle there: {', '.join(shown)}{more}. If it was the "
+        f"Samples lie apart from those about them, as in no other cycle there: {_worst(named)}. If it was the "
         "instrument, remove these lines: samples may be missing. If it was the robot, they belong into the figures.",
     )
+
+
+def _worst(named: Sequence[tuple[float, str]]) -> str:
+    """Return the texts with the largest numbers, and how many more there are."""
+    shown = [text for _, text in sorted(named, key=lambda both: -both[0])[:_NAMED]]
+    return ", ".join([*shown, f"and {len(named) - _NAMED} more"] if len(named) > _NAMED else shown)
+
+
+def _called(run: Run) -> str:
+    return f"{run.test} on {run.path.path.name}"
 
 
 def _slow(runs: Sequence[Run]) -> Notice | None:
@@ -114,7 +130,7 @@ def _slow(runs: Sequence[Run]) -> Notice | None:
     for run in runs:
         pace = float(np.median([pace_along(run.path, cycle.time, cycle.along) for cycle in run.cycles]))
         if pace < _SLOW[run.path.path.kind] * run.velocity:
-            told.append(f"{run.test} on {run.path.path.name} at {1e3 * pace:.4g} of {1e3 * run.velocity:.4g} mm/s")
+            told.append(f"{_called(run)} at {1e3 * pace:.4g} of {1e3 * run.velocity:.4g} mm/s")
     if not told:
         return None
     more = f", and {len(told) - _NAMED} more" if len(told) > _NAMED else ""
@@ -141,6 +157,29 @@ def _sparse(found: Evaluation) -> Notice | None:
         "sampled-too-slowly",
         f"Samples are too far apart for some values of {listed(tuple(told))}: what lies between two of them is not "
         "seen. Those values are marked; sample faster.",
+    )
+
+
+def _gaps(runs: Sequence[Run]) -> Notice | None:
+    """Return where samples are missing over more than a part of a path."""
+    named = []
+    for run in runs:
+        length = run.path.length
+        for cycle in run.cycles:
+            gap = np.diff(np.clip(cycle.along, 0.0, length))
+            moving = gap[gap > 0.1 * length / len(gap)]
+            usual = float(np.median(moving)) if len(moving) else 0.0
+            worst = int(gap.argmax())
+            if gap[worst] > max(_GAP * length, _GAP_STEPS * usual):
+                lines = f"lines {cycle.lines[worst]} and {cycle.lines[worst + 1]}"
+                text = f"{1e3 * gap[worst]:.3g} mm between {lines} (cycle {cycle.number} of {_called(run)})"
+                named.append((float(gap[worst]), text))
+    if not named:
+        return None
+    return Notice(
+        "gap-in-path",
+        f"Samples are missing on a part of the way: {_worst(named)}. Values there come from straight lines between the "
+        "samples before and behind. Measure these cycles again, or leave them out.",
     )
 
 

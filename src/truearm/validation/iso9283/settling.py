@@ -38,6 +38,8 @@ _TOP = 1 / 6
 #: deviations of the noise: powers of the time that it may grow with.
 _EARLY, _LATE, _OF_WAY, _ABOVE_NOISE = 0.25, 4.0, 0.15, 5.0
 _POWERS, _LEAST_ROWS = tuple(np.arange(1.75, 3.3, 0.25)), 6
+#: After the first entry the tip goes no further than this share of the way before it, or this many bands.
+_AGAIN, _AGAIN_BANDS = 0.8, 20.0
 #: No tip is faster, and none that goes further than a millimetre is slower at its fastest [m/s]: times of other units.
 _FASTEST, _SLOWEST, _FAR = 20.0, 2e-3, 1e-3
 
@@ -198,6 +200,16 @@ def _cycle(
     entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
     stay = entry
     later = distance[entered + 1 :]
+    before = float(distance[: entered + 1].max())
+    if later.max() > max(_AGAIN * before, _AGAIN_BANDS * band):
+        again = entered + 1 + int(later.argmax())
+        raise InputError(
+            "the tip goes away again after it came to rest",
+            where=f"{at}, from line {samples.line[rows[again]]} on" if again else at,
+            came=f"{1e3 * distance[again]:.4g} mm from where it ends, after it was within the limit band",
+            allowed="one way to the pose in each cycle",
+            cure="Give each way a number of its own in the column cycle.",
+        )
     overshoot, width, open_ = 0.0, np.inf, 0.0
     step = float(np.median(np.diff(time)))
     if outside[entered + 1 :].any():
@@ -217,6 +229,8 @@ def _cycle(
     else:
         crossing = 2 * band / max(float(speed), 1e-12)
         slow = step > COARSE * crossing if settles else _LEAST_SAMPLES * step > min(settled, 3 * width)
+        there = slice(entered, int(np.searchsorted(time, stay)) + 1)
+        slow |= float(np.diff(time[there]).max(initial=0.0)) > COARSE * max(settled, crossing)
         few = not settles and _excursion(passing, entered + 1 + int(later.argmax())) < _LEAST_OUTSIDE
         blurred = not settles and overshoot - band < 3 * sigma
         # noise may put an excursion inside the band, or outside of it

@@ -19,7 +19,7 @@ from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.runs import LEAST_SAMPLES, Part, in_base, parts_of
 from truearm.validation.iso9283.smoothing import local_lines
-from truearm.validation.iso9283.streams import noise_of
+from truearm.validation.iso9283.streams import noise_of, spans_of
 from truearm.validation.iso9283.values import COARSE, Conditions, Instrument, Status, Value
 from truearm.validation.iso9283.wild_samples import refuse_wild, wild_steps
 
@@ -38,8 +38,9 @@ _TOP = 1 / 6
 #: deviations of the noise: powers of the time that it may grow with.
 _EARLY, _LATE, _OF_WAY, _ABOVE_NOISE = 0.25, 4.0, 0.15, 5.0
 _POWERS, _LEAST_ROWS = tuple(np.arange(1.75, 3.3, 0.25)), 6
-#: After the first entry the tip goes no further than this share of the way before it, or this many bands.
-_AGAIN, _AGAIN_BANDS = 0.8, 20.0
+#: After it stood in the band so long [s] the tip goes no further than so many bands: no oscillation of a robot is so
+#: slow.
+_STOOD, _AGAIN = 0.2, 5.0
 #: No tip is faster, and none that goes further than a millimetre is slower at its fastest [m/s]: times of other units.
 _FASTEST, _SLOWEST, _FAR = 20.0, 2e-3, 1e-3
 
@@ -200,16 +201,7 @@ def _cycle(
     entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
     stay = entry
     later = distance[entered + 1 :]
-    before = float(distance[: entered + 1].max())
-    if later.max() > max(_AGAIN * before, _AGAIN_BANDS * band):
-        again = entered + 1 + int(later.argmax())
-        raise InputError(
-            "the tip goes away again after it came to rest",
-            where=f"{at}, from line {samples.line[rows[again]]} on" if again else at,
-            came=f"{1e3 * distance[again]:.4g} mm from where it ends, after it was within the limit band",
-            allowed="one way to the pose in each cycle",
-            cure="Give each way a number of its own in the column cycle.",
-        )
+    _refuse_away_again(time, distance, band, at, samples.line[rows])
     overshoot, width, open_ = 0.0, np.inf, 0.0
     step = float(np.median(np.diff(time)))
     if outside[entered + 1 :].any():
@@ -274,6 +266,20 @@ def _refuse_other_times(time: Array, position: Array, where: str) -> None:
             allowed=f"{1e3 * _SLOWEST:g} to {1e3 * _FASTEST:g} mm/s",
             cure="Write the times in seconds.",
         )
+
+
+def _refuse_away_again(time: Array, distance: Array, band: float, where: str, lines: NDArray[np.intp]) -> None:
+    stood = [last for first, last in spans_of(distance <= band) if time[last] - time[first] > _STOOD]
+    if not stood or distance[stood[0] :].max() <= _AGAIN * band:
+        return
+    again = stood[0] + int(distance[stood[0] :].argmax())
+    raise InputError(
+        "the tip goes away again after it came to rest",
+        where=f"{where}, about line {lines[again]}",
+        came=f"{1e3 * distance[again]:.4g} mm from where it ends, after it stood within the limit band",
+        allowed="one way to the pose in each cycle",
+        cure="Give each way a number of its own in the column cycle; remove samples that the instrument read wrongly.",
+    )
 
 
 def _top(time: Array, away: Array, peak: int) -> tuple[float, float]:

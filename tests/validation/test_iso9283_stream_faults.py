@@ -200,6 +200,136 @@ def test_clean_streams_have_no_unusual_sample(seed: int) -> None:
     assert not unusual_samples([c.time for c in cycles], [c.position for c in cycles], [c.along for c in cycles])
 
 
+# -- cycles as a whole ---------------------------------------------------------------------------------
+
+
+def test_a_cycle_that_lies_apart_as_a_whole_is_said_with_what_is_without_it() -> None:
+    samples = runs()
+    notice = said_of_paths(moved(samples, slice(0, int((samples.cycle == 1).sum())), 1e-3))["wild-cycle"]
+    assert notice.level == "warning"
+    assert "cycle 1 of AT on line by 0.99" in notice.message
+    assert "RT is 1.1" in notice.message
+    assert "without it 0.0" in notice.message
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e-3])
+def test_cycles_that_scatter_are_not_wild(scale: float) -> None:
+    rng = np.random.default_rng(1)
+    samples = runs(cycles=10)
+    for _ in range(20):
+        off = scale * rng.standard_normal((11, 3))
+        assert "wild-cycle" not in said_of_paths(replace(samples, position=samples.position + off[samples.cycle]))
+
+
+def test_samples_that_are_missing_on_a_part_of_the_way_are_said() -> None:
+    samples = runs()
+    kept = np.ones(len(samples.time), bool)
+    kept[100:130] = False
+    rows = [
+        (k, samples.time[kept & (samples.cycle == k)], samples.position[kept & (samples.cycle == k)])
+        for k in range(1, 6)
+    ]
+    notice = said_of_paths(samples_of("AT", "line", rows))["gap-in-path"]
+    assert notice.level == "warning"
+    assert "77.5 mm between lines 101 and 102 (cycle 1 of AT on line)" in notice.message
+    rng = np.random.default_rng(0)
+    lost = rng.random(len(samples.time)) < 0.2
+    rows = [
+        (k, samples.time[~lost & (samples.cycle == k)], samples.position[~lost & (samples.cycle == k)])
+        for k in range(1, 6)
+    ]
+    assert not said_of_paths(samples_of("AT", "line", rows))
+
+
+def test_two_runs_under_one_number_are_refused() -> None:
+    samples = runs()
+    twice = samples.cycle <= 2
+    # the way back lies between the two
+    back = samples.position[samples.cycle == 1][::-1] + 0.05 * NORMAL
+    t, p = samples.time[samples.cycle == 1], samples.position[twice]
+    n = len(t)
+    position = np.concatenate([p[:n], back, p[n:]])
+    time = np.concatenate([t, t + 3.0, t + 6.0])
+    text = refusal_of_path(samples_of("AT", "line", [(1, time, position)]))
+    assert "cycle 1 of line runs the path 2 times" in text
+    assert "Number the cycles, or leave the cells" in text
+
+
+def test_two_ways_to_rest_under_one_number_are_refused() -> None:
+    samples = resting()
+    n = int((samples.cycle == 1).sum())
+    once, slower = samples.position[:n], CENTRE + 0.5 * (samples.position[:n] - CENTRE)
+    time = np.concatenate([samples.time[:n], samples.time[:n] + 3.0])
+    both = samples_of("t", "P1", [(1, time, np.concatenate([once, slower]))])
+    with pytest.raises(InputError, match=r"about line \d+: the tip goes away again after it came to rest; got '2[45]"):
+        settling_values(PLAN, both, HERE, EXACT)
+
+
+# -- coming to rest ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("power", "rate"), [(2, 1000.0), (2, 100.0), (3, 1000.0), (3, 250.0), (2.5, 500.0)])
+def test_the_begin_of_a_motion_is_found_whatever_power_of_time_it_grows_with(power: float, rate: float) -> None:
+    t = times(3.0, rate)
+    tau = np.maximum(t - 0.3, 0.0)
+    x = np.where(tau < 0.2, 0.05 * (tau / 0.2) ** power, 0.1 - 0.05 * np.exp(-(tau - 0.2) * power / 0.2))
+    samples = samples_of("posing-time", "D100", [(k, t, CENTRE + np.outer(x, ALONG)) for k in (1, 2, 3)])
+    _, curves = settling_values(PLAN, samples, HERE, EXACT)
+    assert [curve.start for curve in curves] == pytest.approx([0.3] * 3, abs=1e-3)
+
+
+def test_the_begin_of_a_gentle_motion_is_found_in_noise() -> None:
+    rng = np.random.default_rng(5)
+    t = times(3.0, 1000.0)
+    tau = np.clip(t - 0.3, 0.0, 0.4)
+    x = 0.05 * (tau / 0.2) ** 3 * (tau < 0.2) + (tau >= 0.2) * (0.1 - 0.05 * (2 - tau / 0.2) ** 3)
+    samples = samples_of(
+        "posing-time",
+        "D100",
+        [(k, t, CENTRE + np.outer(x, ALONG) + rng.normal(0, 1e-5, (len(t), 3))) for k in range(1, 7)],
+    )
+    _, curves = settling_values(PLAN, samples, HERE, Instrument(1e-5))
+    assert np.mean([curve.start for curve in curves]) == pytest.approx(0.3, abs=5e-3)
+
+
+def ringing(rate: float, hertz: float, sigma: float, *, amplitude: float = 5e-3, damping: float = 0.4) -> Samples:
+    """Return cycles of a damped oscillation, each sampled at other times."""
+    rng = np.random.default_rng(2)
+    w = 2 * np.pi * hertz
+    d = w * np.sqrt(1 - damping**2)
+    rows = []
+    for k in (1, 2, 3):
+        t = times(1.5, rate) + k / 3 / rate
+        tau = np.maximum(t - 0.1, 0.0)
+        x = amplitude * np.exp(-damping * w * tau) * (np.cos(d * tau) + damping * w / d * np.sin(d * tau))
+        rows.append((k, t, CENTRE + np.outer(x, ALONG) + rng.normal(0.0, sigma, (len(t), 3))))
+    return samples_of("t", "P1", rows)
+
+
+def test_noise_makes_an_overshoot_little_larger() -> None:
+    true = 5e-3 * np.exp(-0.4 * np.pi / np.sqrt(1 - 0.4**2))
+    values, curves = settling_values(PLAN, ringing(1000.0, 8.0, 1e-5), HERE, Instrument(1e-5))
+    assert the(values, "OV").value == pytest.approx(true, rel=0.01)
+    assert the(values, "OV").value < max(curve.distance[curve.time > 0.16].max() for curve in curves)
+
+
+@pytest.mark.parametrize(("rate", "status"), [(500.0, "measured"), (50.0, "instrument-too-coarse")])
+def test_an_oscillation_with_fewer_than_eight_samples_a_period_is_marked(rate: float, status: str) -> None:
+    values, curves = settling_values(PLAN, ringing(rate, 8.0, 0.0), HERE, EXACT)
+    assert {value.status for value in values} == {status}
+    assert ("sampled-too-slowly" in said(settling=tuple(curves))) == (status != "measured")
+
+
+def test_an_excursion_that_noise_puts_in_the_band_or_outside_is_marked() -> None:
+    # the second excursion ends within noise of the band
+    damping = 0.4
+    peak = np.exp(-2 * np.pi * damping / np.sqrt(1 - damping**2))
+    for sigma, status in ((0.0, "measured"), (5e-6, "instrument-too-coarse")):
+        samples = ringing(250.0, 8.0, sigma, amplitude=1.02 * PLAN.limit_band / peak, damping=damping)
+        values, _ = settling_values(PLAN, samples, HERE, Instrument(sigma))
+        assert the(values, "t").status == status
+
+
 # -- times of another unit -----------------------------------------------------------------------------
 
 

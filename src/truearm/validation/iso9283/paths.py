@@ -30,6 +30,8 @@ STATIONS = 50
 _HALF = 0.5
 #: Between two samples at most so many stations may lie: deviations that change faster are not seen.
 _SPARSE = 2.0
+#: A cycle so many times as far from the middle of all as every other one is wild.
+_WILD = 4.0
 #: Simulated campaigns for an interval, and normal numbers for the mean and spread of distances.
 _TRIALS, _DRAWS = 400, 500
 _ANGLES: tuple[Component, ...] = ("a", "b", "c")
@@ -163,6 +165,30 @@ def deviations_of(run: Run, stations: int = STATIONS) -> PathDeviations:
         half = stats.t.ppf(0.975, n - 1) * of_cycle.std(axis=0, ddof=1) / np.sqrt(n)
     return PathDeviations(
         run.path.path.name, run, along, deviation, mean, distance, half, _spread(deviation), angles, pooled
+    )
+
+
+def wild_cycle(here: PathDeviations) -> tuple[int, float, float, float] | None:
+    """Return a cycle that is elsewhere as a whole: which, how far [m], and AT and RT without it; None if none is.
+
+    It is four times as far from the middle of the cycles as every other one, root mean square over the stations. Five
+    cycles or more tell.
+    """
+    n = len(here.deviation)
+    if n < LEAST_CYCLES:
+        return None
+    away = here.deviation - np.median(here.deviation, axis=0)
+    far = np.sqrt((away**2).sum(axis=2).mean(axis=1))
+    order = np.argsort(far)
+    worst = int(order[-1])
+    if far[worst] <= _WILD * far[order[-2]]:
+        return None
+    rest = np.delete(here.deviation, worst, axis=0)
+    return (
+        worst,
+        float(far[worst]),
+        float(np.linalg.norm(rest.mean(axis=0), axis=1).max()),
+        float(_spread(rest).max()),
     )
 
 

@@ -12,6 +12,7 @@ from truearm.modeling.chain import Array
 from truearm.notices import Notice
 from truearm.shown import listed
 from truearm.validation.iso9283.evaluation import Evaluation
+from truearm.validation.iso9283.paths import wild_cycle
 from truearm.validation.iso9283.runs import Run
 from truearm.validation.iso9283.synchronise import pace_along
 from truearm.validation.iso9283.unusual_samples import unusual_samples
@@ -46,6 +47,7 @@ def said_of_streams(found: Evaluation) -> tuple[Notice, ...]:
     runs = _runs(found)
     notices = (
         _unusual(_records(found, runs)),
+        _wild(found),
         _gaps(runs),
         _slow(runs),
         _sparse(found),
@@ -157,6 +159,26 @@ def _sparse(found: Evaluation) -> Notice | None:
         "sampled-too-slowly",
         f"Samples are too far apart for some values of {listed(tuple(told))}: what lies between two of them is not "
         "seen. Those values are marked; sample faster.",
+    )
+
+
+def _wild(found: Evaluation) -> Notice | None:
+    named = []
+    for path in found.deviations:
+        wild = wild_cycle(path)
+        if wild is None:
+            continue
+        cycle, far, accuracy, repeatability = wild
+        now = f"RT is {1e3 * float(path.spread.max()):.4f} mm, without it {1e3 * repeatability:.4f}"
+        now += f"; AT is {1e3 * float(path.distance.max()):.4f} mm, without it {1e3 * accuracy:.4f}"
+        number = path.run.cycles[cycle].number
+        named.append((far, f"cycle {number} of {_called(path.run)} by {1e3 * far:.4f} mm ({now})"))
+    if not named:
+        return None
+    return Notice(
+        "wild-cycle",
+        f"Cycles lie apart from the others of their path as a whole: {_worst(named)}. The standard excludes no cycle, "
+        "and none was left out. Look at the record, and measure the cycle again if the instrument or its mount moved.",
     )
 
 

@@ -18,6 +18,7 @@ from tests.performance_plan import small_plan
 import truearm
 from truearm.errors import InputError
 from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
 from truearm.planning.iso9283.criteria import TEST_OF
 from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
 from truearm.results.iso9283_evaluation import Iso9283Evaluation
@@ -242,6 +243,46 @@ def test_a_wild_row_is_said_with_the_value_without_it(small: Arguments) -> None:
         r"0\.\d+ mm: RP is \d\.\d{4} mm, without it 0\.\d{4}; AP is \d\.\d{4} mm, without it \d\.\d{4}\. ",
         said.message,
     )
+
+
+def test_two_places_of_rest_are_said_with_the_rows_of_the_fewer(tmp_path: Path) -> None:
+    plan = small_plan(["AP"], cycles={"AP": 24})
+    (tmp_path / PLAN).write_text(plan_text(plan))
+    (tmp_path / ROBOT).write_text(robot_text(plan.robot))
+    truearm.iso9283_simulate("irb120", plan, seed=1, noise=1e-6, out=tmp_path / "read")
+    poses = tmp_path / "read" / "poses.csv"
+    header, *rows = [line.split(",") for line in poses.read_text().splitlines()]
+    cycle, pose, z = (header.index(name) for name in ("cycle", "pose", "z [mm]"))
+    lines = []
+    for line, row in enumerate(rows, 2):
+        if row[pose] == "P4" and int(row[cycle]) % 4 == 0:
+            row[z] = str(float(row[z]) + 0.3)
+            lines.append(str(line))
+    poses.write_text("\n".join(",".join(row) for row in (header, *rows)) + "\n")
+    tie = tmp_path / "read" / "alignment.yaml"
+    made = truearm.iso9283_evaluate(tmp_path / PLAN, poses=poses, alignment=tie)
+    (said,) = [notice for notice in made.warnings if notice.code in ("two-places", "wild-row")]
+    assert (said.code, said.level) == ("two-places", "warning")
+    assert "AP P4, 100 %, load 100 % (6 and 18 cycles, 0.3" in said.message
+    assert f"the 6 on lines {', '.join(lines)})" in said.message
+
+
+def test_orientations_that_are_degrees_off_are_said(small: Arguments) -> None:
+    given = {"poses": small["poses"], "noise_rot": 1e-5}
+    clean = truearm.iso9283_evaluate(small["plan"], **given, alignment=small["alignment"])
+    assert "orientation-far-off" not in {notice.code for notice in clean.warnings}
+    header, *rows = [line.split(",") for line in small["poses"].read_text().splitlines()]
+    place = header.index("qw")
+    q = np.array([row[place : place + 4] for row in rows], dtype=float)
+    turned = quaternion_from_rotation(rotation_from_quaternion(q) @ rotation_from_vector(np.array([0, 0, 0.1])))
+    lines = [",".join([*row[:place], *map(str, one)]) for row, one in zip(rows, turned, strict=True)]
+    small["poses"].write_text("\n".join([",".join(header), *lines]) + "\n")
+    off = truearm.iso9283_evaluate(small["plan"], **given, alignment=small["alignment"])
+    (said,) = [notice for notice in off.warnings if notice.code == "orientation-far-off"]
+    off_by = re.search(r"up to -?(\d\.\d+) deg \(AP c of P\d\)", said.message)
+    assert said.level == "warning"
+    assert off_by
+    assert float(off_by[1]) == pytest.approx(5.73, abs=0.5)
 
 
 def test_a_pose_without_a_row_is_said_and_stands_in_the_table(small: Arguments) -> None:

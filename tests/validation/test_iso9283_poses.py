@@ -319,6 +319,19 @@ def test_a_wild_push_is_named_and_no_other() -> None:
     assert evaluate_pushes(task, shuffled, TIE, TRACKER)[0] == evaluate_pushes(task, noisy, TIE, TRACKER)[0]
 
 
+def test_drift_from_a_first_group_at_its_command_is_within_its_interval() -> None:
+    rng = np.random.default_rng(5)
+    drift = 1e-4 * (1 - np.exp(-np.linspace(0, 3, 9)))
+    task = plan(PlannedTest("dAP", ("P1",), 10))
+    held = []
+    for _ in range(20):
+        points = POINTS[0] + np.repeat(drift, 10)[:, None] * [1, 0, 0] + 1e-5 * rng.standard_normal((90, 3))
+        value = found(evaluate(task, rows("dAP", ["P1"] * 90, [*range(1, 11)] * 9, points), TIE, TRACKER).values, "dAP")
+        assert value.interval is not None
+        held.append(value.interval[0] < drift[-1] < value.interval[1])
+    assert np.mean(held) >= 0.95
+
+
 def test_a_tip_that_moves_against_the_force_is_refused() -> None:
     task, read = plan(PlannedTest("compliance", ("P1",), 3)), pushes()
     swapped = {"+x": "-x", "-x": "+x"}

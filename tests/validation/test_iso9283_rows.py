@@ -204,6 +204,7 @@ def test_two_places_of_rest_are_told_and_their_rows_are_not_wild() -> None:
     (places,) = made.two_places
     assert (places.of.pose, places.rows, made.wild) == ("P2", (7, 23), ())
     assert places.apart == pytest.approx(15 * SCATTER, rel=0.1)
+    assert places.lines == tuple(sorted(read.line[rows].tolist()))
 
 
 def test_rows_of_several_groups_that_are_off_alike_are_a_second_place() -> None:
@@ -213,6 +214,7 @@ def test_rows_of_several_groups_that_are_off_alike_are_a_second_place() -> None:
     made = unusual(plan, moved(read, rows, [0, 40 * SCATTER, 0]))
     assert (len(made.two_places), made.wild) == (1, ())
     assert made.two_places[0].rows == (3, 21)
+    assert made.two_places[0].lines == tuple(read.line[rows].tolist())
 
 
 def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> AttainedPoses:
@@ -234,7 +236,10 @@ def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> Att
         (lambda r: changed(r, "velocity", 3, 0.01), "line 5, column velocity: 1 row of the test AP"),
         (lambda r: changed(r, "velocity", 3, 0.995), "99.5 %"),
         (lambda r: changed(r, "load", 3, 0.5), "line 5, column load: 1 row of the test AP"),
-        (lambda r: changed(r, "robot", 3, "irb12O"), "line 2, column robot: rows have no robot in the test AP: 299"),
+        (
+            lambda r: changed(r, "robot", 3, "irb12O"),
+            "line 5, column robot: the robot is named in some rows of the test AP and in others not",
+        ),
     ],
 )
 def test_rows_under_conditions_that_were_not_planned_are_refused(
@@ -255,10 +260,22 @@ def test_rounded_velocities_are_those_of_the_plan() -> None:
 
 def test_a_robot_with_a_few_rows_alone_is_refused() -> None:
     plan, read = campaign(1, ("E",))
-    with pytest.raises(InputError, match="a robot has few rows in the test E: 1, where r1 has 30"):
+    with pytest.raises(InputError, match="the robot r11 has few rows in the test E: 1, where r1 has 30"):
         found(plan, changed(read, "robot", 0, "r11"))
     kept = np.setdiff1d(np.arange(len(read.cycle)), rows_of(read, robot="r0")[20:])
     assert found(plan, in_order(read, kept)).missing == ("E: P5 of r0",)
+
+
+def test_a_row_that_was_copied_is_refused() -> None:
+    plan, read = campaign(1, ("AP",))
+    read = dataclasses.replace(read, time=np.arange(len(read.cycle), dtype=float))
+    one, other = (int(rows_of(read, pose="P2", velocity=1.0, cycle=cycle)[0]) for cycle in (4, 5))
+    copied = changed(
+        moved(read, np.array([other]), read.position[one] - read.position[other]), "time", other, read.time[one]
+    )
+    copied.position[other] = copied.position[one]
+    with pytest.raises(InputError, match=f"lines {one + 2} and {other + 2}: 1 row with the time and the place"):
+        found(plan, copied)
 
 
 def test_two_poses_that_were_swapped_are_refused() -> None:

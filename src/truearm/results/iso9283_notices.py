@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from truearm.notices import Notice
@@ -18,6 +19,8 @@ _TOLD: Final = 3
 _TOLD_PLACES: Final = 8
 #: So many values are told with and without a row.
 _VALUES: Final = 2
+#: Mean orientations further off than this are told [rad].
+_FAR_TURNED: Final = math.radians(2.0)
 
 
 def row_notices(found: Evaluation) -> tuple[Notice, ...]:
@@ -25,7 +28,7 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
     notices = []
     wild, places = found.unusual.wild, found.unusual.two_places
     if wild:
-        told = " ".join(_wild_words(row) for row in wild[:_TOLD])
+        told = " ".join(_wild_words(row, "it" if len(wild) == 1 else "them") for row in wild[:_TOLD])
         if len(wild) > _TOLD:
             told += f" So do {counted(len(wild) - _TOLD, 'other row')}, on line "
             told += f"{', '.join(str(int(row.of.line[0])) for row in wild[_TOLD:])}."
@@ -55,6 +58,17 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
                 "may not hold. Look for play, or for something that changed during the test.",
             )
         )
+    turned = [v for v in found.values if v.id == "AP" and v.quantity == "angle" and abs(v.value) > _FAR_TURNED]
+    if turned:
+        worst = max(turned, key=lambda value: abs(value.value))
+        notices.append(
+            Notice(
+                "orientation-far-off",
+                f"Orientations are off by up to {number_words(worst)} deg (AP {worst.component} of {worst.where}). "
+                "Robots are seldom off by a degree: check that they are those of the plan's tip, and the rotation of "
+                "the alignment.",
+            )
+        )
     if found.missing:
         told = "; ".join(found.missing[:_TOLD_PLACES])
         more = f"; and {len(found.missing) - _TOLD_PLACES} more" if len(found.missing) > _TOLD_PLACES else ""
@@ -68,10 +82,10 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
     return tuple(notices)
 
 
-def _wild_words(row: WildRow) -> str:
+def _wild_words(row: WildRow, without: str) -> str:
     away, scatter = (_size(number, row.kind) for number in (row.away, row.scatter))
     what = "The orientation of cycle" if row.kind == "orientation" else "Cycle"
-    changes = "; ".join(_change_words(*pair) for pair in row.changes[:_VALUES])
+    changes = "; ".join(_change_words(*pair, without) for pair in row.changes[:_VALUES])
     return (
         f"{what} {int(row.of.cycle[0])} of {_under_words(row.of)}, on line {int(row.of.line[0])} lies {away} from the "
         f"others, which scatter by {scatter}{': ' if changes else ''}{changes}."
@@ -87,15 +101,19 @@ def _push_words(one: WildPush) -> str:
     )
 
 
-def _change_words(value: Value, without: Value) -> str:
+def _change_words(value: Value, other: Value, without: str) -> str:
     part = "" if value.component == "position" else f" {value.component}"
-    left = number_words(without) if without.status != "not-measured" else "nothing"
-    return f"{value.id}{part} is {number_words(value)} {UNITS[value.quantity][0]}, without it {left}"
+    left = number_words(other) if other.status != "not-measured" else "nothing"
+    return f"{value.id}{part} is {number_words(value)} {UNITS[value.quantity][0]}, without {without} {left}"
 
 
 def _places_words(one: TwoPlaces) -> str:
     what = "orientations, " * (one.kind == "orientation")
-    return f"{_under_words(one.of)} ({what}{one.rows[0]} and {one.rows[1]} cycles, {_size(one.apart, one.kind)} apart)"
+    lines = ", ".join(map(str, one.lines[:_TOLD_PLACES])) + ", .." * (len(one.lines) > _TOLD_PLACES)
+    return (
+        f"{_under_words(one.of)} ({what}{one.rows[0]} and {one.rows[1]} cycles, {_size(one.apart, one.kind)} apart; "
+        f"the {one.rows[0]} on lines {lines})"
+    )
 
 
 def _under_words(one: Cycles) -> str:

@@ -95,6 +95,8 @@ def drift_values(
             value, interval = _largest_change(course_of, scatter)
             tied = _changes_by_tie(groups, one.command, alignment) if id == "dAP" else None
             left = unknown
+            if id == "dAP" and interval is not None:
+                interval = interval[0], interval[1] + _raised(groups[0])
             if tied is not None:
                 left = math.hypot(unknown, float(np.std(tied)))
                 interval = None if interval is None else _widened(interval, value, tied)
@@ -128,6 +130,13 @@ def _course(one: Cycles, groups: list[Cycles]) -> DriftCourse:
 
 
 _Scatter = tuple[Array, Array] | None
+
+
+def _raised(first: Cycles) -> float:
+    """Return by how much scatter alone raises the AP of the first group [m], so that changes from it are too small."""
+    accuracy = float(np.linalg.norm(first.barycentre - first.command))
+    scatter = float(first.points.var(axis=0, ddof=1).sum()) / len(first)
+    return accuracy - math.sqrt(max(accuracy**2 - scatter, 0.0))
 
 
 def _largest_change(course: Array, scatter: _Scatter) -> tuple[float, Interval | None]:

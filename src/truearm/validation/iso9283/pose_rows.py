@@ -116,12 +116,14 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
     InputError
         For a test, a pose, an approach, a velocity or a load that the plan does not have, a robot without a name where
         robots are compared, a robot that has a few rows alone, poses outside the cube or at another pose of the plan
-        than they are called, orientations that no robot attains, and a cycle that appears twice.
+        than they are called, a row that is another one's copy, orientations that no robot attains, and a cycle that
+        appears twice.
     """
     _check_names(plan, readings)
     position = alignment.in_base(readings.position)
     _check_cube(plan, readings, position)
     _check_nearest(plan, readings, position)
+    _check_copies(readings)
     rotation = None if readings.rotation is None else alignment.turned_to_base(readings.rotation)
     if rotation is not None:
         commanded = np.array([plan.poses[name].rotation for name in readings.pose.names])[readings.pose.code]
@@ -185,8 +187,8 @@ def _planned_conditions(plan: PerformancePlan, readings: AttainedPoses) -> Array
             if len(other):
                 row = int(rows[other[0]])
                 raise InputError(
-                    f"{len(other)} row{'s' * (len(other) != 1)} of the test {planned.id} at a {name} that it does not "
-                    "have in the plan",
+                    f"{len(other)} row{'s' * (len(other) != 1)} of the test {planned.id} at a {name} that is not "
+                    "planned for it",
                     where=f"{readings.source}, line {int(readings.line[row])}, column {name}",
                     came=f"{100.0 * read[row]:g} %",
                     allowed=", ".join(f"{100.0 * share:g} %" for share in known),
@@ -251,22 +253,25 @@ def _check_names(plan: PerformancePlan, readings: AttainedPoses) -> None:
 
 
 def _check_robots(readings: AttainedPoses, test: str, rows: NDArray[np.bool_]) -> None:
-    """Refuse a robot that has a few rows of a test alone: its name is probably another's, mistyped."""
+    """Refuse a robot that has a few rows of a test alone, its name probably mistyped, and names in some rows alone."""
     counted = {name: int((rows & readings.robot.are(name)).sum()) for name in readings.robot.names}
     counts = {name: count for name, count in counted.items() if count}
     if len(counts) == 1:
         return
-    most = max((name for name in counts if name), key=lambda name: counts[name])
-    for name, count in counts.items():
-        if name != most and (not name or count < _FEW_ROWS * counts[most]):
-            raise InputError(
-                f"{'a robot has few rows' if name else 'rows have no robot'} in the test {test}: {count}, where {most} "
-                f"has {counts[most]}",
-                where=f"{readings.source}, line {_first(readings, rows & readings.robot.are(name))}, column robot",
-                came=name or None,
-                allowed=", ".join(other for other in counts if other not in (name, "")),
-                cure="Correct the name; or remove its rows, or measure it too.",
-            )
+    fewest, most = (chosen(counts, key=lambda name: counts[name]) for chosen in (min, max))
+    if "" not in counts and counts[fewest] >= _FEW_ROWS * counts[most]:
+        return
+    if "" in counts:
+        what = f"the robot is named in some rows of the test {test} and in others not"
+    else:
+        what = f"the robot {fewest} has few rows in the test {test}: {counts[fewest]}, where {most} has {counts[most]}"
+    raise InputError(
+        what,
+        where=f"{readings.source}, line {_first(readings, rows & readings.robot.are(fewest))}, column robot",
+        came=fewest or None,
+        allowed=", ".join(name or "no name" for name in counts if name != fewest),
+        cure="Correct the name; or remove its rows, or measure it too.",
+    )
 
 
 def _first(readings: AttainedPoses, rows: NDArray[np.bool_]) -> int:
@@ -341,4 +346,22 @@ def _check_nearest(plan: PerformancePlan, readings: AttainedPoses, position: Arr
             where=f"{readings.source}, line {int(readings.line[row])}, column pose",
             came=f"{_name(readings.pose, row)} is {1e3 * own[row]:.4g} mm off, {there} {1e3 * apart[row].min():.4g} mm",
             cure="Correct the name, take the plan that was measured, or remove the cycle.",
+        )
+
+
+def _check_copies(readings: AttainedPoses) -> None:
+    """Refuse rows of one time and one place: a reading that was copied."""
+    if not np.isfinite(readings.time).all() or 2 * len(np.unique(readings.time)) < len(readings.time):
+        return
+    read = np.column_stack([readings.time, readings.position])
+    _, first, which = np.unique(read, axis=0, return_index=True, return_inverse=True)
+    copies = np.flatnonzero(first[which.reshape(-1)] != np.arange(len(read)))
+    if len(copies):
+        row = int(copies[0])
+        other = int(first[which.reshape(-1)[row]])
+        raise InputError(
+            f"{len(copies)} row{'s' * (len(copies) != 1)} with the time and the place of another one",
+            where=f"{readings.source}, lines {int(readings.line[other])} and {int(readings.line[row])}",
+            came=f"{readings.time[row]:g} s",
+            cure="Remove the copy, or write what was read in its cycle.",
         )

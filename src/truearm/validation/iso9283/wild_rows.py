@@ -89,12 +89,15 @@ class TwoPlaces:
         The distance of the two places [m or rad].
     rows
         How many are in either, the fewer first.
+    lines
+        Of the fewer, in the file.
     """
 
     of: Cycles
     kind: Kind
     apart: float
     rows: tuple[int, int]
+    lines: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +148,7 @@ class _Rows:
         self.kind: Kind = kind
         numbers = [one.points if kind == "position" or one.angles is None else one.angles for one in groups]
         self.numbers = np.concatenate(numbers)
+        self.line = np.concatenate([one.line for one in groups])
         self.counts = np.array([len(one) for one in groups])
         self.begin = np.cumsum(self.counts) - self.counts
         self.group = np.repeat(np.arange(len(groups)), self.counts)
@@ -160,7 +164,9 @@ class _Rows:
             if n >= _LEAST_CYCLES:
                 split = _split(self.numbers[begin : begin + n], self.floor)
                 if split is not None:
-                    found[number] = TwoPlaces(group, self.kind, *split)
+                    apart, fewer = split
+                    lines = tuple(sorted(group.line[fewer].tolist()))
+                    found[number] = TwoPlaces(group, self.kind, apart, (len(fewer), n - len(fewer)), lines)
         return found
 
     def wild(self, places: dict[int, TwoPlaces]) -> tuple[list[WildRow], list[TwoPlaces]]:
@@ -174,11 +180,12 @@ class _Rows:
         for row in rows:
             group = self.groups[self.group[row]]
             key = keys[self.group[row]]
-            same = offset[[keys[number] == key for number in self.group]]
-            near = int((np.linalg.norm(same - offset[row], axis=1) < _ALIKE * np.linalg.norm(offset[row])).sum())
-            if near >= _ALIKE_ROWS:
-                apart = float(np.linalg.norm(offset[row]))
-                alike.setdefault(key, TwoPlaces(group, self.kind, apart, (near, len(same) - near)))
+            same = np.flatnonzero([keys[number] == key for number in self.group])
+            apart = float(np.linalg.norm(offset[row]))
+            near = same[np.linalg.norm(offset[same] - offset[row], axis=1) < _ALIKE * apart]
+            if len(near) >= _ALIKE_ROWS:
+                lines = tuple(sorted(int(self.line[other]) for other in near))
+                alike.setdefault(key, TwoPlaces(group, self.kind, apart, (len(near), len(same) - len(near)), lines))
                 continue
             away = float(np.linalg.norm(self.numbers[row] - means[self.group[row]]))
             others = self.numbers[(self.group == self.group[row]) & ~chosen]
@@ -262,15 +269,16 @@ def _gaussian_deviation(freedom: Array) -> Array:
     return np.asarray(stdtrit(each, 1.0 - _RARE) / ndtri(1.0 - _RARE))[which]
 
 
-def _split(points: Array, floor: float) -> tuple[float, tuple[int, int]] | None:
-    """Return the distance of two places and how many points are in each; None if one place explains the points.
+def _split(points: Array, floor: float) -> tuple[float, NDArray[np.intp]] | None:
+    """Return the distance of two places and the points in that of the fewer; None if one place explains the points.
 
     Along the first principal axis the points are parted where the two parts are furthest apart in terms of the
     scatter within them (Ashman, Bird and Zepf 1994 call that distance D).
     """
     about = points - points.mean(axis=0)
     axis = np.linalg.svd(about, full_matrices=False)[2][0]
-    along = np.sort(about @ axis)
+    order = np.argsort(about @ axis, kind="stable")
+    along = (about @ axis)[order]
     n = len(along)
     k = np.arange(_ALIKE_ROWS, n - _ALIKE_ROWS + 1)
     sums, squares = np.cumsum(along), np.cumsum(along**2)
@@ -280,5 +288,5 @@ def _split(points: Array, floor: float) -> tuple[float, tuple[int, int]] | None:
     best = int(far.argmax())
     if not far[best] > _APART:
         return None
-    fewer = int(min(k[best], n - k[best]))
-    return float(high[best] - low[best]), (fewer, n - fewer)
+    below, above = order[: k[best]], order[k[best] :]
+    return float(high[best] - low[best]), below if len(below) <= len(above) else above

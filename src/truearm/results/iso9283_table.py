@@ -152,6 +152,16 @@ def conditions_words(value: Value) -> str:
     return ", ".join([*parts, under.robot] if under.robot else parts)
 
 
+def conditions_summary(under: Conditions) -> dict[str, float | str]:
+    """Return conditions as JSON holds them."""
+    found: dict[str, float | str] = {}
+    if under.velocity is not None:
+        found["velocity_percent"] = round(100.0 * under.velocity, 6)
+    if under.load is not None:
+        found["load_percent"] = round(100.0 * under.load, 6)
+    return {**found, "robot": under.robot} if under.robot else found
+
+
 def test_name(value: Value) -> str:
     """Return the name of the test that a value belongs to."""
     return TESTS[TEST_OF[value.id]].name

@@ -304,7 +304,7 @@ def _refused(
     cure: str | None = None,
 ) -> InputError:
     known = tuple(known)
-    near = nearest_names(came, known, 1)
+    near = nearest_names(came, known, 1, 0.6)
     return InputError(
         what,
         where=f"{readings.source}, line {_first(readings, rows)}, column {column}",

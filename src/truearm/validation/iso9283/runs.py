@@ -116,7 +116,7 @@ def parts_of(samples: Samples, test: str, known: tuple[str, ...]) -> Iterator[Pa
     for _, part in sorted(zip((int(part[0]) for part in parts), parts, strict=True), key=lambda both: both[0]):
         place = samples.place.names[int(samples.place.code[part[0]])]
         if place not in known:
-            near = nearest_names(place, known, 1)
+            near = nearest_names(place, known, 1, 0.6)
             raise InputError(
                 f"the plan has no such place for {test}",
                 where=f"{samples.source}, line {samples.line[part[0]]}",

@@ -101,7 +101,7 @@ def test_every_criterion_has_a_value_and_the_files_hold_it(found: Iso9283Evaluat
     held = json.loads((folder / "iso9283.json").read_text())
     assert held == json.loads(json.dumps(found.summary()))
     keys = {"id", "component", "where", "value", "unit", "interval_95", "cycles", "conditions", "status"}
-    assert all(keys <= {*entry} <= keys | {"range"} for entry in held["criteria"])
+    assert all(keys <= {*entry} <= keys | {"range", "bandwidth_hz"} for entry in held["criteria"])
     assert held["alignment"]["kind"] == "base-features"
 
 

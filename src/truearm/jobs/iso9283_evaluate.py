@@ -30,6 +30,7 @@ from truearm.shown import listed
 from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
+from truearm.validation.iso9283.said_of_streams import said_of_streams
 from truearm.validation.iso9283.values import Component, Instrument
 
 
@@ -166,7 +167,7 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
                 "They say more about the measurement than about the robot.",
             )
         )
-    return tuple(notices)
+    return (*notices, *said_of_streams(found))
 
 
 def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:

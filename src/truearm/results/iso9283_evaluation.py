@@ -180,4 +180,5 @@ def value_summary(value: Value) -> dict[str, Any]:
         "conditions": conditions_summary(value.conditions),
         "status": value.status,
         **({} if least is None else {"range": [least, largest]}),
+        **({} if value.bandwidth is None else {"bandwidth_hz": value.bandwidth}),
     }

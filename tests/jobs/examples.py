@@ -416,8 +416,8 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "target": None,
         "load": 2.0,
         "velocity": 0.5,
-        "velocities": (0.5,),
-        "loads": (1.0,),
+        "velocities": (50.0,),
+        "loads": (100.0,),
         "out": folder / "performance-plan",
     },
     "iso9283_simulate": lambda _: {

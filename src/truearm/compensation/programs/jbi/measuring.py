@@ -1,9 +1,9 @@
 """Yaskawa jobs with stops, waits and circles.
 
-Source: Yaskawa, INFORM language manuals of the controllers DX100, DX200 and FS100: MOVJ, MOVL, MOVC, TIMER, WAIT, PAUSE,
-and the tags VJ, V and PL. The first MOVC of a row is reached on a line: it stands where the arc begins. Between two arcs
-a MOVL stands at the point where they meet, as the operator's manuals are remembered to ask for; the tag FPT in its place
-is known to newer controllers alone. Tool and load are in the tool files of the controller, not in jobs.
+Source: Yaskawa, INFORM language manuals of the controllers DX100, DX200 and FS100: MOVJ, MOVL, MOVC, TIMER, WAIT,
+PAUSE, and the tags VJ, V and PL. The first MOVC of a row is reached on a line: it stands where the arc begins. Between
+two arcs a MOVL stands at the point where they meet, as the operator's manuals are remembered to ask for; the tag FPT in
+its place is known to newer controllers alone. Tool and load are in the tool files of the controller, not in jobs.
 """
 
 from __future__ import annotations

@@ -73,6 +73,14 @@ class Plan(Record):
         return (*self._there, *self._everywhere)
 
     @property
+    def driving(self) -> tuple[str, ...]:
+        """How the configurations are driven, in words; nothing where no way was checked."""
+        if self.tour is None:
+            return ()
+        words = tuple(tour_words(self.tour, self.made.robot, self.joints_are))
+        return (*words, "The fixtures of the device are not kept clear of.") if self.made.fixtures else words
+
+    @property
     def _there(self) -> tuple[str, ...]:
         """How accurate the robot will be where it shall be, in words."""
         from truearm.reporting.numbers import significant
@@ -169,11 +177,7 @@ class Plan(Record):
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
-        if self.tour is not None:
-            text += tour_words(self.tour, made.robot, self.joints_are)
-            if made.fixtures:
-                text.append("The fixtures of the device are not kept clear of.")
-        return [*text, *self.answer, *joints_lines(self.joints_are)]
+        return [*text, *self.driving, *self.answer, *joints_lines(self.joints_are)]
 
     def save(self, file: str | Path) -> tuple[Path, ...]:
         """Write the plan as CSV, a page with the same name that ends in ``.html``, and the ways if they were checked.

@@ -63,6 +63,8 @@ def sampled_room(robot: Robot, q: np.ndarray, cell: Cell, points: int = _POINTS)
     return room
 
 
-def _points(link: tuple, first: float, last: float, count: int) -> np.ndarray:
+def _points(
+    link: tuple[np.ndarray, np.ndarray, float, float, float], first: float, last: float, count: int
+) -> np.ndarray:
     share = np.linspace(first, last, count)[None, :, None]
-    return link[0][:, None] + share * (link[1] - link[0])[:, None]
+    return np.asarray(link[0][:, None] + share * (link[1] - link[0])[:, None])

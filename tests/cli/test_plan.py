@@ -118,3 +118,42 @@ def test_inputs_are_not_overwritten(truearm: Truearm, small: Path, tmp_path: Pat
     run = truearm("plan", "irb120", "--poses", 12, "--out", tmp_path / "plan.html")
     assert run.code == 2
     assert "the plan is a CSV file" in run.err
+
+
+def test_floor_room_and_home_of_the_command_line(truearm: Truearm, tmp_path: Path) -> None:
+    out = tmp_path / "plan.csv"
+    words = ("plan", "irb120", "--poses", 8, "--candidates", 40, "--out", out)
+    run = truearm(*words, "--floor", -300, "--clearance", 30, "--home", "0,-20,20,0,30,0", "--json")
+    assert run.code == 0
+    ways = json.loads(run.out)["ways"]
+    assert ways["home"] == pytest.approx([0, -20, 20, 0, 30, 0])
+    assert (ways["floor_mm"], ways["clearance_mm"]) == pytest.approx((-300, 30))
+    assert ways["room_mm"] >= 30
+    rows = rows_of(tmp_path / "plan-ways.csv")
+    assert len(rows) == ways["moves"] + 1
+    assert "back in" in (tmp_path / "plan.html").read_text()
+    run = truearm(*words, "--no-floor")
+    assert run.code == 0
+    assert "mm or more from its own links and boxes." in run.out
+    assert f"Written: {out}, {out.with_suffix('.html')}, {tmp_path / 'plan-ways.csv'}" in run.out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--floor", "100"), "--floor: the floor is above the base of the robot; got '100 mm'"),
+        (("--floor", "-100", "--no-floor"), "--floor, --no-floor: a floor is given and denied"),
+        (("--clearance", "-5"), "--clearance"),
+        (("--home", "0,0,0"), "--home: there are not as many numbers as joints"),
+        (("--home", "0,100,0,0,0,0"), "--home: the safe configuration is not clear"),
+        (("--home", "0,0,0,0,0,300"), "--home: joint 6 of the safe configuration is not where the plan keeps it"),
+        (("--device", "inclinometers", "--floor", "-5"), "--floor: this says nothing for inclinometers"),
+    ],
+)
+def test_what_cannot_be_driven_is_refused(
+    truearm: Truearm, tmp_path: Path, words: tuple[str, ...], message: str
+) -> None:
+    run = truearm("plan", "irb120", "--poses", 8, "--candidates", 40, "--out", tmp_path / "plan.csv", *words)
+    assert run.code == 2
+    assert message in run.err
+    assert not list(tmp_path.iterdir())

@@ -140,10 +140,10 @@ def test_a_robot_that_hangs_has_no_floor() -> None:
 
 
 def test_a_safe_configuration_that_is_given_is_driven_from() -> None:
-    home = np.deg2rad([10.0, -20, 10, 0, 30, 0])
+    home = np.deg2rad([10.0, -20, 10, 0, 30, 0]).tolist()
     planned = truearm.plan("irb120", poses=12, candidates=60, home=home)
     assert planned.tour is not None
-    assert np.array_equal(planned.tour.home, home)
+    assert planned.tour.home.tolist() == home
     assert any(line.startswith("Driven from home (10, -20, 10, 0, 30, 0) and back in ") for line in planned.lines())
     assert planned.summary()["ways"]["home"] == pytest.approx([10, -20, 10, 0, 30, 0])
 
@@ -171,7 +171,7 @@ def test_configurations_without_a_way_are_left_out_and_counted() -> None:
         }
     )
     _, data = campaign("irb120", 200, 0.05e-3, 1)
-    home = np.deg2rad([90.0, 60, -30, 0, 0, 0])
+    home = np.deg2rad([90.0, 60, -30, 0, 0, 0]).tolist()
     plan = partial(truearm.plan, "irb120", poses=4, candidates_from=data, floor=-1.0)
     planned = plan(constraints=rules, home=home, clearance=0.02)
     assert planned.made.rejected["ways"] > 0

@@ -136,7 +136,7 @@ def test_joints_stay_on_their_principal_turn(limits: tuple[float, float], window
 
 def test_joints_on_another_turn_are_brought_back() -> None:
     robot = load_robot("irb120")
-    q = np.deg2rad([[10.0, 20, 30, 40, 50, 350], [10, 20, 30, 40, 50, -170]])
+    q = np.deg2rad([[10.0, 20, 30, 40, 50, 350], [10.0, 20, 30, 40, 50, -170]])
     assert np.rad2deg(on_principal_turn(robot, q)[:, 5]) == pytest.approx([-10.0, -170.0])
     assert np.array_equal(on_principal_turn(robot, q)[:, :5], q[:, :5])
 
@@ -187,7 +187,7 @@ def test_a_way_goes_around_a_wall() -> None:
     robot = arm()
     wall = KeepOut("wall", np.array([0.2, -0.02, 0.0]), np.array([2.0, 0.02, 0.6]))
     find = finder(robot, Cell(boxes=(wall,)))
-    q = np.deg2rad([[60.0, 20, 20, 0, 0, 0], [-60, 20, 20, 0, 0, 0]])
+    q = np.deg2rad([[60.0, 20, 20, 0, 0, 0], [-60.0, 20, 20, 0, 0, 0]])
     assert not find.check.ways(q[:1], q[1:]).clear[0]
     tour = tour_of(find, q, ["left", "right"])
     kinds = [stop.kind for stop in tour.stops]
@@ -233,7 +233,7 @@ def test_a_pair_without_a_way_is_named() -> None:
         for name, first, last in (("front", 0.1, np.inf), ("rear", -np.inf, -0.1))
     )
     check = CollisionCheck(robot, Cell(boxes=walls))
-    left, right = np.deg2rad([[90.0, 60, -30, 0, 0, 0], [-90, 60, -30, 0, 0, 0]])
+    left, right = np.deg2rad([[90.0, 60, -30, 0, 0, 0], [-90.0, 60, -30, 0, 0, 0]])
     find = WayFinder(check, left, low, high)
     with pytest.raises(InputError, match=r"no way was found on which .*the box '(front|rear)'") as no:
         tour_of(find, right[None], ["other side"])

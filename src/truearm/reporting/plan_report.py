@@ -33,7 +33,7 @@ def plan_html(planned: Plan) -> str:
         plan=plan,
         chosen_by=planned.chosen_by,
         command=planned.command,
-        words=planned.answer,
+        words=(*planned.answer, *planned.driving),
         indices=[(name, _INDEX_WORDS[name], f"{value:.4g}") for name, value in plan.indices.items()],
     )
 

@@ -77,6 +77,14 @@ class Plan(Record):
         return (*self._there, *self._everywhere)
 
     @property
+    def driving(self) -> tuple[str, ...]:
+        """How the configurations are driven, in words; nothing where no way was checked."""
+        if self.tour is None:
+            return ()
+        words = tuple(tour_words(self.tour, self.made.robot, self.joints_are))
+        return (*words, "The fixtures of the device are not kept clear of.") if self.made.fixtures else words
+
+    @property
     def _there(self) -> tuple[str, ...]:
         """How accurate the robot will be where it shall be, in words."""
         from truearm.reporting.numbers import significant
@@ -174,12 +182,8 @@ class Plan(Record):
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
-        if self.tour is not None:
-            text += tour_words(self.tour, made.robot, self.joints_are)
-            if made.fixtures:
-                text.append("The fixtures of the device are not kept clear of.")
         driven = [] if self.program is None else self.program.lines()
-        return [*text, *self.answer, *joints_lines(self.joints_are), *driven]
+        return [*text, *self.driving, *self.answer, *joints_lines(self.joints_are), *driven]
 
     def contents(self) -> dict[str, str]:
         """Return the texts of all files of a plan with a program, by their names."""

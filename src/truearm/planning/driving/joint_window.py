@@ -33,12 +33,13 @@ def joint_window(
         if low[k] > high[k]:
             assert constraints is not None
             unit, size = ("deg", math.degrees(1.0)) if joint.kind == "revolute" else ("mm", 1e3)
+            given = constraints.limits[k + 1]
             as_given = constraints.units.angle if joint.kind == "revolute" else constraints.units.length
             raise InputError(
                 f"the limits of joint {k + 1} leave nothing of what the robot has",
                 parameter="constraints",
                 where=f"{where}, limits",
-                came="{:g} to {:g} {}".format(*constraints.limits[k + 1], as_given),
+                came=f"{given[0]:g} to {given[1]:g} {as_given}",
                 allowed=f"within {size * lowest:.6g} to {size * highest:.6g} {unit}",
                 cure="Check the number of the joint, and the sign and the unit of its limits.",
             )

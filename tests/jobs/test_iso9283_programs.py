@@ -126,3 +126,14 @@ def test_a_folder_takes_other_tests_and_all_of_them_again(cube: Path, tmp_path: 
     (tmp_path / "programs" / "AD_10.src").write_text("of somebody else")
     with pytest.raises(InputError, match="was not written here by truearm, and is not overwritten"):
         planned(cube, program="krl", criteria=["ad"], out=tmp_path)
+
+
+def test_ways_that_come_near_the_floor_are_told(cube: Path, tmp_path: Path) -> None:
+    low = tmp_path / "low.yaml"
+    low.write_text(CUBE.replace("0, 350]", "0, 150]"))
+    given: dict[str, Any] = {"criteria": ["ap", "av"], "program": "rapid", "tip": (0.0, 0.0, 0.05)}
+    assert not [one for one in planned(cube, **given).warnings if one.code == "ways-near"]
+    (told,) = [one for one in planned(low, **given).warnings if one.code == "ways-near"]
+    assert told.level == "warning"
+    assert "ways the arm comes within 50 mm of the floor or of itself, nearest on A" in told.message
+    assert "near the floor, " in told.message

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from truearm.compensation.iso9283.programs import measuring_programs
 from truearm.compensation.iso9283.slow_run import SLOW_RUN, check_slow_run, slow_run_text
 from truearm.compensation.path_program import BY_NAME
@@ -14,8 +16,12 @@ from truearm.compensation.programs.motion_program import MotionProgram
 from truearm.compensation.programs.program import Language
 from truearm.errors import InputError, refusals_of
 from truearm.files import exists, read_bytes
+from truearm.jobs.driving import cell_argument
 from truearm.manifest import hash_of, sets_in
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.iso9283.plan_file import plan_text
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_plan import WrittenPrograms
@@ -65,6 +71,7 @@ def written_programs(
                 "note",
             )
         )
+    warnings += _near(plan.robot, found.ways)
     count = len(found.slow) + (0 if slow_run is None else len(found.faster))
     return WrittenPrograms(language.name, {**slow, **faster}, record, count, found.share)
 
@@ -72,6 +79,27 @@ def written_programs(
 def _texts(programs: Sequence[MotionProgram], language: Language) -> dict[str, str]:
     assert language.motion is not None
     return {f"{_FOLDER}/{name}": text for one in programs for name, text in language.motion(one).items()}
+
+
+def _near(robot: Robot, ways: Mapping[str, Array]) -> list[Notice]:
+    """Return what is to be said of ways on which the arm comes near the floor or itself."""
+    cell = cell_argument(robot, None, "")
+    check = CollisionCheck(robot, cell)
+    looked = {name: check.ways(joints[:-1], joints[1:]) for name, joints in ways.items() if len(joints) > 1}
+    near = {name: at for name, at in looked.items() if at.room.min() < cell.clearance}
+    if not near:
+        return []
+    worst = min(near, key=lambda name: float(near[name].room.min()))
+    at = int(np.argmin(near[worst].room))
+    room = max(float(near[worst].room[at]), 0.0)
+    return [
+        Notice(
+            "ways-near",
+            f"On {len(near)} of {len(looked)} ways the arm comes within {cell.clearance * 1e3:g} mm of the floor or of "
+            f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {room * 1e3:.0f} mm. Look at "
+            "these ways first, or plan again in a smaller cube or elsewhere.",
+        )
+    ]
 
 
 def refuse_losing_slow_run(folder: Path, slow_run: Path | None) -> None:

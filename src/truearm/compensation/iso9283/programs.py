@@ -5,7 +5,7 @@ A program begins and ends in P1, slowly. Before each measured pose the robot sto
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -54,11 +54,15 @@ class MeasuringPrograms:
         Those at the velocities of the plan.
     share
         Velocity of the first run, in that of the robot; that of single tests may be lower.
+    ways
+        Joint positions of the model on every way between stops, ``(n, joints)`` [rad or m], by its name: close to each
+        other where the tip is led, two where the joints move evenly.
     """
 
     slow: tuple[MotionProgram, ...]
     faster: tuple[MotionProgram, ...]
     share: float
+    ways: Mapping[str, Array]
 
 
 def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> MeasuringPrograms:
@@ -103,7 +107,7 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> Measur
         first += made.of(test, share)
         if test.id != "compliance":
             faster += [one for other in test.velocities if abs(other - share) > 1e-9 for one in made.of(test, other)]
-    return MeasuringPrograms(tuple(first), tuple(faster), slow)
+    return MeasuringPrograms(tuple(first), tuple(faster), slow, {**made.moves, **made.routes.driven})
 
 
 def _is_calibrated(robot: Robot) -> bool:
@@ -121,6 +125,7 @@ class _Programs:
         self.plan, self.dwell, self.mark, self.slow = plan, dwell, mark, slow
         self.routes = Routes(plan.robot, plan.target, self.pose("P1", "every program").joints)
         self.known: dict[tuple[str, str], Route] = {}
+        self.moves: dict[str, Array] = {}
         self.rule = branch_rule(plan.robot)
 
     def pose(self, name: str, test: str) -> PlannedPose:
@@ -196,6 +201,7 @@ class _Steps:
         self.targets: list[Array] = []
         self.steps: list[ProgramStep] = []
         self._numbers: dict[bytes, int] = {}
+        self._at: tuple[str, Array] | None = None
 
     def run(self) -> None:
         """Add all steps of the test, from P1 to P1."""
@@ -229,6 +235,10 @@ class _Steps:
     def _go(self, name: str, joints: Array, share: float) -> None:
         self.programs.routes.check(f"{self.test.id}, {name}", joints)
         plan = self.programs.plan
+        if self._at is not None:
+            left, start = self._at
+            self.programs.moves.setdefault(f"{self.test.id}, from {left} to {name}", np.array([start, joints]))
+        self._at = name, joints
         self.steps.append(JointMove(self._target(joints), share, share * plan.rated_velocity))
 
     def _stand(self) -> None:
@@ -245,7 +255,7 @@ class _Steps:
                 self._go(pose.name, pose.joints, self.share)
                 self._stand()
 
-    def _along(self, route: Route) -> None:
+    def _along(self, name: str, route: Route) -> None:
         before = self._target(route.start)
         for leg in route.legs:
             end, speed = self._target(leg.joints), max(self.speed * leg.pace, _SLOWEST)
@@ -254,6 +264,7 @@ class _Steps:
             else:
                 self.steps.append(CircleMove(before, self._target(leg.via), end, speed, route.zone))
             before = end
+        self._at = name, route.legs[-1].joints
 
     def _approaches(self) -> None:
         plan, routes = self.programs.plan, self.programs.routes
@@ -272,7 +283,7 @@ class _Steps:
                     self._cycle(cycle, f"{place} {approach}, ")
                     self._go(start.name, route.start, self.share)
                     self._stand()
-                    self._along(route)
+                    self._along(place, route)
                     self._stand()
 
     def _paths(self) -> None:
@@ -283,7 +294,7 @@ class _Steps:
                 self._cycle(cycle, f"{place}, ")
                 self._go(f"start of {place}", route.start, self.share)
                 self._stand()
-                self._along(route)
+                self._along(f"the end of {place}", route)
                 self._stand()
 
     def _pushes(self) -> None:

@@ -92,10 +92,16 @@ class Routes:
         Name of what goes along them; None for the flange.
     near
         Joint positions in whose posture they are followed, ``(joints,)``.
+
+    Attributes
+    ----------
+    driven
+        Joint positions on every way that was followed, close to each other, ``(n, joints)``, by the name of the way.
     """
 
     def __init__(self, robot: Robot, target: str | None, near: Array) -> None:
         self.robot, self.target, self._near = robot, target, near
+        self.driven: dict[str, Array] = {}
         rule = branch_rule(robot)
         self._rule = rule if rule is not None and ClosedForm(robot, target).known else None
 
@@ -196,4 +202,5 @@ class Routes:
                 where=names[int(far[0]) + 1],
                 cure="Plan again, in a smaller cube or elsewhere.",
             )
+        self.driven[names[0].partition(", move ")[0]] = joints
         return joints

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 from truearm.planning.driving.collisions import CollisionCheck
@@ -143,7 +142,7 @@ def touched(check: CollisionCheck, joints: Array) -> tuple[int, float, str] | No
     """
     starts, ends = (joints[:-1], joints[1:]) if len(joints) > 1 else (joints, joints)
     looked = check.ways(starts, ends)
-    failed: NDArray[np.intp] = np.flatnonzero(looked.room < check.cell.clearance)
+    failed = np.flatnonzero(looked.room < check.cell.clearance)
     if not len(failed):
         return None
     k = int(failed[0])

@@ -24,6 +24,7 @@ NO_URDF = {
 #: Arms whose makers' reach is of no axis and point, and how much further the flange comes from axis 1.
 NO_POINT = {
     "ur3": (500.0, "recommended working radius"),
+    "hc10": (1200.0, "to where axes R and B meet"),
 }
 #: Arms whose reach nobody publishes.
 NO_REACH = {"li3": "invented"}

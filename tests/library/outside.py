@@ -88,28 +88,27 @@ def _matrix(place: dict[str, list[float]]) -> Array:
 def largest_reach(robot: Robot) -> float:
     """Return how far from the line of its axis the point of a robot's reach comes within the limits [m].
 
-    The best of configurations drawn within the limits is moved joint by joint, in steps that are halved until they
-    are nothing.
+    The best of configurations drawn within the limits are moved along each joint and along directions drawn at random,
+    in steps that are halved where none leads further.
     """
-    assert robot.reach is not None
+    joints = robot.random_configurations(1000, np.random.default_rng(0))
+    best = np.argsort(-_distances(robot, joints))[:4]
+    return max(_climbed(robot, q) for q in joints[best])
+
+
+def _climbed(robot: Robot, q: Array) -> float:
     low, high = np.array([joint.range for joint in robot.joints]).T
-    rng = np.random.default_rng(0)
-    q = robot.random_configurations(1000, rng)
-    q = q[np.argsort(-_distances(robot, q))[:3]]
-    q = q.clip(low, high)
-    best, step = _distances(robot, q), np.radians(20.0)
+    rng = np.random.default_rng(1)
+    each = np.vstack([np.eye(len(low)), -np.eye(len(low))])
+    furthest, step = 0.0, np.radians(20.0)
     while step > 1e-3:
-        moved = False
-        for joint in range(len(robot.joints)):
-            for direction in (step, -step):
-                tried = q.copy()
-                tried[:, joint] = np.clip(tried[:, joint] + direction, low[joint], high[joint])
-                distances = _distances(robot, tried)
-                better = distances > best + 1e-12
-                q[better], best[better] = tried[better], distances[better]
-                moved |= bool(better.any())
-        step = step if moved else step / 2.0
-    return float(best.max())
+        tried = np.clip(q + step * np.vstack([each, rng.normal(size=(40, len(low)))]), low, high)
+        distances = _distances(robot, tried)
+        if distances.max() > furthest + 1e-6:
+            q, furthest = tried[distances.argmax()], float(distances.max())
+        else:
+            step /= 2.0
+    return furthest
 
 
 def _distances(robot: Robot, joints: Array) -> Array:

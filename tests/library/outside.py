@@ -33,16 +33,23 @@ FOLDER = Path(__file__).with_name("outside")
 
 @dataclass(frozen=True)
 class Outside:
-    """What a file says: joint positions of the model (n, joints) [rad], and poses (n, 4, 4) of its flange [m]."""
+    """What a file says: joint positions of the model (n, joints) [rad], and poses (n, 4, 4) of its flange [m].
+
+    `urdf_poses` are as the URDF has them, of its link `tip` in its link `base`.
+    """
 
     robot: str
     source: dict[str, str]
+    base: str
+    tip: str
+    signs: tuple[int, ...]
     limits: Array
     limits_differ: str
     reason: str
     differs: bool
     joints: Array
     poses: Array
+    urdf_poses: Array
 
 
 def known() -> list[str]:
@@ -66,12 +73,16 @@ def read(robot_id: str) -> Outside:
     return Outside(
         robot=content["robot"],
         source=content["source"],
+        base=content["base"],
+        tip=content["tip"],
+        signs=tuple(int(sign) for sign in signs),
         limits=np.radians(limits),
         limits_differ=content.get("limits_differ", ""),
         reason=content.get("reason", ""),
         differs=bool({"joints", "model_base", "model_flange"} & content.keys()),
         joints=np.radians(signs * (counted - zeros)),
         poses=np.linalg.inv(base) @ stored @ np.linalg.inv(flange),
+        urdf_poses=stored,
     )
 
 

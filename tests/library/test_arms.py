@@ -14,6 +14,7 @@ from tests.library import outside
 
 from truearm.errors import InputError
 from truearm.library import library, load_robot
+from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.formats.robot_file import (
     RobotFile,
     is_intact,
@@ -41,6 +42,10 @@ NO_POINT = {
     "ur5": "recommended, not the largest",
     "ur5e": "recommended, not the largest",
 }
+#: Arms whose URDF has another base or tool0 than the others of its package, which are the controller's.
+OTHER_FRAMES = {
+    "m20id_25": "its tool0 is half a turn about z from that of the package's other arms",
+}
 #: Arms without a maker's reach, and why.
 NO_REACH = {
     "katana450": "its flange is an attachment of the thesis",
@@ -48,6 +53,13 @@ NO_REACH = {
     "lrmate200ic": "no maker's figure at hand",
     "puma560": "no maker's figure at hand",
 }
+
+
+def has_controller_s_frames(robot_id: str) -> bool:
+    """Return whether base and tool0 of a URDF are the frames of a controller that the library knows."""
+    stored = outside.read(robot_id)
+    known = load_robot(robot_id).controller != AS_THE_MODEL
+    return known and (stored.base, stored.tip) == ("base", "tool0") and robot_id not in OTHER_FRAMES
 
 
 @pytest.mark.parametrize("robot_id", library())
@@ -125,6 +137,16 @@ def test_limits_are_those_of_the_urdf_or_their_difference_is_explained(robot_id:
     limits = np.array([joint.range for joint in robot.joints])
     same = np.abs(limits - stored.limits).max() <= math.radians(0.1)
     assert same == (not stored.limits_differ)
+
+
+@pytest.mark.parametrize("robot_id", [name for name in outside.known() if has_controller_s_frames(name)])
+def test_the_controller_s_frames_are_base_and_tool0_of_the_urdf(robot_id: str) -> None:
+    robot, stored = load_robot(robot_id), outside.read(robot_id)
+    its = robot.controller
+    assert (its.signs or (1,) * len(robot.joints)) == stored.signs
+    positions, rotations = robot.forward(stored.joints, frame="controller")
+    assert_allclose(positions, stored.urdf_poses[:, :3, 3], rtol=0, atol=1e-5)
+    assert_allclose(rotations, stored.urdf_poses[:, :3, :3], rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("robot_id", sorted({*library()} - {*NO_POINT} - {*NO_REACH}))

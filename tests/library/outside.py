@@ -69,7 +69,8 @@ def read(robot_id: str) -> Outside:
     assert set(signs.tolist()) <= {1.0, -1.0}
     limits = np.sort(signs[:, None] * (np.array(content["limits"], float) - zeros[:, None]), axis=1)
     base, flange = (_matrix(content.get(name, {})) for name in ("model_base", "model_flange"))
-    stored = np.array([_matrix({"translation": p["position"], "quaternion": p["quaternion"]}) for p in content["poses"]])
+    places = [{"translation": pose["position"], "quaternion": pose["quaternion"]} for pose in content["poses"]]
+    stored = np.array([_matrix(place) for place in places])
     return Outside(
         robot=content["robot"],
         source=content["source"],

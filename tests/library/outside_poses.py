@@ -13,6 +13,7 @@ Where the URDF counts joints or has frames otherwise than the library, the entri
 from __future__ import annotations
 
 import argparse
+import sys
 import zlib
 from pathlib import Path
 from typing import Any
@@ -23,20 +24,25 @@ CONFIGURATIONS = 8
 
 
 def main() -> None:
-    """Print the file."""
+    """Write the file to standard output."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("urdf", type=Path)
     for name in ("robot", "repository", "path", "revision"):
         parser.add_argument(f"--{name}", required=True)
     parser.add_argument("--base", default="base")
     parser.add_argument("--tip", default="tool0")
-    parser.add_argument("--joints", nargs="+", help="of the arm, in order; all that move between base and tip if left out")
-    given = parser.parse_args()
+    parser.add_argument("--joints", nargs="+", help="of the arm, in order; all that move if left out")
+    sys.stdout.write(text(parser.parse_args()))
 
+
+def text(given: argparse.Namespace) -> str:
+    """Return the text of the file: limits [deg], joint positions [deg], positions [mm] and quaternions w x y z."""
     import pinocchio
 
     model: Any = pinocchio.buildModelFromUrdf(str(given.urdf))
-    names = given.joints or [name for name in model.names[1:]]
+    names = given.joints or list(model.names[1:])
+    for name in (given.base, given.tip):
+        assert model.existFrame(name), f"there is no link {name}"
     ids = [model.getJointId(name) for name in names]
     places = [model.joints[i].idx_q for i in ids]
     assert all(model.joints[i].nq == 1 for i in ids), "continuous joints: make them revolute, with the maker's limits"
@@ -44,22 +50,27 @@ def main() -> None:
     limits = [[round(float(a), 2), round(float(b), 2)] for a, b in zip(low, high, strict=True)]
     rng = np.random.default_rng(zlib.crc32(given.robot.encode()))
     drawn = rng.uniform(low, high, (CONFIGURATIONS - 1, len(names))).round(1)
-    print("# Poses of a public URDF, computed once by tests/library/outside_poses.py with Pinocchio. No URDF is copied.")
-    print(f"robot: {given.robot}")
-    print(f"source: {{repository: {given.repository}, path: {given.path}, revision: {given.revision}}}")
-    print(f"base: {given.base}\ntip: {given.tip}\nlimits: {limits}\nposes:")
+    lines = [
+        "# Poses of a public URDF, computed once by tests/library/outside_poses.py with Pinocchio. No URDF is copied.",
+        f"robot: {given.robot}",
+        f"source: {{repository: {given.repository}, path: {given.path}, revision: {given.revision}}}",
+        f"base: {given.base}",
+        f"tip: {given.tip}",
+        f"limits: {limits}",
+        "poses:",
+    ]
     data = model.createData()
     base, tip = (model.getFrameId(name) for name in (given.base, given.tip))
-    assert base < model.nframes and tip < model.nframes, "there is no such link"
     for row in np.vstack([np.zeros(len(names)), drawn]):
         q = pinocchio.neutral(model)
         q[places] = np.radians(row)
         pinocchio.framesForwardKinematics(model, data, q)
         pose = data.oMf[base].inverse() * data.oMf[tip]
         turn = pinocchio.Quaternion(pose.rotation).normalized()
-        w, x, y, z = (round(float(v), 12) + 0.0 for v in (turn.w, turn.x, turn.y, turn.z))
+        quaternion = [round(float(v), 12) + 0.0 for v in (turn.w, turn.x, turn.y, turn.z)]
         at = [round(float(v) * 1e3, 6) + 0.0 for v in pose.translation]
-        print(f"  - {{joints: {row.tolist()}, position: {at}, quaternion: {[w, x, y, z]}}}")
+        lines.append(f"  - {{joints: {row.tolist()}, position: {at}, quaternion: {quaternion}}}")
+    return "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 
+
 def position(robot: Robot, degrees: list[float]) -> Array:
     """Flange position [mm]."""
     positions, _ = robot.world_poses(np.radians([degrees]))

@@ -25,6 +25,9 @@ NO_URDF = {
 NO_POINT = {
     "ur3": (500.0, "recommended working radius"),
     "hc10": (1200.0, "to where axes R and B meet"),
+    "tm5_900": (900.0, "less than to the wrist centre"),
+    "xarm6": (700.0, "less than to the wrist centre"),
+    "xarm7": (700.0, "less than to the wrist centre"),
 }
 #: Arms whose reach nobody publishes.
 NO_REACH = {

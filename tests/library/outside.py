@@ -33,7 +33,10 @@ FOLDER = Path(__file__).with_name("outside")
 
 @dataclass(frozen=True)
 class Outside:
-    """What a file says: joint positions of the model (n, joints) [rad], and poses (n, 4, 4) of its flange [m]."""
+    """What a file says: joint positions of the model (n, joints) [rad], and poses (n, 4, 4) of its flange [m].
+
+    `counted` are the joint positions as the URDF has them [rad], and `seen` the poses of its link [m].
+    """
 
     robot: str
     source: dict[str, str]
@@ -43,6 +46,8 @@ class Outside:
     differs: bool
     joints: Array
     poses: Array
+    counted: Array
+    seen: Array
 
 
 def known() -> list[str]:
@@ -72,6 +77,8 @@ def read(robot_id: str) -> Outside:
         differs=bool({"joints", "model_base", "model_flange"} & content.keys()),
         joints=np.radians(signs * (counted - zeros)),
         poses=np.linalg.inv(base) @ stored @ np.linalg.inv(flange),
+        counted=np.radians(counted),
+        seen=stored,
     )
 
 

@@ -35,19 +35,21 @@ FOLDER = Path(__file__).with_name("outside")
 class Outside:
     """What a file says: joint positions of the model (n, joints) [rad], and poses (n, 4, 4) of its flange [m].
 
-    `counted` are the joint positions as the URDF has them [rad], and `seen` the poses of its link [m].
+    `urdf_poses` are as the URDF has them, of its link `tip` in its link `base`.
     """
 
     robot: str
     source: dict[str, str]
+    base: str
+    tip: str
+    signs: tuple[int, ...]
     limits: Array
     limits_differ: str
     reason: str
     differs: bool
     joints: Array
     poses: Array
-    counted: Array
-    seen: Array
+    urdf_poses: Array
 
 
 def known() -> list[str]:
@@ -71,14 +73,16 @@ def read(robot_id: str) -> Outside:
     return Outside(
         robot=content["robot"],
         source=content["source"],
+        base=content["base"],
+        tip=content["tip"],
+        signs=tuple(int(sign) for sign in signs),
         limits=np.radians(limits),
         limits_differ=content.get("limits_differ", ""),
         reason=content.get("reason", ""),
         differs=bool({"joints", "model_base", "model_flange"} & content.keys()),
         joints=np.radians(signs * (counted - zeros)),
         poses=np.linalg.inv(base) @ stored @ np.linalg.inv(flange),
-        counted=np.radians(counted),
-        seen=stored,
+        urdf_poses=stored,
     )
 
 
@@ -95,28 +99,27 @@ def _matrix(place: dict[str, list[float]]) -> Array:
 def largest_reach(robot: Robot) -> float:
     """Return how far from the line of its axis the point of a robot's reach comes within the limits [m].
 
-    The best of configurations drawn within the limits is moved joint by joint, in steps that are halved until they
-    are nothing.
+    The best of configurations drawn within the limits are moved along each joint and along directions drawn at random,
+    in steps that are halved where none leads further.
     """
-    assert robot.reach is not None
+    joints = robot.random_configurations(1000, np.random.default_rng(0))
+    best = np.argsort(-_distances(robot, joints))[:4]
+    return max(_climbed(robot, q) for q in joints[best])
+
+
+def _climbed(robot: Robot, q: Array) -> float:
     low, high = np.array([joint.range for joint in robot.joints]).T
-    rng = np.random.default_rng(0)
-    q = robot.random_configurations(1000, rng)
-    q = q[np.argsort(-_distances(robot, q))[:3]]
-    q = q.clip(low, high)
-    best, step = _distances(robot, q), np.radians(20.0)
+    rng = np.random.default_rng(1)
+    each = np.vstack([np.eye(len(low)), -np.eye(len(low))])
+    furthest, step = 0.0, np.radians(20.0)
     while step > 1e-3:
-        moved = False
-        for joint in range(len(robot.joints)):
-            for direction in (step, -step):
-                tried = q.copy()
-                tried[:, joint] = np.clip(tried[:, joint] + direction, low[joint], high[joint])
-                distances = _distances(robot, tried)
-                better = distances > best + 1e-12
-                q[better], best[better] = tried[better], distances[better]
-                moved |= bool(better.any())
-        step = step if moved else step / 2.0
-    return float(best.max())
+        tried = np.clip(q + step * np.vstack([each, rng.normal(size=(40, len(low)))]), low, high)
+        distances = _distances(robot, tried)
+        if distances.max() > furthest + 1e-6:
+            q, furthest = tried[distances.argmax()], float(distances.max())
+        else:
+            step /= 2.0
+    return furthest
 
 
 def _distances(robot: Robot, joints: Array) -> Array:

@@ -64,3 +64,9 @@ def reach_entry(reach: Reach) -> dict[str, Any]:
     """Return the entry of a reach, in mm."""
     made: dict[str, Any] = {"distance": written(reach.distance, "mm")}
     return made if reach.point is None else made | {"from": f"axis-{reach.axis}", "to": reach.point}
+
+
+def reach_summary(reach: Reach | None) -> dict[str, Any]:
+    """Return a reach as JSON holds it beside other things."""
+    entry = {} if reach is None else reach_entry(reach)
+    return {"reach_mm": entry.get("distance"), "reach_from": entry.get("from"), "reach_to": entry.get("to")}

@@ -46,7 +46,7 @@ NO_POINT = {
     "xarm7": "less than to the wrist centre",
 }
 #: Arms whose makers' own URDF has the controller's base and flange under other names than base and tool0.
-OTHER_NAMES = ("aubo_i5", "fr3", "gen3", "m1013", "panda", "rv7frl", "xarm6", "xarm7")
+OTHER_NAMES = ("aubo_i5", "fr3", "gen3", "m1013", "panda", "rv13frl", "rv4frl", "rv7frl", "xarm6", "xarm7")
 #: Arms whose URDF has another base or tool0 than the others of its package, which are the controller's.
 OTHER_FRAMES = {
     "m20id_25": "its tool0 is half a turn about z from that of the package's other arms",

@@ -36,12 +36,17 @@ NO_URDF = {
 NO_POINT = {
     "crb15000_5_0.95": "to where axis 6 passes axis 5, with the wrist straight",
     "hc10": "to where axes R and B meet",
+    "tm5_900": "less than to the wrist centre",
     "ur16e": "recommended, not the largest",
     "ur3": "recommended, not the largest",
     "ur3e": "recommended, not the largest",
     "ur5": "recommended, not the largest",
     "ur5e": "recommended, not the largest",
+    "xarm6": "less than to the wrist centre",
+    "xarm7": "less than to the wrist centre",
 }
+#: Arms whose makers' own URDF has the controller's base and flange under other names than base and tool0.
+OTHER_NAMES = ("aubo_i5", "fr3", "gen3", "m1013", "panda", "rv13frl", "rv4frl", "rv7frl", "xarm6", "xarm7")
 #: Arms whose URDF has another base or tool0 than the others of its package, which are the controller's.
 OTHER_FRAMES = {
     "m20id_25": "its tool0 is half a turn about z from that of the package's other arms",
@@ -59,7 +64,8 @@ def has_controller_s_frames(robot_id: str) -> bool:
     """Return whether base and tool0 of a URDF are the frames of a controller that the library knows."""
     stored = outside.read(robot_id)
     known = load_robot(robot_id).controller != AS_THE_MODEL
-    return known and (stored.base, stored.tip) == ("base", "tool0") and robot_id not in OTHER_FRAMES
+    named = (stored.base, stored.tip) == ("base", "tool0") or robot_id in OTHER_NAMES
+    return known and named and robot_id not in OTHER_FRAMES
 
 
 @pytest.mark.parametrize("robot_id", library())

@@ -55,7 +55,6 @@ OTHER_FRAMES = {
 NO_REACH = {
     "katana450": "its flange is an attachment of the thesis",
     "li3": "invented",
-    "lrmate200ic": "no maker's figure at hand",
     "puma560": "no maker's figure at hand",
 }
 

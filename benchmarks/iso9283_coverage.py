@@ -152,7 +152,8 @@ def drifts(change: Array, growth: Array, campaigns: int, rng: np.random.Generato
         points = rng.standard_normal((k, 10, 3)) * growth[:, None, None]
         points[..., 0] += 5 + change[:, None]
         flat, cycle = points.reshape(-1, 3), np.tile(np.arange(1, 11), k)
-        one = Cycles("dAP", "", "P1", "", 1.0, 1.0, cycle, np.full(10 * k, np.nan), flat, None, np.zeros(3))
+        time, lines = np.full(10 * k, np.nan), np.arange(10 * k)
+        one = Cycles("dAP", "", "P1", "", 1.0, 1.0, cycle, time, flat, None, np.zeros(3), lines)
         for value in drift_values(test, [one], Instrument(1e-6))[0]:
             if value.component == "position":
                 per[value.id].append(value.interval)

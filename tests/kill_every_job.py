@@ -52,6 +52,7 @@ PLACES: dict[str, Arguments] = {
     "import_circle": {"out": "data.csv"},
     "import_sockets": {"out": "data.csv"},
     "import_hand_eye": {"out": "data.csv"},
+    "import_ros": {"out": "data.csv"},
     "import_ur_kinematics": {"out": "robot.yaml"},
     "calibrate": {"out": "."},
     "tilting": {"out": "."},

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from truearm.jobs.import_hand_eye import import_hand_eye
     from truearm.jobs.import_matrices import import_matrices
     from truearm.jobs.import_robodk import import_robodk
+    from truearm.jobs.import_ros import import_ros
     from truearm.jobs.import_sockets import import_sockets
     from truearm.jobs.import_table import import_table
     from truearm.jobs.import_ur_kinematics import import_ur_kinematics
@@ -101,6 +102,7 @@ __all__ = [
     "import_hand_eye",
     "import_matrices",
     "import_robodk",
+    "import_ros",
     "import_sockets",
     "import_table",
     "import_ur_kinematics",

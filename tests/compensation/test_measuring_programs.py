@@ -66,8 +66,8 @@ def meant(name: str, program: MotionProgram) -> list[tuple[str, int | None, int]
         elif isinstance(step, StraightMove):
             moves.append(("linear", None, step.target))
         elif isinstance(step, CircleMove):
-            if name == "inform" and not arc:
-                moves.append(("linear", None, step.start))
+            if name == "inform":  # where arcs meet stands a line as well
+                moves += [("linear", None, step.start)] * (1 + arc)
             moves.append(("circular", step.via, step.target))
         arc = isinstance(step, CircleMove)
     return moves
@@ -166,6 +166,21 @@ def test_speeds_and_zones_are_said(name: str, programs: dict[str, MotionProgram]
     lines = slow.splitlines()
     for words in ("Not verified, no safety function", "First run: step by step,", "ISO 9283 CR", "Plan abc"):
         assert any(words in line for line in lines)
+
+
+def test_yaskawa_arcs_are_separated_by_a_line_and_by_no_tag_of_newer_controllers(
+    programs: dict[str, MotionProgram],
+) -> None:
+    text = text_of("inform", programs["AT_10"])
+    assert "FPT" not in text
+    moves = [line.split()[0] for line in text.splitlines() if line.startswith(("MOV", "TIMER"))]
+    joined = " ".join(moves)
+    assert "MOVJ TIMER MOVC MOVC MOVC MOVL MOVC MOVC MOVC TIMER" in joined
+
+
+def test_a_staubli_speed_is_left_to_the_one_that_is_said(programs: dict[str, MotionProgram]) -> None:
+    text = text_of("val3", programs["REORI_100"])
+    assert text.count('tmax="99999" rmax="99999"') == 3
 
 
 def test_every_test_begins_and_ends_slowly_in_the_first_pose(programs: dict[str, MotionProgram]) -> None:

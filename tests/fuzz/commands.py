@@ -90,6 +90,7 @@ COMMANDS: Final[tuple[str, ...]] = (
     "import table table.csv --map mapping.yaml --out made.csv",
     "import table points.csv --map spatial.yaml --out made.csv",
     "import sockets sockets.csv --apart 200mm,0.02mm --ball 25mm --sigma 0.02 --out made.csv",
+    "import ros cell.bag --target tip=/tracker/pose --out made.csv",
     "import hand-eye views.csv --on-flange camera --out made.csv",
     "import circle --scan a=page.png --points a=page.csv --dpi 300 --sigma 0.02 --out made.csv",
     "hexapod enumerate --json",

@@ -94,6 +94,7 @@ def folder() -> Path:
         "import_circle",
         "import_sockets",
         "import_hand_eye",
+        "import_ros",
         "tolerance",
         "tilting",
         "compensate",

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from tests.identification.test_axes import runs
 from tests.performance_plan import small_plan
+from tests.ros_bags import joint_messages, recorded, target_messages, write_ros1
 from tests.simulated import campaign
 from tests.ur_controller import UR10_CONF
 
@@ -108,6 +109,18 @@ def _circle(folder: Path) -> Arguments:
 def _sockets(folder: Path) -> Arguments:
     rows = "configuration,joint_1 [deg],joint_2 [deg],socket\n1,10,20,left\n2,12,22,right\n3,15,25,left\n"
     return {"file": _written(folder / "sockets.csv", rows), "apart": "200mm,0.02mm", "ball": "25mm", "sigma": 2e-5}
+
+
+def _recording(folder: Path) -> Arguments:
+    times, joints, seen, positions, turns = recorded(stand=1.2, move=0.3, joint_rate=50.0)
+    messages = [*joint_messages(times, joints), *target_messages(seen, positions, turns)]
+    names = tuple(f"joint_{number}" for number in range(1, 7))
+    return {
+        "file": write_ros1(folder / "cell.bag", messages),
+        "targets": {"tip": "/tracker/pose"},
+        "joint_topic": "/joint_states",
+        "joint_names": names,
+    }
 
 
 def _views(folder: Path) -> Arguments:
@@ -308,6 +321,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "import_circle": _circle,
     "import_sockets": _sockets,
     "import_hand_eye": _views,
+    "import_ros": _recording,
     "import_ur_kinematics": lambda folder: {
         "file": _written(folder / "calibration.conf", UR10_CONF),
         "robot": "ur10",
@@ -402,8 +416,8 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "target": None,
         "load": 2.0,
         "velocity": 0.5,
-        "velocities": (0.5,),
-        "loads": (1.0,),
+        "velocities": (50.0,),
+        "loads": (100.0,),
         "out": folder / "performance-plan",
     },
     "iso9283_simulate": lambda _: {

@@ -44,6 +44,7 @@ FILES = (
     ("import_ur_kinematics", "file"),
     ("path", "file"),
     ("import_hand_eye", "file"),
+    ("import_ros", "file"),
     ("import_sockets", "file"),
 )
 Arguments = dict[str, Any]

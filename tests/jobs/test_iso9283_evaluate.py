@@ -18,11 +18,13 @@ from tests.performance_plan import small_plan
 import truearm
 from truearm.errors import InputError
 from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
 from truearm.planning.iso9283.criteria import TEST_OF
 from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
 from truearm.results.iso9283_evaluation import Iso9283Evaluation
 from truearm.results.iso9283_table import worst_places
 from truearm.simulation.truths import truth_twin
+from truearm.validation.iso9283.missing import missing_places
 from truearm.validation.iso9283.values import Conditions, Value
 
 FILES = ("poses", "paths", "settling", "forces")
@@ -99,7 +101,7 @@ def test_every_criterion_has_a_value_and_the_files_hold_it(found: Iso9283Evaluat
     held = json.loads((folder / "iso9283.json").read_text())
     assert held == json.loads(json.dumps(found.summary()))
     keys = {"id", "component", "where", "value", "unit", "interval_95", "cycles", "conditions", "status"}
-    assert all(keys <= {*entry} <= keys | {"range"} for entry in held["criteria"])
+    assert all(keys <= {*entry} <= keys | {"range", "bandwidth_hz"} for entry in held["criteria"])
     assert held["alignment"]["kind"] == "base-features"
 
 
@@ -141,10 +143,10 @@ def test_the_worst_place_is_taken_at_the_fastest_velocity_and_loads_stay_apart()
         ]
     )
     assert [one.cells[:3] for one in found] == [
-        ("AD", "b, worst of 2", "-2.0000 mm"),
+        ("AD", "b, worst of 2 of 3", "-2.0000 mm"),
         ("AD", "a, load 10 %", "4.0000 mm"),
     ]
-    assert found[0].cells[4] == "50 %: 1.0000"
+    assert found[0].cells[4:] == ("50 %: 1.0000", "not-measured: c")
 
 
 def test_the_report_has_a_picture_of_every_test_and_stays_small(found: Iso9283Evaluation) -> None:
@@ -222,6 +224,88 @@ def test_too_few_cycles_are_said_and_the_values_stand(small: Arguments) -> None:
     assert (said.level, "AP" in said.message) == ("warning", True)
     assert {"too-few-cycles", "measured"} <= {value.status for value in positions(fewer, "AP").values()}
     assert all(np.isfinite(value.value) for value in positions(fewer, "AP").values())
+
+
+def test_a_wild_row_is_said_with_the_value_without_it(small: Arguments) -> None:
+    given = {"poses": small["poses"], "alignment": small["alignment"]}
+    clean = truearm.iso9283_evaluate(small["plan"], **given)
+    assert not {"wild-row", "two-places", "places-missing"} & {notice.code for notice in clean.warnings}
+    header, *rows = small["poses"].read_text().splitlines()
+    place, cell = header.split(",").index("y [mm]"), rows[7].split(",")
+    cell[place] = str(float(cell[place]) + 5.0)
+    rows[7] = ",".join(cell)
+    small["poses"].write_text("\n".join([header, *rows]) + "\n")
+    (said,) = [n for n in truearm.iso9283_evaluate(small["plan"], **given).warnings if n.code == "wild-row"]
+    assert said.level == "warning"
+    where = cell[header.split(",").index("pose")]
+    assert re.search(
+        rf"^Cycle 2 of AP {where}, 100 %, load 100 %, on line 9 lies 5(\.\d+)? mm from the others, which scatter by "
+        r"0\.\d+ mm: RP is \d\.\d{4} mm, without it 0\.\d{4}; AP is \d\.\d{4} mm, without it \d\.\d{4}\. ",
+        said.message,
+    )
+
+
+def test_two_places_of_rest_are_said_with_the_rows_of_the_fewer(tmp_path: Path) -> None:
+    plan = small_plan(["AP"], cycles={"AP": 24})
+    (tmp_path / PLAN).write_text(plan_text(plan))
+    (tmp_path / ROBOT).write_text(robot_text(plan.robot))
+    truearm.iso9283_simulate("irb120", plan, seed=1, noise=1e-6, out=tmp_path / "read")
+    poses = tmp_path / "read" / "poses.csv"
+    header, *rows = [line.split(",") for line in poses.read_text().splitlines()]
+    cycle, pose, z = (header.index(name) for name in ("cycle", "pose", "z [mm]"))
+    lines = []
+    for line, row in enumerate(rows, 2):
+        if row[pose] == "P4" and int(row[cycle]) % 4 == 0:
+            row[z] = str(float(row[z]) + 0.3)
+            lines.append(str(line))
+    poses.write_text("\n".join(",".join(row) for row in (header, *rows)) + "\n")
+    tie = tmp_path / "read" / "alignment.yaml"
+    made = truearm.iso9283_evaluate(tmp_path / PLAN, poses=poses, alignment=tie)
+    (said,) = [notice for notice in made.warnings if notice.code in ("two-places", "wild-row")]
+    assert (said.code, said.level) == ("two-places", "warning")
+    assert "AP P4, 100 %, load 100 % (6 and 18 cycles, 0.3" in said.message
+    assert f"the 6 on lines {', '.join(lines)})" in said.message
+
+
+def test_orientations_that_are_degrees_off_are_said(small: Arguments) -> None:
+    given = {"poses": small["poses"], "noise_rot": 1e-5}
+    clean = truearm.iso9283_evaluate(small["plan"], **given, alignment=small["alignment"])
+    assert "orientation-far-off" not in {notice.code for notice in clean.warnings}
+    header, *rows = [line.split(",") for line in small["poses"].read_text().splitlines()]
+    place = header.index("qw")
+    q = np.array([row[place : place + 4] for row in rows], dtype=float)
+    turned = quaternion_from_rotation(rotation_from_quaternion(q) @ rotation_from_vector(np.array([0, 0, 0.1])))
+    lines = [",".join([*row[:place], *map(str, one)]) for row, one in zip(rows, turned, strict=True)]
+    small["poses"].write_text("\n".join([",".join(header), *lines]) + "\n")
+    off = truearm.iso9283_evaluate(small["plan"], **given, alignment=small["alignment"])
+    (said,) = [notice for notice in off.warnings if notice.code == "orientation-far-off"]
+    off_by = re.search(r"up to -?(\d\.\d+) deg \(AP c of P\d\)", said.message)
+    assert said.level == "warning"
+    assert off_by
+    assert float(off_by[1]) == pytest.approx(5.73, abs=0.5)
+
+
+def test_a_pose_without_a_row_is_said_and_stands_in_the_table(small: Arguments) -> None:
+    lines = small["poses"].read_text().splitlines()
+    small["poses"].write_text("\n".join(line for line in lines if ",P3," not in line) + "\n")
+    made = truearm.iso9283_evaluate(small["plan"], poses=small["poses"], alignment=small["alignment"])
+    (said,) = [notice for notice in made.warnings if notice.code == "places-missing"]
+    assert (said.level, said.message.split(". ")[0]) == ("warning", "Planned and without a row: AP: P3")
+    (row,) = [line for line in made.lines() if line.startswith("  AP ")]
+    assert "worst of 4 of 5" in row
+    assert row.endswith("not-measured: P3")
+    assert "worst of 4 of 5" in str(made.contents()["report.html"]).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_places_and_velocities_of_other_tests_without_a_value_are_said() -> None:
+    plan = small_plan(["AT", "posing-time", "AV"], velocities=(1.0, 0.5))
+
+    def value(id_: str, where: str, velocity: float | None) -> Value:
+        return Value(id_, "position", where, 1.0, "length", None, 3, Conditions(velocity, 1.0), "measured")
+
+    there = [value("AT", place, v) for place in ("line", "rectangle", "large-circle") for v in (1.0, 0.5)]
+    there += [value("AT", "small-circle", 0.5), value("posing-time", "P1-D50", None)]
+    assert [one.words for one in missing_places(plan, there)] == ["AT: small-circle at 100 %", "posing-time: P1-D10"]
 
 
 def test_an_instrument_that_is_too_coarse_is_said(small: Arguments) -> None:

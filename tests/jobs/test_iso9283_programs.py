@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +25,13 @@ def cube(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def planned(cube: Path, **more: Any) -> Iso9283Plan:
-    given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [1.0, 0.1], "velocity": 0.5, "load": 3.0}
+    given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [100, 10], "velocity": 0.5, "load": 3.0}
     return truearm.iso9283_plan("irb120", **(given | more))
 
 
 def filled(path: Path, **entries: str) -> None:
     lines = path.read_text().splitlines()
-    known = {"completed": "yes", "by": "A. Operator", "date": "2026-11-23", **entries}
+    known = {"completed": "yes", "by": "A. Operator", "date": datetime.date.today().isoformat(), **entries}
     path.write_text(
         "\n".join(f"{key}: {known[key]}" if (key := line.partition(":")[0]) in known else line for line in lines) + "\n"
     )
@@ -70,7 +71,12 @@ def test_faster_programs_are_written_once_the_slow_run_is_recorded(cube: Path, t
         ({"completed": "no"}, {}, "the slow run is not completed, so no faster programs are written; got 'no'"),
         ({"by": "''"}, {}, "does not say by whom and when"),
         ({"date": "''"}, {}, "does not say by whom and when"),
-        ({}, {"velocities": [1.0, 0.5, 0.1]}, "the slow run was of another plan"),
+        ({"date": "yesterday"}, {}, "the day of the slow run is no date; got 'yesterday'; allowed: year-month-day"),
+        ({"date": "23.11.2026"}, {}, "the day of the slow run is no date"),
+        ({"date": "2026-02-30"}, {}, "day is out of range for month"),
+        ({"date": "2099-01-01"}, {}, "the day of the slow run is still to come; got 2099-01-01"),
+        ({"date": "2099-01-01 08:00:00"}, {}, "the day of the slow run is still to come; got 2099-01-01"),
+        ({}, {"velocities": [100.0, 50.0, 10.0]}, "the slow run was of another plan"),
         ({}, {"dwell": 3.0}, "the slow run was of other programs"),
         ({}, {"program": "krl"}, "the slow run was of other programs"),
         ({"completed": "perhaps"}, {}, "completed"),
@@ -90,7 +96,7 @@ def test_a_slow_run_that_says_too_little_or_something_else_is_refused(
     ("more", "message"),
     [
         ({"program": "basic"}, "program"),
-        ({"dwell": 0.0}, "this is above 0"),
+        ({"dwell": 0.0}, "stands for a time above 0"),
         ({"dwell": 301.0}, "controllers wait no longer at once; got '?301 s"),
         ({"slow_run": "x.yaml"}, "a slow run allows faster programs, and none are asked for"),
     ],

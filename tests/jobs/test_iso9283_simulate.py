@@ -151,3 +151,16 @@ def test_what_cannot_be_simulated_is_refused(calibrated: Robot, tmp_path: Path) 
         truearm.iso9283_simulate(
             "irb120", plan, corrected=ur5.with_values({"theta_offset_2": ur5.values["theta_offset_2"] + 1e-3})
         )
+
+
+@pytest.mark.parametrize("truth", ["random", "nominal"])
+def test_a_robot_of_which_no_compliance_is_known_gives_way_to_pushes_as_real_ones_do(truth: str) -> None:
+    plan = small_plan(["compliance", "AP"], cycles={"compliance": 1, "AP": 1})
+    found = truearm.iso9283_simulate("irb120", plan, truth=truth, noise=0.0, seed=4)
+    forces, tie = found.campaign.forces, found.tie.T_base_instrument
+    assert forces is not None
+    for way in forces.direction.names:
+        rows = forces.direction.are(way)
+        along = (forces.position[rows] @ tie.rotation.T)[:, "xyz".index(way[1])] * (1 if way[0] == "+" else -1)
+        slope = np.polyfit(forces.force[rows], along, 1)[0]
+        assert 5e-7 < slope < 5e-5  # 0.5 to 50 um/N

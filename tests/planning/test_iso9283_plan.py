@@ -14,7 +14,9 @@ import truearm
 from truearm.errors import InputError
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
+from truearm.planning.iso9283.plan import performance_plan
 from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text, read_cube, read_plan
+from truearm.planning.poses.iso9283 import Cube
 from truearm.planning.poses.tip import Tip
 from truearm.results.iso9283_plan import Iso9283Plan
 
@@ -108,10 +110,22 @@ def test_the_rated_velocity_that_is_assumed_is_said(whole: Iso9283Plan, tmp_path
         ({"plane": "C1-C3"}, "plane"),
         ({"target": "9"}, "target"),
         ({"target": "1", "tip": (0.0, 0.0, 0.1)}, "only one of them"),
-        ({"velocities": (1.5,)}, "shares of the rated one"),
-        ({"velocities": (0.0,)}, "shares of the rated one"),
-        ({"limit_band": 0.0}, "limit_band"),
-        ({"load": -1.0}, "load"),
+        (
+            {"velocities": (150.0,)},
+            "percent of the rated one; got 150 %; allowed: percent of the rated velocity, above 1",
+        ),
+        ({"velocities": (0.0,)}, "percent of the rated one; got 0 %"),
+        ({"velocities": (100.0, 0.5)}, "looks like a share; got 0.5 %"),
+        ({"velocities": (1.0,)}, "Give 100, not 1."),
+        ({"velocities": ()}, "no velocity is given"),
+        ({"loads": (0.1,)}, "Give 10, not 0.1."),
+        ({"loads": (-5.0,)}, "got -5 %; allowed: percent of the rated load, 0, or above 1 up to 100"),
+        ({"limit_band": 0.0}, "the limit band is above 0"),
+        ({"hours": 0.0}, "watched for a time above 0"),
+        ({"velocity": -1.0}, "the rated velocity is above 0; got -1"),
+        ({"velocity": 0.0005}, "along a path; got 0.5 mm/s; allowed: 10 to 20000 mm/s. Is it 500 mm/s?"),
+        ({"velocity": 1000.0}, "got 1e+06 mm/s; allowed: 10 to 20000 mm/s. Is it 1000 mm/s? Check its unit."),
+        ({"load": -3.0}, "the rated load is above 0; got -3; allowed: a mass above 0 [kg]"),
         ({"ahead": "+z"}, "ahead"),
     ],
 )
@@ -203,3 +217,16 @@ def test_a_plan_file_that_cannot_be_used_is_refused(
     with pytest.raises(InputError) as refusal:
         read_plan(tmp_path / PLAN)
     assert said in str(refusal.value)
+
+
+def test_the_largest_cube_is_that_of_the_robot_whichever_tests_are_planned(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = truearm.load_robot("irb120")
+    found = Cube([0.3036, 0.0, 0.3036], 0.4239)  # AP alone would be planned in it
+    monkeypatch.setattr("truearm.planning.iso9283.plan.largest_cube", lambda *_, **__: found)
+    sides = {
+        tests: performance_plan(robot, tests=tests, rated_load=3.0, rated_velocity=1.0).cube.side
+        for tests in (("AP",), ("AT", "vAP"))
+    }
+    assert sides["AP",] == sides["AT", "vAP"] < found.side
+    alone = performance_plan(robot, tests=("AP",), cube=found, rated_load=3.0, rated_velocity=1.0)
+    assert alone.cube.side == found.side

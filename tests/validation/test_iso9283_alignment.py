@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
-from truearm.validation.iso9283.alignment import best_fit, read_alignment
+from truearm.planning.poses.iso9283 import Cube
+from truearm.validation.iso9283.alignment import best_fit, read_alignment, refuse_implausible
 
 FILE = {
     "truearm": "truearm-alignment/1",
@@ -56,3 +57,41 @@ def test_poses_on_a_line_have_no_best_fit() -> None:
     line = np.arange(5.0)[:, None] * np.ones(3)
     with pytest.raises(InputError, match="do not lie on a line"):
         best_fit(line, line)
+
+
+#: A quarter of a turn about z, and then moved: what lies in the cube, in the base frame.
+CUBE = Cube([0.4, 0.1, 0.5], 0.25)
+TURNED = {"quaternion": "[0.7071067812, 0, 0, 0.7071067812]"}
+
+
+def measured_in(folder: Path) -> np.ndarray:
+    """Return points of the cube in the instrument's frame of a sound file."""
+    tie = read_alignment(written(folder, **TURNED))
+    R, p = tie.T_base_instrument.rotation, np.array(tie.T_base_instrument.translation)
+    return np.asarray((CUBE.plane("C1-C2-C7-C8").measuring_points - p) @ R)
+
+
+def test_a_sound_tie_is_plausible(tmp_path: Path) -> None:
+    measured = measured_in(tmp_path)
+    refuse_implausible(read_alignment(written(tmp_path, **TURNED)), CUBE, measured, "tie.yaml")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"position": "[1.5, -0.31, 0.012]"}, "Is `position` in m where the file says mm?"),
+        ({"units": "{length: m, angle: deg}", "sigma": "3e-5"}, "Is `position` in mm where the file says m?"),
+        ({"position": "[310, 1500, -12]", "quaternion": "[0.7071067812, 0, 0, -0.7071067812]"}, "the base in the inst"),
+        ({"quaternion": "[0, 0, 0.7071067812, 0.7071067812]"}, "Does `quaternion` begin with x?"),
+        ({"position": "[-4000, 0, 0]"}, "Check its numbers and units"),
+    ],
+)
+def test_a_tie_that_puts_the_readings_elsewhere_is_refused_with_its_likely_cause(
+    changes: dict[str, str], said: str, tmp_path: Path
+) -> None:
+    measured = measured_in(tmp_path)
+    tie = read_alignment(written(tmp_path, **(TURNED | changes)))
+    with pytest.raises(InputError, match="lies far from the cube of the tests") as refusal:
+        refuse_implausible(tie, CUBE, measured, "tie.yaml")
+    assert said in str(refusal.value)
+    assert str(refusal.value).startswith("tie.yaml: ")

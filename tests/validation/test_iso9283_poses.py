@@ -25,6 +25,7 @@ from truearm.validation.iso9283.inverted_tests import norm_interval
 from truearm.validation.iso9283.pose_rows import best_fit_of, cycles_of
 from truearm.validation.iso9283.poses import evaluate
 from truearm.validation.iso9283.values import Instrument, Value
+from truearm.validation.iso9283.wild_pushes import wild_pushes
 
 CUBE = Cube((0.5, 0.0, 0.5), 0.4)
 POINTS = CUBE.plane("C1-C2-C7-C8").measuring_points
@@ -291,6 +292,52 @@ def test_compliance_of_a_linear_spring() -> None:
         assert (value.status, value.interval, value.cycles) == ("measured", None, 3)
     assert len(lines) == 18
     assert lines[0].displacement == pytest.approx(lines[0].force * 2e-6, abs=1e-12)
+
+
+def test_a_wild_push_is_named_and_no_other() -> None:
+    task = plan(PlannedTest("compliance", ("P1",), 3))
+    rng = np.random.default_rng(2)
+    read = pushes()
+    for _ in range(50):
+        noisy = dataclasses.replace(read, position=read.position + 3e-6 * rng.standard_normal(read.position.shape))
+        assert wild_pushes(evaluate_pushes(task, noisy, TIE, TRACKER)[1], TRACKER) == ()
+    position = noisy.position.copy()
+    position[[40, 100]] += [[2e-4, 0, 0], [0, -1e-4, 0]]
+    values, lines = evaluate_pushes(task, dataclasses.replace(noisy, position=position), TIE, TRACKER)
+    one, other = wild_pushes(lines, TRACKER)
+    assert (one.line, one.direction, other.line, other.direction) == (42, "-x", 102, "-y")
+    assert (one.away, other.away) == pytest.approx((2e-4, 1e-4), rel=0.2)
+    for named in (one, other):
+        value = next(v for v in values if v.where == named.direction)
+        assert named.value == pytest.approx(value.value)
+        assert named.without == pytest.approx(2e-6, rel=0.1)
+        assert abs(named.without - 2e-6) < abs(named.value - 2e-6)
+    order = rng.permutation(len(position))
+    names = Names.of([noisy.direction.names[code] for code in noisy.direction.code[order]])
+    arrays = {name: getattr(noisy, name)[order] for name in ("force", "cycle", "position", "line")}
+    shuffled = dataclasses.replace(noisy, direction=names, **arrays)
+    assert evaluate_pushes(task, shuffled, TIE, TRACKER)[0] == evaluate_pushes(task, noisy, TIE, TRACKER)[0]
+
+
+def test_drift_from_a_first_group_at_its_command_is_within_its_interval() -> None:
+    rng = np.random.default_rng(5)
+    drift = 1e-4 * (1 - np.exp(-np.linspace(0, 3, 9)))
+    task = plan(PlannedTest("dAP", ("P1",), 10))
+    held = []
+    for _ in range(20):
+        points = POINTS[0] + np.repeat(drift, 10)[:, None] * [1, 0, 0] + 1e-5 * rng.standard_normal((90, 3))
+        value = found(evaluate(task, rows("dAP", ["P1"] * 90, [*range(1, 11)] * 9, points), TIE, TRACKER).values, "dAP")
+        assert value.interval is not None
+        held.append(value.interval[0] < drift[-1] < value.interval[1])
+    assert np.mean(held) >= 0.95
+
+
+def test_a_tip_that_moves_against_the_force_is_refused() -> None:
+    task, read = plan(PlannedTest("compliance", ("P1",), 3)), pushes()
+    swapped = {"+x": "-x", "-x": "+x"}
+    names = Names(tuple(swapped.get(name, name) for name in read.direction.names), read.direction.code)
+    with pytest.raises(InputError, match=r"line 35: the tip moves against the force in cycle 1 of the direction \+x"):
+        evaluate_pushes(task, dataclasses.replace(read, direction=names), TIE, TRACKER)
 
 
 def test_pushes_that_cannot_be_used_are_refused() -> None:

@@ -20,7 +20,8 @@ from truearm.simulation.moving.arm import DRIVES, WARMING, Drives
 from truearm.simulation.moving.servo import Servo
 from truearm.simulation.truths import truth_twin
 from truearm.validation.iso9283.controller_commands import ZONE
-from truearm.validation.iso9283.simulated import TrueRobot, simulated_campaign
+from truearm.validation.iso9283.simulated import simulated_campaign
+from truearm.validation.iso9283.simulated_cell import TrueRobot
 from truearm.validation.iso9283.simulated_readings import SimulatedCampaign, Tracker
 
 CYCLES = {"AP": 3, "vAP": 2, "AD": 2, "dAP": 4, "E": 2, "AT": 2, "AT-reorientation": 2, "AV": 2}

@@ -7,9 +7,12 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.cubes import Ahead, Floor, Nearest, TargetName, TipText
 from truearm.cli.loading import read_lengths, read_numbers
 from truearm.cli.options import Commands, command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
+
+_PERCENT = "percent, as 100,50,10"
 
 app = Commands(no_args_is_help=True, help="Test a robot by the criteria of ISO 9283: plan, simulate, evaluate.")
 
@@ -21,13 +24,8 @@ def plan(
     criteria: Annotated[str, typer.Option(metavar="ID,..|all", help="As ap,rp,at.")] = "all",
     cube: Annotated[str, typer.Option(metavar="auto|FILE", help="The largest one, or a file with one.")] = "auto",
     plane: Annotated[str, typer.Option(metavar="CORNERS", help="Diagonal plane of the cube.")] = "C1-C2-C7-C8",
-    target: Annotated[
-        str | None, typer.Option(metavar="NAME", help="What is measured.", show_default="the flange")
-    ] = None,
-    tip: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y,Z", help="What is measured, in the flange frame \\[mm].", show_default="the flange"),
-    ] = None,
+    target: TargetName = None,
+    tip: TipText = None,
     load: Annotated[
         float | None, typer.Option(metavar="KG", help="Rated load.", show_default="that of the robot file")
     ] = None,
@@ -35,13 +33,13 @@ def plan(
         float | None,
         typer.Option(metavar="MM/S", help="Rated velocity along a path.", show_default="1000"),
     ] = None,
-    velocities: Annotated[str, typer.Option(metavar="%,..", help="Of the rated velocity.")] = "100,50,10",
-    loads: Annotated[str, typer.Option(metavar="%,..", help="Of the rated load.")] = "100",
+    velocities: Annotated[str, typer.Option(metavar="%,..", help="Percent of the rated velocity.")] = "100,50,10",
+    loads: Annotated[str, typer.Option(metavar="%,..", help="Percent of the rated load.")] = "100",
     limit_band: Annotated[float, typer.Option(metavar="MM", help="Within which the tip is said to stand.")] = 0.1,
     hours: Annotated[float, typer.Option(metavar="H", help="How long the drift is watched.")] = 8.0,
-    ahead: Annotated[str, typer.Option(metavar="+x|-x|+y|-y", help="Where the largest cube is searched.")] = "+x",
-    nearest: Annotated[float, typer.Option(metavar="MM", help="How far ahead the largest cube begins.")] = 0.0,
-    floor: Annotated[float, typer.Option(metavar="MM", help="How high the largest cube begins.")] = 0.0,
+    ahead: Ahead = "+x",
+    nearest: Nearest = 0.0,
+    floor: Floor = 0.0,
     program: Annotated[
         str | None,
         typer.Option(
@@ -72,8 +70,8 @@ def plan(
         tip=None if tip is None else read_lengths(tip, "tip"),  # type: ignore[arg-type]
         load=load,
         velocity=None if velocity is None else sized_si(velocity, "mm", parameter="velocity"),
-        velocities=_shares(velocities, "velocities"),
-        loads=_shares(loads, "loads"),
+        velocities=read_numbers(velocities, "velocities", _PERCENT),
+        loads=read_numbers(loads, "loads", _PERCENT),
         limit_band=sized_si(limit_band, "mm", parameter="limit_band"),
         hours=hours,
         ahead=ahead,  # type: ignore[arg-type]
@@ -131,11 +129,6 @@ def simulate(
             progress=say,
         )
     print_record(found)
-
-
-def _shares(text: str, parameter: str) -> list[float]:
-    """Return shares where the text has percent."""
-    return [value / 100.0 for value in read_numbers(text, parameter, "percent, as 100,50,10")]
 
 
 @app.command()

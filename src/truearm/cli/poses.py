@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from truearm.cli.cubes import Ahead, Floor, Nearest, TargetName, TipText
 from truearm.cli.loading import JointsText, read_lengths, read_numbers
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record
@@ -26,23 +27,16 @@ def poses(
         float | None,
         typer.Option(metavar="MM", help="Of the cube; the diameter of the sphere.", show_default="the largest cube"),
     ] = None,
-    ahead: Annotated[str, typer.Option(metavar="+x|-x|+y|-y", help="Where the largest cube is searched.")] = "+x",
-    nearest: Annotated[float, typer.Option(metavar="MM", help="How far ahead the largest cube begins.")] = 0.0,
-    floor: Annotated[float, typer.Option(metavar="MM", help="How high the largest cube begins.")] = 0.0,
+    ahead: Ahead = "+x",
+    nearest: Nearest = 0.0,
+    floor: Floor = 0.0,
     plane: Annotated[str, typer.Option(metavar="CORNERS", help="Diagonal plane, for sets on one.")] = "C1-C2-C7-C8",
     count: Annotated[
         int | None,
         typer.Option(metavar="N", min=1, help="Poses of diagonal, 118 and sphere.", show_default="25, 118 and 50"),
     ] = None,
-    target: Annotated[
-        str | None, typer.Option(metavar="NAME", help="What goes to the poses.", show_default="the flange")
-    ] = None,
-    tip: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X,Y,Z", help="What goes to the poses, in the flange frame \\[mm].", show_default="the flange"
-        ),
-    ] = None,
+    target: TargetName = None,
+    tip: TipText = None,
     orientation: Annotated[
         str, typer.Option(metavar="free|down|QW,QX,QY,QZ", help="Of the tip in the base frame.")
     ] = "free",

@@ -20,6 +20,7 @@ JOBS: Final = (
     "import_circle",
     "import_sockets",
     "import_hand_eye",
+    "import_ros",
     "import_ur_kinematics",
     "check",
     "calibrate",

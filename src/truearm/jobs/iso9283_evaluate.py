@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
+
+import numpy as np
 
 from truearm.errors import refusals_of
 from truearm.files import path_argument
@@ -23,11 +25,13 @@ from truearm.measurement.readers.performance_samples import read_path_samples, r
 from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
+from truearm.results.iso9283_notices import row_notices
 from truearm.shown import listed
-from truearm.validation.iso9283.alignment import Alignment, read_alignment
+from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
-from truearm.validation.iso9283.values import Instrument
+from truearm.validation.iso9283.said_of_streams import said_of_streams
+from truearm.validation.iso9283.values import Component, Instrument
 
 
 def iso9283_evaluate(
@@ -104,6 +108,10 @@ def iso9283_evaluate(
         progress(f"reading {file.name}")
         with refusals_of(name):
             read[name] = _READERS[name](file)
+    if tie is not None and read:
+        positions = np.concatenate([one.position for one in read.values()])
+        with refusals_of("alignment"):
+            refuse_implausible(tie, planned.cube, positions, str(tie_path))
     instrument = Instrument(sigma, sigma_rot)
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
     made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found), inputs)
@@ -117,6 +125,7 @@ def iso9283_evaluate(
     return made
 
 
+_COMPONENTS: Final = get_args(Component)
 _READERS: Final[Mapping[str, Callable[[Path], object]]] = {
     "poses": read_attained_poses,
     "paths": read_path_samples,
@@ -136,21 +145,29 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
                 "Tie the instrument to the base and give `alignment`.",
             )
         )
+    notices += row_notices(found)
     few = sorted({value.id for value in found.values if value.status == "too-few-cycles"})
     if few:
         notices.append(
             Notice("too-few-cycles", f"Fewer cycles than planned were measured for {listed(few)}; their values stand.")
         )
-    coarse = sorted({value.id for value in found.values if value.status == "instrument-too-coarse"})
+    coarse: dict[str, list[str]] = {}
+    for value in found.values:
+        if value.status == "instrument-too-coarse" and value.component not in coarse.setdefault(value.id, []):
+            coarse[value.id].append(value.component)
     if coarse:
+        names = [
+            name if components == ["position"] else f"{name} ({', '.join(sorted(components, key=_COMPONENTS.index))})"
+            for name, components in coarse.items()
+        ]
         notices.append(
             Notice(
                 "instrument-too-coarse",
-                f"What instrument and tie leave open is more than a quarter of some values of {listed(coarse)}. "
+                f"What instrument and tie leave open is more than a quarter of some values of {', '.join(names)}. "
                 "They say more about the measurement than about the robot.",
             )
         )
-    return tuple(notices)
+    return (*notices, *said_of_streams(found))
 
 
 def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:

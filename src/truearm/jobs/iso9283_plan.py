@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 from truearm.compensation.programs.motion_program import LONGEST_WAIT
-from truearm.errors import InputError, refusals_of
+from truearm.errors import InputError, Words, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
     choice_argument,
@@ -16,25 +17,27 @@ from truearm.jobs.arguments import (
     folder_beside,
     folder_for,
     length_argument,
-    lengths_argument,
     numbers_argument,
     python_call,
     robot_argument,
 )
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, written_programs
+from truearm.jobs.tip import tip_argument
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
-from truearm.planning.iso9283.plan import VELOCITIES, performance_plan
+from truearm.planning.iso9283.plan import performance_plan
 from truearm.planning.iso9283.plan_file import PLAN, read_cube
 from truearm.planning.poses.iso9283 import PLANES
 from truearm.planning.poses.largest_cube import DIRECTIONS, Direction
 from truearm.results.iso9283_plan import PLAN_FILES, Iso9283Plan
 
-#: What the tip of a robot is called whose target is given by its place alone.
-TIP = "tip"
 #: Every criterion at once; the largest cube.
 ALL, AUTO = "all", "auto"
+#: Rated velocities of robots along a path [m/s]: another one is in another unit.
+_VELOCITIES: Final = (0.01, 20.0)
+#: No test is run at so little of the rated velocity or load: such a number is a share, 0 to 1.
+_LEAST_PERCENT: Final = 1.0
 #: Rated velocity along a path where none is stated [m/s].
 _ASSUMED_VELOCITY = 1.0
 
@@ -49,8 +52,8 @@ def iso9283_plan(
     tip: Sequence[float] | None = None,
     load: float | None = None,
     velocity: float | None = None,
-    velocities: Sequence[float] = VELOCITIES,
-    loads: Sequence[float] = (1.0,),
+    velocities: Sequence[float] = (100.0, 50.0, 10.0),
+    loads: Sequence[float] = (100.0,),
     limit_band: float = 0.1e-3,
     hours: float = 8.0,
     ahead: Direction = "+x",
@@ -71,7 +74,8 @@ def iso9283_plan(
     criteria
         Ids of criteria, in capitals or not (``ap``, ``rp``), or ``all``.
     cube
-        ``auto`` for the largest that the robot can be tested in, or a file with one (schema ``truearm-cube/1``).
+        ``auto`` for the largest that the robot can be tested in, by all criteria, or a file with one (schema
+        ``truearm-cube/1``).
     plane
         Which of the cube's diagonal planes: ``C1-C2-C7-C8``, ``C2-C3-C8-C5``, ``C3-C4-C5-C6`` or ``C4-C1-C6-C7``.
     target
@@ -83,7 +87,7 @@ def iso9283_plan(
     velocity
         Rated velocity of the tip along a path, that 100 % stands for [m/s]; None for 1 m/s.
     velocities, loads
-        Shares of them that are tested, 0 to 1.
+        What is tested, in percent of them, as in the files: 50, not 0.5. A load may be 0.
     limit_band
         Within which of the final pose the tip is said to stand [m].
     hours
@@ -113,10 +117,10 @@ def iso9283_plan(
     choice_argument(plane, "plane", dict.fromkeys(PLANES))
     choice_argument(ahead, "ahead", dict.fromkeys(DIRECTIONS))
     near, low = length_argument(nearest, "nearest"), length_argument(floor, "floor")
-    band = _positive(limit_band, "limit_band", "a length above 0 [m]")
-    watched = _positive(hours, "hours", "hours above 0")
-    shares = _shares(velocities, "velocities", above_zero=True)
-    carried = _shares(loads, "loads", above_zero=False)
+    band = _positive(limit_band, "limit_band", "the limit band is above 0", "a length above 0 [m]")
+    watched = _positive(hours, "hours", "the drift is watched for a time above 0", "hours above 0")
+    shares = _shares(velocities, "velocities", "velocity", may_be_zero=False)
+    carried = _shares(loads, "loads", "load", may_be_zero=True)
     given_cube = None if isinstance(cube, str) and cube == AUTO else path_argument(cube, "cube")
     language = None if program is None else choice_argument(program, "program", PROGRAM_LANGUAGES)
     stands = _dwell(dwell)
@@ -151,14 +155,7 @@ def iso9283_plan(
         slow_run=slow_run,
     )
     arm = robot_argument(robot)
-    if target is not None and tip is not None:
-        raise InputError(
-            "only one of them can be measured", parameter="target, tip", came=target, cure="Leave one out."
-        )
-    if target is not None:
-        choice_argument(target, "target", {known.name: known for known in arm.targets})
-    if tip is not None:
-        arm, target = arm.with_frames(arm.base, {TIP: lengths_argument(tip, "tip", 3)}), TIP
+    arm, target = tip_argument(arm, target, tip, "be measured")
     warnings: list[Notice] = []
     rated = _rated_load(arm, load, warnings)
     speed = _ASSUMED_VELOCITY
@@ -172,7 +169,7 @@ def iso9283_plan(
             )
         )
     else:
-        speed = _positive(velocity, "velocity", "a velocity above 0 [m/s]")
+        speed = _rated_velocity(velocity)
     with refusals_of("cube"):
         whole = None if given_cube is None else read_cube(given_cube)
     with refusals_of("cube" if whole is not None else "robot"):
@@ -216,7 +213,7 @@ def _tests(criteria: Sequence[str]) -> tuple[str, ...]:
 
 def _rated_load(arm: Robot, load: object, warnings: list[Notice]) -> float:
     if load is not None:
-        return _positive(load, "load", "a mass above 0 [kg]")
+        return _positive(load, "load", "the rated load is above 0", "a mass above 0 [kg]")
     if arm.rated_load is not None:
         return arm.rated_load
     raise InputError(
@@ -228,15 +225,30 @@ def _rated_load(arm: Robot, load: object, warnings: list[Notice]) -> float:
     )
 
 
-def _positive(value: object, parameter: str, allowed: str) -> float:
+def _rated_velocity(velocity: object) -> float:
+    speed = _positive(velocity, "velocity", "the rated velocity is above 0", "a velocity above 0 [m/s]")
+    least, most = _VELOCITIES
+    if not least <= speed <= most:
+        other = 1e3 if speed < least else 1e-3
+        raise InputError(
+            "no robot is rated for this velocity along a path",
+            parameter="velocity",
+            came=Words(f"{1e3 * speed:g} mm/s"),
+            allowed=f"{1e3 * least:g} to {1e3 * most:g} mm/s",
+            cure=f"Is it {1e3 * speed * other:g} mm/s? Check its unit." if least <= speed * other <= most else None,
+        )
+    return speed
+
+
+def _positive(value: object, parameter: str, what: str, allowed: str) -> float:
     (number,) = numbers_argument([value], parameter, 1, allowed)
     if number <= 0.0:
-        raise InputError("this is above 0", parameter=parameter, came=number, allowed=allowed)
+        raise InputError(what, parameter=parameter, came=Words(f"{number:g}"), allowed=allowed)
     return number
 
 
 def _dwell(value: object) -> float:
-    seconds = _positive(value, "dwell", f"a time above 0, up to {LONGEST_WAIT:g} s")
+    seconds = _positive(value, "dwell", "the robot stands for a time above 0", f"above 0, up to {LONGEST_WAIT:g} s")
     if seconds > LONGEST_WAIT:
         raise InputError(
             "controllers wait no longer at once",
@@ -247,11 +259,26 @@ def _dwell(value: object) -> float:
     return seconds
 
 
-def _shares(values: object, parameter: str, *, above_zero: bool) -> tuple[float, ...]:
+def _shares(values: object, parameter: str, rated: str, *, may_be_zero: bool) -> tuple[float, ...]:
+    """Return shares, 0 to 1, of percent of what is rated."""
+    allowed = f"percent of the rated {rated}, {'0, or ' * may_be_zero}above {_LEAST_PERCENT:g} up to 100, one or more"
     count = len(values) if isinstance(values, Sequence) else 1
-    shares = numbers_argument(values, parameter, count, "shares of the rated one, 0 to 1")
-    if not shares or not all(0.0 <= v <= 1.0 and (v > 0.0 or not above_zero) for v in shares):
-        raise InputError(
-            "these are shares of the rated one", parameter=parameter, came=list(shares), allowed="0 to 1, one or more"
-        )
-    return tuple(dict.fromkeys(shares))
+    percent = numbers_argument(values, parameter, count, allowed)
+    if not percent:
+        raise InputError(f"no {rated} is given", parameter=parameter, allowed=allowed)
+    for value in percent:
+        if may_be_zero and value == 0.0:
+            continue
+        if 0.0 < value <= _LEAST_PERCENT:
+            raise InputError(
+                "these are percent of the rated one, and this looks like a share",
+                parameter=parameter,
+                came=Words(f"{value:g} %"),
+                allowed=allowed,
+                cure=f"Give {100 * value:g}, not {value:g}.",
+            )
+        if not 0.0 < value <= 100.0:
+            raise InputError(
+                "these are percent of the rated one", parameter=parameter, came=Words(f"{value:g} %"), allowed=allowed
+            )
+    return tuple(dict.fromkeys(value / 100.0 for value in percent))

@@ -28,13 +28,17 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_vector, rotation_vector
+from truearm.modeling.wrench import STANDARD_GRAVITY
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_simulation import FILES, Iso9283Simulation, StatedTie
 from truearm.simulation.gear_errors import DRAWN
+from truearm.simulation.moving.stiffness import drawn_compliance
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
 from truearm.units import sized_si
-from truearm.validation.iso9283.simulated import ROBOTS, Corrected, TrueRobot, simulated_campaign
+from truearm.validation.iso9283.simulated import simulated_campaign
+from truearm.validation.iso9283.simulated_cell import Corrected, TrueRobot
+from truearm.validation.iso9283.simulated_poses import ROBOTS
 from truearm.validation.iso9283.simulated_readings import Tracker
 
 #: Readings in a second that an instrument can take.
@@ -46,6 +50,8 @@ _LOCATED: Final = 30
 #: A calibrated robot and the truth stand at one place within this [m], [rad]; else they are in frames of two
 #: instruments.
 _SAME_PLACE: Final = (20e-3, math.radians(1.0))
+#: Which numbers of a seed say how far joints give way.
+_PUSHED: Final = 1
 #: Arms are the same whose flanges are nearer than this [m].
 _SAME_ARM: Final = 1e-6
 
@@ -68,7 +74,8 @@ def iso9283_simulate(
 
     The controller believes in the nominal robot. The twin adds what a test of performance sees beside wrong geometry:
     joints that follow as damped springs, come to rest a little elsewhere each time and have some play, links that grow
-    while the arm warms up, and an arm that gives way to its load and to pushes. Readings are in the instrument's frame;
+    while the arm warms up, and an arm that gives way to its load and to pushes; where the truth knows of no compliance,
+    joints give way to pushes alone, by what is drawn. Readings are in the instrument's frame;
     how that is tied to the robot's base is written beside them, with an error drawn from its stated uncertainty.
 
     Parameters
@@ -142,7 +149,11 @@ def iso9283_simulate(
             calibrated = robot_argument(corrected, "corrected")
             _check_kinds(planned.robot, calibrated)
             correct = _correction(planned, calibrated, TrueRobot(twin, tip), base, tie, tracker, rng)
-    robots = [TrueRobot(twin, tip)]
+    lever = float(np.linalg.norm(planned.cube.centre))
+    weight = STANDARD_GRAVITY * (planned.rated_load or 1.0)
+    # Drawn by itself, so that the seed draws the rest as it does without it.
+    compliance = drawn_compliance(planned.robot, weight, lever, np.random.default_rng([seed, _PUSHED]))
+    robots = [TrueRobot(twin, tip, compliance)]
     if planned.test("E") is not None:
         robots += [TrueRobot(_another(nominal, twin, truth, rng), tip) for _ in range(ROBOTS - 1)]
     campaign = simulated_campaign(planned, robots, base, tracker, rng, corrected=correct, progress=progress)

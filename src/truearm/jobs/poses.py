@@ -22,6 +22,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.jobs.tip import tip_argument
 from truearm.limits import limit
 from truearm.measurement.readers.rows import QUATERNION_TOLERANCE
 from truearm.modeling.chain import Array
@@ -33,9 +34,6 @@ from truearm.planning.poses.largest_cube import DIRECTIONS, Direction, largest_c
 from truearm.planning.poses.pose_sets import POSE_SETS, pose_set
 from truearm.planning.poses.seven_lines import DOWN
 from truearm.results.pose_set import PlannedPoses, places
-
-#: What the tip of a robot is called whose target is given by its place alone.
-TIP = "tip"
 
 
 def poses(
@@ -123,16 +121,9 @@ def poses(
         joints=joints,
     )
     arm = robot_argument(robot)
-    if target is not None and tip is not None:
-        raise InputError(
-            "only one of them can go to the poses", parameter="target, tip", came=target, cure="Leave one out."
-        )
-    if target is not None:
-        choice_argument(target, "target", {known.name: known for known in arm.targets})
+    arm, target = tip_argument(arm, target, tip, "go to the poses")
     own = tip is None
-    if tip is not None:
-        arm, target = arm.with_frames(arm.base, {TIP: lengths_argument(tip, "tip", 3)}), TIP
-    elif not arm.targets:
+    if not arm.targets:
         arm = arm.with_frames(arm.base, {"flange": (0.0, 0.0, 0.0)})
     turned = _rotation(orientation)
     joints_are = joints_argument(joints, arm)

@@ -11,14 +11,18 @@ import numpy as np
 
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.planning.poses.iso9283 import DiagonalPlane
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
 from truearm.reporting.numbers import rounded_to
 from truearm.reporting.panels import Panel, panels
 from truearm.reporting.picture_page import Drawing
+from truearm.results.iso9283_table import conditions_summary
+from truearm.validation.iso9283.comparison import Comparison, key_of
 from truearm.validation.iso9283.compliance import PushLine
 from truearm.validation.iso9283.drift import DriftCourse
 from truearm.validation.iso9283.poses import PoseCloud
 from truearm.validation.iso9283.settling import SettlingCurve
+from truearm.validation.iso9283.values import Conditions
 
 #: Colours of things that are drawn together.
 HUES: Final = (*COLOURS, "#8a6d1d", "#5b3a8c", "#1d7f86", "#6b6f73")
@@ -26,6 +30,8 @@ INK: Final = "#2b2f33"
 SHADE: Final = "#e4e6e8"
 #: Arrows of errors are as long as this share of the cube's side.
 _ARROW: Final = 0.15
+#: Where the camera is before the plane of the cube, and aside.
+_FRONT, _ASIDE = 1.7, 1.2
 _MOST_SAMPLES: Final = 400
 _CIRCLE: Final = np.linspace(0.0, 2.0 * np.pi, 73)
 
@@ -50,7 +56,7 @@ def line(name: str, x: Array, y: Array, colour: str, width: float = 1.5, **more:
         "mode": "lines",
         "name": html.escape(name),
         "x": rounded_to(x, 4),
-        "y": rounded_to(y, 4),
+        "y": [value if math.isfinite(value) else None for value in rounded_to(y, 4)],  # a gap
         "line": {"color": colour, "width": width},
         "hoverinfo": "skip" if not name else "x+y+name",
         **more,
@@ -76,8 +82,15 @@ def pose_pictures(
     drift: Sequence[DriftCourse],
     settling: Sequence[SettlingCurve],
     pushes: Sequence[PushLine],
+    other: Comparison | None = None,
 ) -> list[Drawing]:
-    """Return the pictures of what was measured at poses."""
+    """Return the pictures of what was measured at poses.
+
+    Parameters
+    ----------
+    other
+        Another result, whose accuracy is drawn beside this one's.
+    """
     drawings: list[Drawing] = []
     accuracy = fastest([one for one in clouds if one.test == "AP"])
     # Of several robots the first: the picture is of one.
@@ -92,7 +105,7 @@ def pose_pictures(
                 _clouds(accuracy),
             )
         )
-        drawings.append(_accuracy(plan, accuracy, under))
+        drawings.append(_accuracy(plan, accuracy, under, other))
     for test, name, title, words, series in (
         (
             "vAP",
@@ -176,29 +189,45 @@ def _clouds(clouds: Sequence[PoseCloud]) -> Figure:
     return panels(drawn, len(clouds), 190)
 
 
-def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str) -> Drawing:
+def _offsets(clouds: Sequence[PoseCloud], other: Comparison | None) -> Array:
+    """Return how far the barycentres of another result are from their commands [m], NaN where it has none."""
+    found = np.full((len(clouds), 3), np.nan)
+    for row, cloud in enumerate(clouds) if other is not None else ():
+        under = conditions_summary(Conditions(cloud.velocity, cloud.load, cloud.robot))
+        offset = other.offsets.get(key_of(cloud.test, cloud.pose, under)) if other is not None else None
+        if offset is not None:
+            found[row] = 1e-3 * np.array(offset)
+    return found
+
+
+def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str, other: Comparison | None) -> Drawing:
     command = np.array([cloud.command for cloud in clouds])
     away = np.array([cloud.barycentre for cloud in clouds]) - command
+    beside = _offsets(clouds, other)
     length = np.linalg.norm(away, axis=1)
-    largest = float(length.max())
+    largest = float(np.nanmax(np.concatenate([length, np.linalg.norm(beside, axis=1)])))
     times = _times(_ARROW * plan.cube.side / largest) if largest > 0.0 else 1.0
     around = plan.cube.plane(plan.plane).points([1, -1, -1, 1, 1], [1, 1, -1, -1, 1]) * 1e3
     tips = (command + times * away) * 1e3
     feet = command * 1e3
-    gap = np.full((len(clouds), 1), np.nan)
+    gap = np.full((len(clouds), 3), np.nan)
+
+    def arrows(to: Array) -> Array:
+        return np.stack([feet, to, gap], axis=1).reshape(-1, 3)
+
     traces: list[Figure] = [
         _in_space("plane of the cube", around, "lines", line={"color": "#9aa0a6", "width": 3}),
         _in_space(
             "command",
             feet,
             "markers+text",
-            marker={"color": INK, "size": 4},
+            marker={"color": INK, "size": 3},
             text=[html.escape(cloud.pose) for cloud in clouds],
             textposition="top center",
         ),
         _in_space(
             f"to the barycentre, times {times:g}",
-            np.stack([np.c_[feet], np.c_[tips], np.repeat(gap, 3, axis=1)], axis=1).reshape(-1, 3),
+            arrows(tips),
             "lines",
             line={"color": COLOURS[0], "width": 5},
         ),
@@ -211,15 +240,26 @@ def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str) ->
             hovertemplate="AP %{customdata:.4f} mm<extra></extra>",
         ),
     ]
+    words = f"Where the poses are on average {under}, in the base frame; arrows are {times:g} times as long as AP."
+    if np.isfinite(beside).any():
+        before = arrows((command + times * beside) * 1e3)
+        traces.insert(2, _in_space("of the other result", before, "lines", line={"color": BEFORE, "width": 5}))
+        words += " The pale ones are those of the other result."
     scene = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
     drawn = figure(
         traces,
         520,
-        scene={**scene, "aspectmode": "data", "camera": CAMERA},
+        scene={**scene, "aspectmode": "data", "camera": _before(plan.cube.plane(plan.plane))},
         margin={"l": 0, "r": 0, "t": 40, "b": 0},
     )
-    words = f"Where the poses are on average {under}, in the base frame; arrows are {times:g} times as long as AP."
     return Drawing("accuracy", "Pose accuracy in the cube", words, drawn)
+
+
+def _before(plane: DiagonalPlane) -> Figure:
+    """Return a camera in front of a plane of the cube, a little aside and above, so that no label lies on an edge."""
+    normal = plane.normal if plane.normal[2] >= 0.0 else -plane.normal
+    eye = _FRONT * normal + _ASIDE * plane.along
+    return {**CAMERA, "eye": dict(zip("xyz", np.round(eye, 3).tolist(), strict=True))}
 
 
 def _times(most: float) -> float:

@@ -13,6 +13,8 @@ from truearm.reporting.iso9283_figures import HUES, INK, SHADE, line, thinned
 from truearm.reporting.numbers import rounded_to
 from truearm.reporting.panels import Panel, panels
 from truearm.reporting.picture_page import Drawing
+from truearm.results.iso9283_table import conditions_summary
+from truearm.validation.iso9283.comparison import Comparison, Course, key_of
 from truearm.validation.iso9283.corners import CornerCurves
 from truearm.validation.iso9283.evaluation import Evaluation
 from truearm.validation.iso9283.paths import PathDeviations
@@ -33,8 +35,14 @@ _BAND: Final = "#c3d5e3"
 _Curves = TypeVar("_Curves", PathDeviations, CornerCurves, VelocityCurves, WeaveCurves)
 
 
-def path_pictures(found: Evaluation) -> list[Drawing]:
-    """Return the pictures of what was measured along paths, those at the fastest velocity of each test."""
+def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Drawing]:
+    """Return the pictures of what was measured along paths, those at the fastest velocity of each test.
+
+    Parameters
+    ----------
+    other
+        Another result, whose deviations are drawn beside these.
+    """
     drawings: list[Drawing] = []
     for test, name, title in (
         ("AT", "paths", "Deviation along the paths"),
@@ -46,7 +54,10 @@ def path_pictures(found: Evaluation) -> list[Drawing]:
                 f"Distance from the command in planes at right angles to it, {_under(courses[0].run)}. "
                 "AT is the largest of the barycentre's; the band is its 95 % interval at each station for itself."
             )
-            drawings.append(Drawing(name, title, words, _deviations(courses)))
+            beside = [_course(one, other) for one in courses]
+            if any(beside):
+                words += " Dashed: the barycentre of the other result."
+            drawings.append(Drawing(name, title, words, _deviations(courses, beside)))
     corners = _fastest(found.corners)
     if corners:
         words = (
@@ -97,9 +108,16 @@ def _under(run: Run) -> str:
     return f"at {100 * (under.velocity or 0.0):g} % of the rated velocity and {100 * (under.load or 0.0):g} % load"
 
 
-def _deviations(courses: Sequence[PathDeviations]) -> Figure:
+def _course(course: PathDeviations, other: Comparison | None) -> Course | None:
+    """Return the same of another result, None where it has none."""
+    if other is None:
+        return None
+    return other.curves.get(key_of(course.run.test, course.path, conditions_summary(course.run.conditions)))
+
+
+def _deviations(courses: Sequence[PathDeviations], others: Sequence[Course | None]) -> Figure:
     drawn = []
-    for course in courses:
+    for course, other in zip(courses, others, strict=True):
         along = course.along * 1e3
         low = np.maximum(course.distance - course.half_width, 0.0) * 1e3
         high = (course.distance + course.half_width) * 1e3
@@ -110,6 +128,10 @@ def _deviations(courses: Sequence[PathDeviations]) -> Figure:
             line("barycentre", along, course.distance * 1e3, AFTER, 2.2),
         ]
         title = f"{html.escape(course.path)}: AT {np.nanmax(course.distance) * 1e3:.3f} mm"
+        if other is not None:
+            dashed = {"line": {"color": COLOURS[0], "width": 1.8, "dash": "dash"}}
+            traces.append(line("other result", np.array(other.along), np.array(other.distance), COLOURS[0]) | dashed)
+            title += f", other {np.nanmax(other.distance):.3f} mm"
         drawn.append(Panel(title, traces, "along the path [mm]", "distance [mm]"))
     return panels(drawn, 2 if len(drawn) > 1 else 1, 230)
 

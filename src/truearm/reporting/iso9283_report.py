@@ -29,7 +29,8 @@ _ANGLES: tuple[Component, ...] = ("a", "b", "c")
 def iso9283_report(found: Iso9283Evaluation) -> str:
     """Return the report: the criteria at their worst places, pictures, and every value."""
     measured = [value for value in found.values if value.status != "not-measured"]
-    tables = [Figures("Criteria at their worst places", HEADING, tuple(one.cells for one in worst_places(measured)))]
+    worst = tuple(tuple(map(_unbroken, one.cells)) for one in worst_places(found.values))
+    tables = [Figures("Criteria at their worst places", HEADING, worst, texts=(1, 4, 5))]
     if found.comparison is not None:
         tables.append(_compared(found.comparison))
     details: list[Figures] = []
@@ -55,13 +56,20 @@ def iso9283_report(found: Iso9283Evaluation) -> str:
         words,
         found.command,
         pictures=[
-            *pose_pictures(plan, evaluation.clouds, evaluation.drift, evaluation.settling, evaluation.pushes),
-            *path_pictures(evaluation),
+            *pose_pictures(
+                plan, evaluation.clouds, evaluation.drift, evaluation.settling, evaluation.pushes, found.comparison
+            ),
+            *path_pictures(evaluation, found.comparison),
         ],
         tables=tables,
         details=details,
         notices=found.warnings,
     )
+
+
+def _unbroken(cell: str) -> str:
+    """Return a cell that is broken behind commas alone, a no-break space in place of the others."""
+    return ", ".join(part.replace(" ", "\u00a0") for part in cell.split(", "))
 
 
 def _tables(name: str, values: Sequence[Value]) -> list[Figures]:

@@ -39,14 +39,17 @@ class Figures:
     title
         Above it.
     heading
-        Names of the columns; those after the first are numbers.
+        Names of the columns; those after the first are numbers, if they are not in `texts`.
     rows
         Its cells, row by row.
+    texts
+        Columns of words, from 0, whose cells go on in another line where there is no room.
     """
 
     title: str
     heading: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    texts: tuple[int, ...] = ()
 
 
 def picture_page(

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from truearm.modeling.chain import Array
 from truearm.notices import Notice
 from truearm.planning.iso9283.planned import PerformancePlan
-from truearm.results.iso9283_table import HEADING, UNITS, counted_criteria, worst_places
+from truearm.results.iso9283_table import HEADING, UNITS, conditions_summary, counted_criteria, worst_places
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted
 from truearm.validation.iso9283.comparison import Comparison
 from truearm.validation.iso9283.evaluation import Evaluation
-from truearm.validation.iso9283.values import Instrument, Value
+from truearm.validation.iso9283.values import Conditions, Instrument, Value
 from truearm.writing import output_folder, write_files
 
 RESULT: Final = "iso9283.json"
@@ -77,9 +78,34 @@ class Iso9283Evaluation(Record):
             },
             "rated": {"load_kg": self.plan.rated_load, "velocity_mm_s": self.plan.rated_velocity * 1e3},
             "criteria": [value_summary(value) for value in self.values],
+            **self._drawn(),
             **({} if self.comparison is None else {"comparison": self.comparison.summary()}),
             "warnings": notice_summaries(self.warnings),
         }
+
+    def _drawn(self) -> dict[str, Any]:
+        """Return what another result draws beside its own: deviations along paths, and barycentres from commands."""
+        curves = [
+            {
+                "id": course.run.test,
+                "where": course.path,
+                "conditions": conditions_summary(course.run.conditions),
+                "along_mm": _millimetres(course.along),
+                "distance_mm": _millimetres(course.distance),
+            }
+            for course in self.evaluation.deviations
+        ]
+        offsets = [
+            {
+                "id": cloud.test,
+                "where": cloud.pose,
+                "conditions": conditions_summary(Conditions(cloud.velocity, cloud.load, cloud.robot)),
+                "offset_mm": _millimetres(cloud.barycentre - cloud.command),
+            }
+            for cloud in self.evaluation.clouds
+            if cloud.test == "AP"
+        ]
+        return {**({"curves": curves} if curves else {}), **({"offsets": offsets} if offsets else {})}
 
     def lines(self) -> list[str]:
         """Return each criterion at its worst place, at the fastest velocity and at others; the rest is in the files."""
@@ -89,7 +115,7 @@ class Iso9283Evaluation(Record):
         criteria = len({value.id for value in measured})
         text = [f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {counted_criteria(criteria)}."]
         text.append(self.tied)
-        rows = [worst.cells for worst in worst_places(measured)]
+        rows = [worst.cells for worst in worst_places(self.values)]
         if rows:
             text.append(
                 "Each at its worst place and fastest velocity, with its 95 % interval or the range of its cycles."
@@ -130,6 +156,11 @@ class Iso9283Evaluation(Record):
         return tuple(out / name for name in contents)
 
 
+def _millimetres(metres: Array) -> list[float | None]:
+    """Return lengths as JSON holds them, None where there is none."""
+    return [round(1e3 * value, 6) if math.isfinite(value) else None for value in metres.tolist()]
+
+
 def value_summary(value: Value) -> dict[str, Any]:
     """Return a value as JSON holds it."""
     unit, per_si = UNITS[value.quantity]
@@ -137,13 +168,6 @@ def value_summary(value: Value) -> dict[str, Any]:
     def shown(number: float | None) -> float | None:
         return None if number is None or not math.isfinite(number) else number * per_si
 
-    conditions: dict[str, Any] = {}
-    if value.conditions.velocity is not None:
-        conditions["velocity_percent"] = round(100.0 * value.conditions.velocity, 6)
-    if value.conditions.load is not None:
-        conditions["load_percent"] = round(100.0 * value.conditions.load, 6)
-    if value.conditions.robot:
-        conditions["robot"] = value.conditions.robot
     least, largest = shown(value.least), shown(value.largest)
     return {
         "id": value.id,
@@ -153,7 +177,8 @@ def value_summary(value: Value) -> dict[str, Any]:
         "unit": unit,
         "interval_95": None if value.interval is None else [shown(end) for end in value.interval],
         "cycles": value.cycles,
-        "conditions": conditions,
+        "conditions": conditions_summary(value.conditions),
         "status": value.status,
         **({} if least is None else {"range": [least, largest]}),
+        **({} if value.bandwidth is None else {"bandwidth_hz": value.bandwidth}),
     }

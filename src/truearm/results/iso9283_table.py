@@ -53,11 +53,17 @@ class Worst:
         How many there are.
     others
         The worst at each other velocity.
+    missing
+        Other places at that velocity that have no value.
+    faster
+        A faster planned velocity at which there is no value; None if there is none.
     """
 
     value: Value
     places: int
     others: tuple[Value, ...]
+    missing: tuple[str, ...] = ()
+    faster: float | None = None
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -66,19 +72,25 @@ class Worst:
         where = value.where
         if self.places > 1 and where != _ALL_PLACES:
             where = f"{where}, worst of {self.places}"
+            if self.missing:
+                where += f" of {self.places + len(self.missing)}"
         besides = [f"{velocity_words(other.conditions)}: {number_words(other)}" for other in self.others]
         name = f"{value.id} {value.conditions.robot}".rstrip()
         load = value.conditions.load
         if load is not None and load < 1.0:
             where = f"{where}, load {100 * load:g} %"
-        status = "" if value.status == "measured" else value.status
+        status = [str(value.status)] if value.status != "measured" else []
+        if self.missing:
+            status.append(f"not-measured: {', '.join(self.missing)}")
+        if self.faster is not None:
+            status.append(f"not-measured: {100 * self.faster:g} %")
         return (
             name,
             where,
             f"{number_words(value)} {UNITS[value.quantity][0]}",
             beside_words(value),
             ", ".join(besides),
-            status,
+            "; ".join(status),
         )
 
 
@@ -86,15 +98,22 @@ def worst_places(values: Sequence[Value]) -> list[Worst]:
     """Return each criterion of position at its worst place; loads and robots apart, in the order of the standard."""
     groups: dict[tuple[str, float | None, str], dict[float, list[Value]]] = {}
     for value in values:
-        if value.component == "position" and math.isfinite(value.value):
+        if value.component == "position":
             under = value.conditions
             by_velocity = groups.setdefault((value.id, under.load, under.robot), {})
             by_velocity.setdefault(under.velocity or 0.0, []).append(value)
     found = []
     for by_velocity in groups.values():
-        fastest, *others = (by_velocity[velocity] for velocity in sorted(by_velocity, reverse=True))
+        planned = sorted(by_velocity, reverse=True)
+        there = {velocity: [one for one in by_velocity[velocity] if math.isfinite(one.value)] for velocity in planned}
+        measured = [velocity for velocity in planned if there[velocity]]
+        if not measured:
+            continue
+        fastest, *others = (there[velocity] for velocity in measured)
         places = len([value for value in fastest if value.where != _ALL_PLACES])
-        found.append(Worst(_worst(fastest), places, tuple(map(_worst, others))))
+        missing = [one.where for one in by_velocity[measured[0]] if math.isnan(one.value)]
+        faster = planned[0] if planned[0] != measured[0] else None
+        found.append(Worst(_worst(fastest), places, tuple(map(_worst, others)), tuple(missing), faster))
     return sorted(found, key=lambda one: CRITERIA.index(one.value.id))
 
 
@@ -131,6 +150,16 @@ def conditions_words(value: Value) -> str:
     if under.load is not None:
         parts.append(f"load {100 * under.load:g} %")
     return ", ".join([*parts, under.robot] if under.robot else parts)
+
+
+def conditions_summary(under: Conditions) -> dict[str, float | str]:
+    """Return conditions as JSON holds them."""
+    found: dict[str, float | str] = {}
+    if under.velocity is not None:
+        found["velocity_percent"] = round(100.0 * under.velocity, 6)
+    if under.load is not None:
+        found["load_percent"] = round(100.0 * under.load, 6)
+    return {**found, "robot": under.robot} if under.robot else found
 
 
 def test_name(value: Value) -> str:

@@ -12,6 +12,7 @@ from truearm.library import load_robot
 from truearm.modeling.parts import Payload
 from truearm.modeling.transform import IDENTITY, Transform, homogeneous
 from truearm.simulation.moving.arm import DRIVES, WARMING, MovingArm, last_moves
+from truearm.simulation.moving.stiffness import drawn_compliance
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
 
@@ -139,3 +140,42 @@ def test_a_truth_with_other_joints_is_refused(twin: Twin) -> None:
 def test_the_direction_of_the_last_move_is_kept_at_rest() -> None:
     joints = np.array([[0.0, 1.0], [0.0, 0.5], [0.2, 0.5], [0.2, 0.5], [0.1, 0.6]])
     np.testing.assert_array_equal(last_moves(joints), [[1, -1], [1, -1], [1, -1], [1, -1], [-1, 1]])
+
+
+SOFT = (2e-5, 3e-5, 4e-5, 2e-4, 2e-4, 3e-4)
+
+
+def test_a_rigid_truth_gives_way_to_pushes_alone() -> None:
+    rigid = MovingArm(ROBOT, None, truth_twin(ROBOT, "nominal", np.random.default_rng(0)), TIP, LOAD)
+    soft = replace(rigid, compliance=SOFT)
+    still = np.zeros_like(JOINTS)
+    np.testing.assert_array_equal(soft.at_rest(JOINTS, still, EVER), rigid.at_rest(JOINTS, still, EVER))
+    force = np.array([[0.0, 0.0, 20.0], [15.0, -5.0, 0.0]])
+    np.testing.assert_allclose(
+        rigid.at_rest(JOINTS, still, EVER, force), rigid.at_rest(JOINTS, still, EVER), atol=1e-12
+    )
+    moved = soft.at_rest(JOINTS, still, EVER, force) - rigid.at_rest(JOINTS, still, EVER)
+    # What the moments of the force turn the joints by, through the Jacobian of the tip.
+    J = ROBOT.with_frames(ROBOT.base, {"tip": TIP}).jacobian(JOINTS, frame="base", target="tip")[:, :3]
+    expected = np.einsum("nij,j,nkj,nk->ni", J, np.array(SOFT), J, force)
+    np.testing.assert_allclose(moved[:, :3, 3] @ soft.twin.robot.base.rotation, expected, rtol=0.02, atol=2e-6)
+
+
+def test_a_truth_that_gives_way_keeps_its_own_compliance(arm: MovingArm) -> None:
+    force = np.array([[0.0, 0.0, 20.0]])
+    still = np.zeros((1, 6))
+    other = replace(arm, compliance=SOFT)
+    first, second = (one.at_rest(JOINTS[:1], still, EVER[:1], force) for one in (arm, other))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_joints_give_way_as_those_of_real_robots_do() -> None:
+    drawn = np.array([drawn_compliance(ROBOT, 30.0, 0.6, np.random.default_rng(seed)) for seed in range(200)])
+    middle = np.exp(np.log(drawn).mean(axis=0))
+    np.testing.assert_allclose(middle[:3], 3e-4 / 18.0, rtol=0.1)
+    np.testing.assert_allclose(middle[3:], 1.2e-3 / 18.0, rtol=0.1)
+    assert drawn.min() > 3e-4 / 18.0 / 5
+    # The published ones lie in the same range (Nubiola, Table 2.7: 3e-5 and 1.3e-4, wrist 4e-4 to 6e-4).
+    assert drawn[:, :3].max() > 3e-5
+    katana = load_robot("katana450")
+    assert len(drawn_compliance(katana, 4.0, 0.3, np.random.default_rng(0))) == len(katana.joints)

@@ -10,8 +10,8 @@
     programs:
       programs/AP_10.mod: 8c1e...
 
-The operator fills in ``completed: yes``, who ran the programs, and when. Plan and programs are known by their hashes
-(SHA-256), so that a record is of this plan and these programs alone.
+The operator fills in ``completed: yes``, who ran the programs, and the day on which they did (2026-11-23). Plan and
+programs are known by their hashes (SHA-256), so that a record is of this plan and these programs alone.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import Final, Literal
 
 from pydantic import BaseModel
 
-from truearm.errors import InputError
+from truearm.errors import InputError, Words
 from truearm.files import read_yaml
 from truearm.manifest import hash_of
 from truearm.modeling.formats.entries import STRICT
@@ -40,7 +40,7 @@ class SlowRunFile(BaseModel):
     plan: str
     completed: Literal["yes", "no"]
     by: str
-    date: datetime.date | str
+    date: datetime.datetime | datetime.date | str
     programs: dict[str, str]
 
 
@@ -56,7 +56,7 @@ def slow_run_text(plan: str, programs: Mapping[str, str]) -> str:
     """
     lines = [
         "# Run every program below at its velocity from its first motion to its last, with nobody in reach of the",
-        "# robot. Then say so here: completed: yes, by: who, date: when.",
+        "# robot. Then say so here: completed: yes, by: who, date: the day, as 2026-11-23.",
         f"truearm: {_SCHEMA}",
         f"plan: {hash_of(plan.encode())}",
         "completed: no",
@@ -68,13 +68,23 @@ def slow_run_text(plan: str, programs: Mapping[str, str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def check_slow_run(path: Path, plan: str, programs: Mapping[str, str]) -> None:
+def check_slow_run(path: Path, plan: str, programs: Mapping[str, str], today: datetime.date) -> None:
     """Refuse a record that is not of a completed slow run of a plan and its programs.
+
+    Parameters
+    ----------
+    path
+        The record.
+    plan, programs
+        As for :func:`slow_run_text`.
+    today
+        A run of a later day is not done yet; a day more is allowed, as dates differ around the world.
 
     Raises
     ------
     InputError
-        If it is of another plan or of other programs, not completed, or does not say by whom and when.
+        If it is of another plan or of other programs, not completed, does not say by whom and when, or names a day
+        that is no date or still to come.
     """
     record = read_yaml(path, SlowRunFile)
     if record.plan != hash_of(plan.encode()):
@@ -109,3 +119,30 @@ def check_slow_run(path: Path, plan: str, programs: Mapping[str, str]) -> None:
                 where=f"{path}, {name}",
                 cure="Fill it in.",
             )
+    day = _day(record.date, f"{path}, date")
+    if day > today + datetime.timedelta(days=1):
+        raise InputError(
+            "the day of the slow run is still to come",
+            where=f"{path}, date",
+            came=Words(day.isoformat()),
+            allowed=f"{today.isoformat()}, or earlier",
+            cure="State the day on which the slow programs were run to their end.",
+        )
+
+
+def _day(date: datetime.datetime | datetime.date | str, where: str) -> datetime.date:
+    """Return the day that a record names."""
+    if isinstance(date, datetime.datetime):
+        return date.date()
+    if isinstance(date, datetime.date):
+        return date
+    try:
+        return datetime.date.fromisoformat(date.strip())
+    except ValueError:
+        raise InputError(
+            "the day of the slow run is no date",
+            where=where,
+            came=date,
+            allowed="year-month-day, such as 2026-11-23",
+            cure="State the day on which the slow programs were run to their end.",
+        ) from None

@@ -79,7 +79,7 @@ def read_csv(path: Path) -> Dataset:
     """
     text = read_text(path)
     header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
-    refuse_other_separators(text, f"{path}, line {header}")
+    refuse_other_separators(text, f"{path}, line {header}", ", or import it with `truearm import table`")
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
     setup = None
@@ -141,8 +141,16 @@ def read_csv(path: Path) -> Dataset:
     )
 
 
-def refuse_other_separators(text: str, where: str) -> None:
-    """Refuse a text whose header is not separated by commas; `where` names the header."""
+def refuse_other_separators(text: str, where: str, otherwise: str = "") -> None:
+    """Refuse a text whose header is not separated by commas.
+
+    Parameters
+    ----------
+    where
+        Names the header.
+    otherwise
+        What can be done besides saving it again, for the end of that sentence.
+    """
     heading = next(line for line in lines_of(text) if line.strip())
     seen = next((name for sign, name in _SEPARATORS.items() if sign in heading), None)
     if seen is None and "," not in heading and len(heading.split()) > 3:
@@ -153,7 +161,7 @@ def refuse_other_separators(text: str, where: str) -> None:
             where=where,
             came=seen,
             allowed="commas",
-            cure="Save the file with commas and decimal points, or import it with `truearm import table`.",
+            cure=f"Save the file with commas and decimal points{otherwise}.",
         )
 
 

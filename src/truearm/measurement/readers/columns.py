@@ -16,6 +16,8 @@ from truearm.modeling.formats.joint_columns import JOINT_COLUMN, joint_names
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
+#: So alike a name that is not known must be for another to be offered: "note" is no "pose".
+_ALIKE: Final = 0.6
 _JOINTS: Final = "joint_1 [deg] .. or axis_1 [deg] .."
 
 Columns = dict[str, tuple[int, str]]
@@ -71,7 +73,7 @@ def _found_columns(cells: Cells, shown: Mapping[str, str], units: Mapping[str, t
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
         fitting = (*ANGLE_UNITS, *LENGTH_UNITS) if more and JOINT_COLUMN.fullmatch(name) else units.get(name)
         if fitting is None and name not in shown:
-            near = nearest_names(name, shown, 1)
+            near = nearest_names(name, shown, 1, _ALIKE)
             raise InputError(
                 "the column is not known" if heading else "the column has no name",
                 where=where,

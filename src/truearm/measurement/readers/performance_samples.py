@@ -155,7 +155,7 @@ def _columns(headings: Sequence[str], header: str, place: Place) -> dict[str, tu
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
         if name not in known:
-            near = nearest_names(name, known, 1)
+            near = nearest_names(name, known, 1, 0.6)
             raise InputError(
                 "the column is not known" if heading else "the column has no name",
                 where=where,
@@ -252,7 +252,7 @@ def _check_labels(labels: dict[str, str], line: int, header: _Header) -> None:
     known = TESTS_OF[place]
     criterion = labels["criterion"]
     if criterion not in known:
-        near = nearest_names(criterion, known, 1)
+        near = nearest_names(criterion, known, 1, 0.6)
         cure = f"Did you mean {near[0]}?" if near else "Name the test for which it was measured."
         if criterion in TESTS_OF["pose" if place == "path" else "path"]:
             cure = f"Samples of {criterion} belong into the file of {'paths' if place == 'pose' else 'settling'}."

@@ -1,9 +1,9 @@
 """Plans of tests by ISO 9283: poses and paths in the cube, with the posture in which the arm reaches all of them.
 
 The standard tests in the largest cube of the workspace, on one of its diagonal planes (:mod:`.poses.iso9283`). Where
-the cube is left open, the largest one is shrunk until the arm comes to every pose and runs every path in one posture,
-with one orientation of the tip. The standard prints no orientation; the tip points down, ahead, or at right angles to
-the plane, whichever allows the largest cube.
+the cube is left open, the largest one is shrunk until the arm comes to every pose and runs every path of all tests in
+one posture, with one orientation of the tip, so that it does not depend on which of them are planned. The standard
+prints no orientation; the tip points down, ahead, or at right angles to the plane, whichever allows the largest cube.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def performance_plan(
     tests
         Keys of :data:`truearm.planning.iso9283.criteria.TESTS`.
     cube
-        In which the poses lie; None for the largest that the arm can be tested in.
+        In which the poses lie; None for the largest that the arm can be tested in, by all tests.
     plane
         Which of its diagonal planes.
     rotation
@@ -122,6 +122,12 @@ def performance_plan(
         tried = Cube(whole.centre, side)
         turned = [rotation] if rotation is not None else _orientations(tried.plane(plane), ahead)
         for R in turned:
+            # The cube is that of the robot: the same whichever tests are planned in it.
+            if find and set(tests) != set(TESTS):
+                layout = _Layout(robot, target, tried, plane, R, tuple(TESTS))
+                if not layout.reached():
+                    missed = layout.missed
+                    continue
             layout = _Layout(robot, target, tried, plane, R, tests)
             if layout.reached():
                 planned = tuple(_test(one, velocities, loads, layout) for one in tests)

@@ -31,7 +31,7 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 from pydantic import BaseModel, Field
 
-from truearm.errors import InputError, refusals_at
+from truearm.errors import InputError, Words, refusals_at
 from truearm.files import read_yaml
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.entries import STRICT, Name, NotNegative, Number, Positive, Quaternion, Triple
@@ -49,6 +49,8 @@ PLAN: Final = "plan.yaml"
 ROBOT: Final = "robot.yaml"
 #: How near the joint positions of a pose bring the tip to it [m], and [rad].
 _NEAR: Final = (0.1e-3, 1e-3)
+#: Sides of cubes in which robots are tested [m]: another one is in another unit.
+_SIDES: Final = (0.01, 20.0)
 #: What lies outside the cube by less is on its face [m].
 _ON_FACE: Final = 1e-6
 
@@ -283,7 +285,19 @@ def read_cube(path: Path) -> Cube:
     length = content.units.length
     centre = [sized_si(value, length, f"{path}, centre") for value in content.centre]
     with refusals_at(f"{path}, side"):
-        return Cube(centre, sized_si(content.side, length, f"{path}, side"))
+        side = sized_si(content.side, length, f"{path}, side")
+        least, most = _SIDES
+        if not least <= side <= most:
+            fitting = [unit for unit in ("mm", "m") if least <= sized_si(content.side, unit) <= most]
+            raise InputError(
+                "no robot is tested in a cube of this side",
+                came=Words(f"{content.side:g} {length}"),
+                allowed=f"{least * 1e3:g} mm to {most:g} m",
+                cure=f"Are these numbers in {fitting[0]}? Then state `units: {{length: {fitting[0]}}}`."
+                if fitting
+                else "Check the number and its unit.",
+            )
+        return Cube(centre, side)
 
 
 def _check_approaches(

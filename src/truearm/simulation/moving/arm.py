@@ -116,6 +116,9 @@ class MovingArm:
         What it carries.
     drives, warming
         What the truth does not say.
+    compliance
+        How far each joint gives way to a push [rad/(N m), m/N of a prismatic one], where the truth knows of no
+        compliance at all; empty for a rigid arm. Its own weight and its load do not bend such an arm.
     """
 
     nominal: Robot
@@ -125,6 +128,7 @@ class MovingArm:
     payload: Payload
     drives: Drives = DRIVES
     warming: Warming = WARMING
+    compliance: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         kinds = [[joint.kind for joint in robot.joints] for robot in (self.nominal, self.twin.robot)]
@@ -151,6 +155,15 @@ class MovingArm:
                 growth=truth.growth or self.warming.growth,
             )
         return replace(self.twin, robot=replace(placed, payload=self.payload, wrench=None), joints=joints)
+
+    @cached_property
+    def pushed(self) -> Twin:
+        """The twin that gives way to pushes."""
+        joints = self.true.joints
+        if not self.compliance or any(truth.compliance for truth in joints.values()):
+            return self.true
+        softer = {number: replace(joints[number], compliance=value) for number, value in enumerate(self.compliance, 1)}
+        return replace(self.true, joints=softer)
 
     def joints_for(self, frames: Array, near: Array) -> Array:
         """Return joint positions with which the nominal robot brings its tip to poses in its base frame.
@@ -200,11 +213,20 @@ class MovingArm:
         wrench = np.concatenate([force, np.zeros_like(force)], axis=1)
         base = self.twin.robot.base.rotation
         for _ in range(2):  # the lever is that of the arm as it has given way
-            at = self.true.frames(joints, approach=approach, temperature=warm, wrench=wrench)
+            at = self.pushed.frames(joints, approach=approach, temperature=warm, wrench=wrench)
             lever = (at[TIP][:, :3, 3] - at[_FLANGE][:, :3, 3]) @ base
             wrench = np.concatenate([force, np.cross(lever, force)], axis=1)
-        at = self.true.frames(joints, approach=approach, temperature=warm, wrench=wrench)
-        return np.asarray(at[TIP])
+        there = np.asarray(self.pushed.frames(joints, approach=approach, temperature=warm, wrench=wrench)[TIP])
+        if self.pushed is self.true:
+            return there
+        # From where the arm stands without giving way, by what the push alone does.
+        free, stands = (
+            twin.frames(joints, approach=approach, temperature=warm)[TIP] for twin in (self.pushed, self.true)
+        )
+        moved = stands.copy()
+        moved[:, :3, 3] += there[:, :3, 3] - free[:, :3, 3]
+        moved[:, :3, :3] = there[:, :3, :3] @ free[:, :3, :3].transpose(0, 2, 1) @ stands[:, :3, :3]
+        return np.asarray(moved)
 
     def in_motion(self, command: Array, step: float, time: Array, working: float) -> Motion:
         """Return where the tip is while the joints follow commands from rest.

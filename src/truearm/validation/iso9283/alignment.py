@@ -27,11 +27,12 @@ from typing import Final, Literal
 import numpy as np
 from pydantic import BaseModel
 
-from truearm.errors import InputError, refusals_at
+from truearm.errors import InputError, Words, refusals_at
 from truearm.files import read_yaml
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.entries import STRICT, Number, Triple
 from truearm.modeling.transform import Transform, rigid_motion
+from truearm.planning.poses.iso9283 import Cube
 from truearm.units import sized_si
 
 SCHEMA: Final = "truearm-alignment/1"
@@ -141,6 +142,53 @@ def read_alignment(path: Path) -> Alignment:
         sigma_rot = sized_si(content.sigma_rot, units.angle, deviation=True)
     qw, qx, qy, qz = (float(part) for part in q / length)
     return Alignment(content.kind, Transform((x, y, z), (qw, qx, qy, qz)), sigma, sigma_rot)
+
+
+def refuse_implausible(tie: Alignment, cube: Cube, measured: Array, where: str) -> None:
+    """Refuse a tie with which what was measured does not lie near the cube of the tests.
+
+    Parameters
+    ----------
+    cube
+        In which all poses and paths lie.
+    measured
+        Positions in the instrument's frame [m], ``(n, 3)``.
+    where
+        The file of the tie.
+
+    Raises
+    ------
+    InputError
+        If half of the positions lie farther from the cube's centre than its side. The message says which mistake would
+        explain it: another unit, or the pose of the base in the instrument's frame.
+    """
+    middle = np.median(measured, axis=0)
+
+    def away(place: Transform) -> float:
+        return float(np.abs(place.rotation @ middle + np.array(place.translation) - cube.centre).max())
+
+    given = tie.T_base_instrument
+    if not away(given) > cube.side:
+        return
+    x, y, z = given.translation
+    w, i, j, k = given.quaternion
+    cures = [
+        (Transform((f * x, f * y, f * z), given.quaternion), f"Is `position` in {unit}? Then say so in `units`.")
+        for f, unit in ((1e3, "m where the file says mm"), (1e-3, "mm where the file says m"))
+    ]
+    inverse = Transform.from_matrix(given.rotation.T, -given.rotation.T @ np.array(given.translation))
+    cures += [
+        (inverse, "Is this the base in the instrument's frame? The instrument's frame in the base frame belongs here."),
+        (Transform(given.translation, (k, w, i, j)), "Does `quaternion` begin with x? It begins with w: w, x, y, z."),
+    ]
+    fitting = [cure for place, cure in cures if away(place) <= cube.side / 2]
+    raise InputError(
+        "with this tie of the instrument to the base, what was measured lies far from the cube of the tests",
+        where=where,
+        came=Words(f"{away(given) * 1e3:.4g} mm from its centre"),
+        allowed=f"up to {cube.side * 1e3:.4g} mm",
+        cure=fitting[0] if fitting else "Check its numbers and units, and those of the files that were measured.",
+    )
 
 
 def best_fit(attained: Array, commanded: Array) -> Alignment:

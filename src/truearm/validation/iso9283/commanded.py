@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PlannedPath
@@ -16,45 +16,53 @@ from truearm.planning.iso9283.way import Way
 
 @dataclass(frozen=True, eq=False)
 class CommandedPath:
-    """A planned path by its arc length.
+    """A planned path by its arc length, going on before its begin and behind its end, and the feet of points on it.
 
     A weave is taken along the line in its middle.
 
     Attributes
     ----------
-    path
-        The plan.
-    vertices, starts
-        Ends of the sides [m], ``(k, 3)``, and the arc length at each [m], ``(k,)``. A circle has one side.
-    centre, radius
-        Of a circle [m]; the radius is 0 of others.
-    reoriented
-        Whether the orientation alternates on the way.
+    way
+        The path by the distance travelled.
     """
 
-    path: PlannedPath
-    vertices: Array
-    starts: Array
-    centre: Array
-    radius: float
-    reoriented: bool = False
+    way: Way
 
     @classmethod
     def of(cls, path: PlannedPath, *, reoriented: bool = False) -> Self:
         """Return the path of a plan, and whether the orientation alternates on it."""
-        if path.kind == "circle":
-            centre, first = path.points[0], path.points[1]
-            radius = float(np.linalg.norm(first - centre))
-            return cls(
-                path, np.stack([first, first]), np.array([0.0, 2 * math.pi * radius]), centre, radius, reoriented
-            )
-        steps = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
-        return cls(path, path.points, np.concatenate([[0.0], np.cumsum(steps)]), np.zeros(3), 0.0, reoriented)
+        return cls(Way(path, reoriented))
+
+    @property
+    def path(self) -> PlannedPath:
+        """The plan."""
+        return self.way.path
 
     @property
     def length(self) -> float:
         """From begin to end [m]."""
-        return float(self.starts[-1])
+        return self.way.length
+
+    @property
+    def starts(self) -> Array:
+        """Arc length at each end of a side [m], ``(k,)``. A circle has one side."""
+        return self.way.corners
+
+    @cached_property
+    def vertices(self) -> Array:
+        """Ends of the sides [m], ``(k, 3)``."""
+        return self.way.position(self.way.corners)
+
+    @cached_property
+    def centre(self) -> Array:
+        """Of a circle [m], ``(3,)``."""
+        return np.asarray(self.path.points[0])
+
+    @cached_property
+    def radius(self) -> float:
+        """Of a circle [m]; 0 of others."""
+        circle = self.path.kind == "circle"
+        return float(np.linalg.norm(self.path.points[1] - self.path.points[0])) if circle else 0.0
 
     @property
     def closed(self) -> bool:
@@ -68,39 +76,23 @@ class CommandedPath:
             return 2 * self.radius
         return float(np.linalg.norm(self.vertices[:, None] - self.vertices[None], axis=2).max())
 
-    def _axes(self) -> tuple[Array, Array]:
-        """Return unit vectors of a circle: to where it begins, and in the direction in which it begins."""
-        out = (self.vertices[0] - self.centre) / self.radius
-        return out, np.cross(self.path.normal, out)
-
-    def _side(self, along: Array) -> tuple[NDArray[np.intp], Array]:
-        last = len(self.starts) - 2
-        side: NDArray[np.intp] = np.clip(np.searchsorted(self.starts, along, side="right") - 1, 0, last)
-        ends = self.vertices[1:] - self.vertices[:-1]
-        return side, (ends / np.linalg.norm(ends, axis=1)[:, None])[side]
-
     def points(self, along: Array) -> Array:
-        """Return the points at arc lengths ``(n,)`` [m], ``(n, 3)``; straight on before the begin and after the end."""
+        """Return the points at arc lengths ``(n,)`` [m], ``(n, 3)``.
+
+        Before the begin and after the end it is straight on; round again on a circle.
+        """
         if self.radius:
-            out, onward = self._axes()
-            angle = along / self.radius
-            return np.asarray(
-                self.centre + self.radius * (np.outer(np.cos(angle), out) + np.outer(np.sin(angle), onward))
-            )
-        side, direction = self._side(along)
-        return np.asarray(self.vertices[side] + (along - self.starts[side])[:, None] * direction)
+            return self.way.position(along % self.length)
+        beyond = along - np.clip(along, 0.0, self.length)
+        return np.asarray(self.way.position(along) + beyond[:, None] * self.way.direction(along))
 
     def tangents(self, along: Array) -> Array:
         """Return unit vectors along the path at arc lengths ``(n,)``, ``(n, 3)``."""
-        if self.radius:
-            out, onward = self._axes()
-            angle = along / self.radius
-            return np.asarray(np.outer(np.cos(angle), onward) - np.outer(np.sin(angle), out))
-        return self._side(along)[1]
+        return self.way.direction(along % self.length if self.radius else along)
 
     def rotations(self, along: Array) -> Array:
         """Return the commanded orientations at arc lengths ``(n,)``, ``(n, 3, 3)``."""
-        return Way(self.path, self.reoriented).rotation(along)
+        return self.way.rotation(along)
 
     def feet(self, points: Array, near: Array, within: float) -> Array:
         """Return the arc length of the foot of each point ``(n, 3)`` on the path, ``(n,)`` [m].
@@ -113,7 +105,7 @@ class CommandedPath:
             So far from there at most [m].
         """
         if self.radius:
-            out, onward = self._axes()
+            out, onward = (self.vertices[0] - self.centre) / self.radius, self.way.direction(np.zeros(1))[0]
             away = points - self.centre
             turn = 2 * math.pi * self.radius
             found = self.radius * np.arctan2(away @ onward, away @ out)

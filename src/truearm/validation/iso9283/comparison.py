@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from truearm.errors import InputError
+from truearm.errors import InputError, Words
 from truearm.files import read_text
+from truearm.printable import shortened
 
 Verdict = Literal["smaller", "larger", "not told apart", "no interval"]
 
@@ -47,6 +48,29 @@ class Compared:
 
 
 @dataclass(frozen=True)
+class Course:
+    """How far the other result is from its command along a path.
+
+    Attributes
+    ----------
+    along, distance
+        Arc length and distance of the barycentre [mm]; NaN where there is none.
+    """
+
+    along: tuple[float, ...]
+    distance: tuple[float, ...]
+
+
+#: A criterion, where, and under what, by which curves of two results are found.
+Key = tuple[str, str, tuple[tuple[str, float | str], ...]]
+
+
+def key_of(id_: str, where: str, conditions: Mapping[str, float | str]) -> Key:
+    """Return the key of a curve, conditions as files have them."""
+    return id_, where, tuple(sorted(conditions.items()))
+
+
+@dataclass(frozen=True)
 class Comparison:
     """A result beside another one.
 
@@ -58,11 +82,16 @@ class Comparison:
         All values that both have.
     left_out
         Ids of criteria that were not compared, because the two were tied to the base in different ways.
+    curves, offsets
+        What is drawn of the other one: deviations along paths, and how far barycentres are from their commands [mm].
+        Empty where it was written by an older version, or is tied in another way.
     """
 
     other: str
     rows: tuple[Compared, ...]
     left_out: tuple[str, ...] = ()
+    curves: Mapping[Key, Course] = field(default_factory=dict)
+    offsets: Mapping[Key, tuple[float, ...]] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -86,6 +115,9 @@ class Comparison:
         return text
 
 
+_Length = Annotated[float, Field(allow_inf_nan=False)] | None
+
+
 class _Entry(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
     id: str
@@ -103,12 +135,31 @@ class _Tie(BaseModel):
     kind: str
 
 
+class _Curve(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+    id: str
+    where: str
+    conditions: dict[str, float | str]
+    along_mm: tuple[_Length, ...]
+    distance_mm: tuple[_Length, ...]
+
+
+class _Offset(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+    id: str
+    where: str
+    conditions: dict[str, float | str]
+    offset_mm: tuple[_Length, _Length, _Length]
+
+
 class _Result(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
     truearm: Literal["truearm-iso9283-result/1"]
     robot: str
     alignment: _Tie
     criteria: tuple[_Entry, ...]
+    curves: tuple[_Curve, ...] = ()
+    offsets: tuple[_Offset, ...] = ()
 
 
 #: Criteria whose values depend on how the instrument was tied to the base.
@@ -137,13 +188,7 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
     try:
         second = _Result.model_validate_json(text)
     except ValidationError as error:
-        fault = error.errors()[0]
-        raise InputError(
-            "this is no result of tests by ISO 9283",
-            where=f"{other}, {'.'.join(map(str, fault['loc']))}".rstrip(", "),
-            came=fault["msg"],
-            allowed="iso9283.json of an evaluation",
-        ) from error
+        raise _no_result(other, error.errors()[0]) from error
     first = _Result.model_validate_json(json.dumps(summary))
     if first.robot != second.robot:
         raise InputError(
@@ -171,7 +216,36 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
             where=str(other),
             cure="Evaluate the same criteria of both.",
         )
-    return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)))
+    curves = {
+        key_of(one.id, one.where, one.conditions): Course(_numbers(one.along_mm), _numbers(one.distance_mm))
+        for one in second.curves
+    }
+    offsets = {key_of(one.id, one.where, one.conditions): _numbers(one.offset_mm) for one in second.offsets}
+    drawn = (curves, offsets) if same_tie else ({}, {})
+    return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)), *drawn)
+
+
+def _numbers(lengths: Sequence[float | None]) -> tuple[float, ...]:
+    return tuple(math.nan if length is None else length for length in lengths)
+
+
+def _no_result(other: Path, fault: Any) -> InputError:
+    """Return the refusal of a file that is no result, in words of a person who gave another file."""
+    entry = ".".join(map(str, fault["loc"]))
+    if fault["type"] == "json_invalid":
+        came = "a text that is not JSON"
+    elif entry in ("", "truearm"):
+        kind = fault["input"] if entry and isinstance(fault["input"], str) else None
+        came = "JSON of something else" if kind is None else f"a file of the kind {shortened(kind, 60)}"
+    else:
+        came = f"a result {'without' if fault['type'] == 'missing' else 'with another kind of'} {entry}"
+    return InputError(
+        "this is no result of tests by ISO 9283",
+        where=str(other),
+        came=Words(came),
+        allowed="the file iso9283.json that an evaluation has written",
+        cure="Evaluate the other tests first, and give the iso9283.json of that folder.",
+    )
 
 
 def _shown(name: str, value: float | str) -> str:

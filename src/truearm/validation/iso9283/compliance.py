@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.performance.records import Pushes
@@ -26,6 +27,8 @@ GRAVITY: Final = 9.80665
 #: Forces may exceed the rated load's weight by rounding, as people round 98.07 N to 100 N.
 _ROUNDING: Final = 0.05
 _NOTHING: Final = math.nan
+#: Scatter gives a tip that moves against the force by no more than so many standard errors.
+_AGAINST: Final = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +45,8 @@ class PushLine:
         Along the force, from where the line is without force [m], ``(n,)``.
     slope
         [m/N].
+    line
+        Of each push in the file, ``(n,)``.
     """
 
     direction: str
@@ -49,6 +54,7 @@ class PushLine:
     force: Array
     displacement: Array
     slope: float
+    line: NDArray[np.intp]
 
 
 def evaluate_pushes(
@@ -62,7 +68,7 @@ def evaluate_pushes(
     ------
     InputError
         For forces above the weight of the rated load, a direction that the plan does not have, a test that it does not
-        have, and a cycle whose forces are all the same.
+        have, a cycle whose forces are all the same, and a tip that moves against the force.
     """
     test = plan.test("compliance")
     if test is None:
@@ -79,7 +85,7 @@ def evaluate_pushes(
         way = pushes.position @ (turn.T @ along)
         mine = pushes.direction.are(direction)
         found = [
-            _line(pushes, direction, int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle)), way)
+            _line(pushes, direction, int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle)), way, instrument.sigma)
             for cycle in np.unique(pushes.cycle[mine])
         ]
         slopes = np.array([line.slope for line in found])
@@ -110,7 +116,8 @@ def _spread(force: Array) -> float:
     return float(np.linalg.norm(force - force.mean()))
 
 
-def _line(pushes: Pushes, direction: str, cycle: int, rows: np.typing.NDArray[np.intp], way: Array) -> PushLine:
+def _line(pushes: Pushes, direction: str, cycle: int, rows: NDArray[np.intp], way: Array, sigma: float) -> PushLine:
+    rows = rows[np.lexsort((way[rows], pushes.force[rows]))]
     force = pushes.force[rows]
     if not _spread(force) > 1e-9 * max(float(force.max()), 1.0):
         raise InputError(
@@ -124,7 +131,15 @@ def _line(pushes: Pushes, direction: str, cycle: int, rows: np.typing.NDArray[np
     moved = way[rows]
     slope = float(about @ moved / (about @ about))
     rest = float(moved.mean() - slope * force.mean())
-    return PushLine(direction, cycle, force, moved - rest, slope)
+    scatter = max(float(np.std(moved - rest - slope * force)), sigma)
+    if slope < -_AGAINST * scatter / _spread(force):
+        raise InputError(
+            f"the tip moves against the force in cycle {cycle} of the direction {direction}",
+            where=f"{pushes.source}, line {int(pushes.line[rows].min())}",
+            came=f"{1e3 * slope:.4g} mm/N",
+            cure="Check the sign of the direction, and how the instrument was tied to the robot's base.",
+        )
+    return PushLine(direction, cycle, force, moved - rest, slope, pushes.line[rows])
 
 
 def _check(plan: PerformancePlan, pushes: Pushes, directions: tuple[str, ...]) -> None:

@@ -17,11 +17,22 @@ from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.runs import Run, runs_of
 from truearm.validation.iso9283.smoothing import local_lines
+from truearm.validation.iso9283.streams import spans_of
 from truearm.validation.iso9283.synchronise import Cycle
 from truearm.validation.iso9283.values import COARSE, Instrument, Value
 
 #: Up to this share of the side behind it the tip is said to come from the corner.
 _AFTER = 0.5
+#: Straight lines from sample to sample cut off less than a tenth of the least distance if samples are no further
+#: apart than so many times that distance: on an arc that touches both sides, and on no arc at all.
+_SPARSE = 1.2
+#: Less beyond a side is rounding [m].
+_NOTHING = 1e-9
+#: So many samples show how far the tip goes beyond a side.
+_LEAST_OUTSIDE = 4
+#: Beyond this share of that part of a side the tip keeps its line; so many steps on either side of the nearest tell how
+#: far samples are apart at the corner.
+_KEPT, _ABOUT = 0.8, 2
 #: Positions are straight lines through samples within this share of the least distance: on an arc that changes the
 #: distance by less than half a percent.
 _SMOOTHED = 0.2
@@ -46,6 +57,13 @@ class CornerCurves:
     rounding, overshoot, stabilisation
         CR, CO, and the length of path after the corner from which on the tip stays within the limit band of the line
         that it then keeps [m], ``(cycles,)``.
+    aside
+        From the commanded corner to that of the two lines that the tip keeps before and behind it [m],
+        ``(cycles, 3)``.
+    own
+        Least distance from that corner [m], ``(cycles,)``.
+    sparse
+        Whether samples are too far apart for CR, and for CO.
     """
 
     where: str
@@ -58,6 +76,37 @@ class CornerCurves:
     rounding: Array
     overshoot: Array
     stabilisation: Array
+    aside: Array
+    own: Array
+    sparse: tuple[bool, bool]
+
+    @property
+    def offset(self) -> float:
+        """Distance of the corner of the attained path from the commanded one, mean of the cycles [m]."""
+        return float(np.linalg.norm(self.aside, axis=1).mean())
+
+
+@dataclass(frozen=True, eq=False)
+class _Turn:
+    """A cycle near a corner: see :class:`CornerCurves`.
+
+    Attributes
+    ----------
+    spacing
+        Between the samples at the corner [m].
+    outside
+        So many samples in a row are beyond the side about the one that is furthest.
+    """
+
+    attained: Array
+    along: Array
+    rounding: float
+    overshoot: float
+    stabilisation: float
+    aside: Array
+    own: float
+    spacing: float
+    outside: int
 
 
 def corner_values(
@@ -73,8 +122,9 @@ def corner_values(
         for number in range(1, len(run.path.vertices) - 1):
             here = _corner(run, number, max(plan.limit_band, 3 * instrument.sigma))
             found.append(here)
-            for id_, lengths in (("CR", here.rounding), ("CO", here.overshoot)):
+            for id_, lengths, sparse in zip(("CR", "CO"), (here.rounding, here.overshoot), here.sparse, strict=True):
                 mean = float(lengths.mean())
+                coarse = instrument.sigma > COARSE * mean and (id_ == "CR" or mean > 0.0)
                 values.append(
                     Value(
                         id_,
@@ -85,7 +135,7 @@ def corner_values(
                         None,
                         len(lengths),
                         run.conditions,
-                        run.status(coarse=instrument.sigma > COARSE * mean and (id_ == "CR" or mean > 0.0)),
+                        run.status(coarse=sparse or coarse),
                         float(lengths.min()),
                         float(lengths.max()),
                     )
@@ -98,26 +148,31 @@ def _corner(run: Run, number: int, band: float) -> CornerCurves:
     at = float(path.starts[number])
     before, after = path.tangents(np.array([at - 1e-6, at + 1e-6]))
     reach = (_AFTER * (at - float(path.starts[number - 1])), _AFTER * (float(path.starts[number + 1]) - at))
-    rows = [_cycle(cycle, run, at, before, after, reach, band) for cycle in run.cycles]
-    attained, along, rounding, overshoot, stabilisation = zip(*rows, strict=True)
+    turns = [_cycle(cycle, run, at, before, after, reach, band) for cycle in run.cycles]
+    rounding, overshoot = (np.array([getattr(turn, name) for turn in turns]) for name in ("rounding", "overshoot"))
+    far = float(np.mean([turn.spacing for turn in turns])) > _SPARSE * float(rounding.mean())
+    highest = max(turns, key=lambda turn: turn.overshoot)
     return CornerCurves(
         f"{path.path.name} E{number + 1}",
         run,
         path.vertices[number],
         before,
         after,
-        attained,
-        along,
-        np.array(rounding),
-        np.array(overshoot),
-        np.array(stabilisation),
+        tuple(turn.attained for turn in turns),
+        tuple(turn.along for turn in turns),
+        rounding,
+        overshoot,
+        np.array([turn.stabilisation for turn in turns]),
+        np.array([turn.aside for turn in turns]),
+        np.array([turn.own for turn in turns]),
+        (far, highest.outside < _LEAST_OUTSIDE if highest.overshoot > _NOTHING else far),
     )
 
 
 def _cycle(
     cycle: Cycle, run: Run, at: float, before: Array, after: Array, reach: tuple[float, float], band: float
-) -> tuple[Array, Array, float, float, float]:
-    """Return positions and arc lengths near the corner, CR, CO and the length of stabilisation of a cycle."""
+) -> _Turn:
+    """Return a cycle near the corner."""
     near = np.flatnonzero((cycle.along > at - reach[0]) & (cycle.along < at + reach[1]))
     chosen = slice(int(near[0]), int(near[-1]) + 1)
     corner = run.path.points(np.array([at]))[0]
@@ -131,11 +186,33 @@ def _cycle(
     behind = (away @ after > 0) & (np.maximum.accumulate(along) > 0)
     aside = away - np.outer(away @ after, after)
     outside = behind & (aside @ before > 0)
-    overshoot = float(np.linalg.norm(aside[outside], axis=1).max(initial=0.0))
-    kept = np.median(aside[along > 0.8 * reach[1]], axis=0) if (along > 0.8 * reach[1]).any() else np.zeros(3)
+    beyond = np.where(outside, np.linalg.norm(aside, axis=1), 0.0)
+    overshoot = float(beyond.max(initial=0.0))
+    highest = [span for span in spans_of(beyond > 0.0) if span[0] <= int(beyond.argmax()) <= span[1]]
+    kept = _kept(aside[along > _KEPT * reach[1]])
+    kept_before = _kept((away - np.outer(away @ before, before))[along < -_KEPT * reach[0]])
     unsettled = np.flatnonzero(behind & (np.linalg.norm(aside - kept, axis=1) > band))
     stabilisation = float(away[unsettled[-1]] @ after) if len(unsettled) else 0.0
-    return smooth, along, rounding, overshoot, stabilisation
+    # where the two lines that the tip keeps come nearest to each other
+    lines = np.concatenate([np.eye(3) - np.outer(before, before), np.eye(3) - np.outer(after, after)])
+    own = np.linalg.lstsq(lines, np.concatenate([kept_before, kept]), rcond=None)[0]
+    steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    nearest = int(_distance(position, corner).argmin())
+    return _Turn(
+        smooth,
+        along,
+        rounding,
+        overshoot,
+        stabilisation,
+        own,
+        float(_distance(smooth, corner + own).min()),
+        max(float(np.median(steps[max(nearest - _ABOUT, 0) : nearest + _ABOUT + 1])), float(steps[nearest])),
+        highest[0][1] - highest[0][0] + 1 if highest else 0,
+    )
+
+
+def _kept(aside: Array) -> Array:
+    return np.asarray(np.median(aside, axis=0)) if len(aside) else np.zeros(3)
 
 
 def _distance(position: Array, corner: Array) -> Array:

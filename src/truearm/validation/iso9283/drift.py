@@ -7,7 +7,7 @@ robot warms up, each group has an AP and an RP, and dAP and dRP are the largest 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
@@ -65,11 +65,7 @@ def groups_of(one: Cycles) -> list[Cycles]:
     if len(between) and np.isfinite(between).all():
         begins = begins | (between > _PAUSE * max(float(np.median(between)), 1e-9))
     ends = [0, *(np.flatnonzero(begins) + 1).tolist(), len(one)]
-    made = []
-    for a, b in pairwise(ends):
-        angles = None if one.angles is None else one.angles[a:b]
-        made.append(replace(one, cycle=one.cycle[a:b], time=one.time[a:b], points=one.points[a:b], angles=angles))
-    return made
+    return [one.rows(slice(a, b)) for a, b in pairwise(ends)]
 
 
 def drift_values(
@@ -99,6 +95,8 @@ def drift_values(
             value, interval = _largest_change(course_of, scatter)
             tied = _changes_by_tie(groups, one.command, alignment) if id == "dAP" else None
             left = unknown
+            if id == "dAP" and interval is not None:
+                interval = interval[0], interval[1] + _raised(groups[0])
             if tied is not None:
                 left = math.hypot(unknown, float(np.std(tied)))
                 interval = None if interval is None else _widened(interval, value, tied)
@@ -132,6 +130,13 @@ def _course(one: Cycles, groups: list[Cycles]) -> DriftCourse:
 
 
 _Scatter = tuple[Array, Array] | None
+
+
+def _raised(first: Cycles) -> float:
+    """Return by how much scatter alone raises the AP of the first group [m], so that changes from it are too small."""
+    accuracy = float(np.linalg.norm(first.barycentre - first.command))
+    scatter = float(first.points.var(axis=0, ddof=1).sum()) / len(first)
+    return accuracy - math.sqrt(max(accuracy**2 - scatter, 0.0))
 
 
 def _largest_change(course: Array, scatter: _Scatter) -> tuple[float, Interval | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from truearm.validation.iso9283.alignment import Alignment
 from truearm.validation.iso9283.compliance import PushLine, evaluate_pushes
 from truearm.validation.iso9283.corners import CornerCurves, corner_values
 from truearm.validation.iso9283.drift import DriftCourse
+from truearm.validation.iso9283.missing import missing_places
 from truearm.validation.iso9283.paths import PathDeviations, path_values
 from truearm.validation.iso9283.pose_rows import best_fit_of
 from truearm.validation.iso9283.poses import PoseCloud, evaluate
@@ -24,6 +25,8 @@ from truearm.validation.iso9283.settling import SettlingCurve, settling_values
 from truearm.validation.iso9283.values import Conditions, Instrument, Quantity, Value
 from truearm.validation.iso9283.velocity import VelocityCurves, velocity_values
 from truearm.validation.iso9283.weaving import WeaveCurves, weaving_values
+from truearm.validation.iso9283.wild_pushes import WildPush, wild_pushes
+from truearm.validation.iso9283.wild_rows import UnusualRows
 
 #: What kind of number each criterion is; a length if it is not here.
 _QUANTITIES: dict[str, Quantity] = {
@@ -66,6 +69,12 @@ class Evaluation:
         How the instrument was tied to the robot's base.
     clouds, drift, deviations, corners, velocities, weaves, settling, pushes
         For pictures.
+    unusual
+        Rows of poses far from the others, and poses with two places of rest.
+    wild_pushes
+        Pushes far from the line of the others.
+    missing
+        Places that have no value in tests that were measured, in words.
     """
 
     values: tuple[Value, ...]
@@ -78,6 +87,9 @@ class Evaluation:
     weaves: tuple[WeaveCurves, ...] = ()
     settling: tuple[SettlingCurve, ...] = ()
     pushes: tuple[PushLine, ...] = ()
+    unusual: UnusualRows = field(default_factory=UnusualRows)
+    wild_pushes: tuple[WildPush, ...] = ()
+    missing: tuple[str, ...] = ()
 
 
 def evaluated(
@@ -118,6 +130,8 @@ def evaluated(
             )
         alignment = best_fit_of(plan, poses)
     values: list[Value] = []
+    unusual = UnusualRows()
+    missing: tuple[str, ...] = ()
     clouds: tuple[PoseCloud, ...] = ()
     drift: tuple[DriftCourse, ...] = ()
     pushes: tuple[PushLine, ...] = ()
@@ -133,6 +147,7 @@ def evaluated(
         of_poses = evaluate(plan, poses, alignment, instrument)
         values += of_poses.values
         clouds, drift = of_poses.clouds, of_poses.drift
+        unusual, missing = of_poses.unusual, of_poses.missing
     if paths is not None:
         tie = np.sqrt(np.diag(alignment.covariance_at(plan.cube.centre)))
         for test in ("AT", "AT-reorientation"):
@@ -157,6 +172,13 @@ def evaluated(
         progress(TESTS["compliance"].name)
         stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, instrument)
         values += stiff
+    absent = missing_places(plan, values)
+    values += [
+        Value(id_, "position", one.where, float("nan"), _quantity(id_), None, 0, one.conditions, "not-measured")
+        for one in absent
+        for id_ in TESTS[one.test].criteria
+        if not any((value.id, value.where, value.conditions) == (id_, one.where, one.conditions) for value in values)
+    ]
     there = {value.id for value in values}
     for planned in plan.tests:
         values += [_nothing(criterion, planned) for criterion in TESTS[planned.id].criteria if criterion not in there]
@@ -171,11 +193,19 @@ def evaluated(
         tuple(weaves),
         tuple(settling),
         pushes,
+        unusual,
+        wild_pushes(pushes, instrument),
+        (*missing, *dict.fromkeys(one.words for one in absent)),
     )
 
 
 def _nothing(criterion: str, test: PlannedTest) -> Value:
     """Return the value of a criterion that was planned and not measured."""
-    quantity = _QUANTITIES.get(criterion, "length")
     where = ", ".join(test.places)
-    return Value(criterion, "position", where, float("nan"), quantity, None, 0, Conditions(), "not-measured")
+    return Value(
+        criterion, "position", where, float("nan"), _quantity(criterion), None, 0, Conditions(), "not-measured"
+    )
+
+
+def _quantity(criterion: str) -> Quantity:
+    return _QUANTITIES.get(criterion, "length")

@@ -17,6 +17,7 @@ from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_vector
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.validation.iso9283.intervals import LEAST_CYCLES
 from truearm.validation.iso9283.runs import Run, runs_of
 from truearm.validation.iso9283.smoothing import local_lines
 from truearm.validation.iso9283.synchronise import Cycle
@@ -27,6 +28,10 @@ STATIONS = 50
 #: An intersection is the straight line through the samples so near to the plane, as a share of the way between two
 #: stations.
 _HALF = 0.5
+#: Between two samples at most so many stations may lie: deviations that change faster are not seen.
+_SPARSE = 2.0
+#: A cycle so many times as far from the middle of all as every other one is wild; so many times of fewer than so many.
+_WILD, _WILD_OF_FEW, _FEW = 4.0, 12.0, 8
 #: Simulated campaigns for an interval, and normal numbers for the mean and spread of distances.
 _TRIALS, _DRAWS = 400, 500
 _ANGLES: tuple[Component, ...] = ("a", "b", "c")
@@ -70,6 +75,13 @@ class PathDeviations:
     angles: Array | None
     pooled: float
 
+    @property
+    def sparse(self) -> bool:
+        """Whether samples are too far apart to show how the deviation changes along the path."""
+        length = self.run.path.length
+        steps = np.concatenate([np.abs(np.diff(_middle(cycle.along, length))) for cycle in self.run.cycles])
+        return not len(steps) or float(np.median(steps)) > _SPARSE * length / STATIONS
+
 
 def path_values(
     plan: PerformancePlan,
@@ -86,7 +98,8 @@ def path_values(
     What the interval of AT holds is the largest distance from the command of the path that the robot takes on average
     over very many cycles, and that of RT the largest mean plus three standard deviations of very many. A largest of
     noisy stations is too large, so both come from simulated campaigns with the covariance of the cycles along the path,
-    which say how much (parametric bootstrap of a basic kind, its spread corrected for the few cycles).
+    which say how much (parametric bootstrap of a basic kind, its spread corrected for the few cycles). Fewer than five
+    cycles have none.
 
     Parameters
     ----------
@@ -155,6 +168,35 @@ def deviations_of(run: Run, stations: int = STATIONS) -> PathDeviations:
     )
 
 
+def wild_cycle(here: PathDeviations) -> tuple[int, float, float, float] | None:
+    """Return a cycle that is elsewhere as a whole: which, how far [m], and AT and RT without it; None if none is.
+
+    It is four times as far from the middle of the cycles as every other one, root mean square over the stations; of
+    five to seven cycles twelve times. Fewer do not tell.
+    """
+    n = len(here.deviation)
+    if n < LEAST_CYCLES:
+        return None
+    away = here.deviation - np.median(here.deviation, axis=0)
+    far = np.sqrt((away**2).sum(axis=2).mean(axis=1))
+    order = np.argsort(far)
+    worst = int(order[-1])
+    if far[worst] <= (_WILD if n >= _FEW else _WILD_OF_FEW) * far[order[-2]]:
+        return None
+    rest = np.delete(here.deviation, worst, axis=0)
+    return (
+        worst,
+        float(far[worst]),
+        float(np.linalg.norm(rest.mean(axis=0), axis=1).max()),
+        float(_spread(rest).max()),
+    )
+
+
+def _middle(along: Array, length: float) -> Array:
+    """Return the arc lengths of samples that do not stand at an end of the path [m]."""
+    return along[(along > 0.05 * length) & (along < 0.95 * length)]
+
+
 def _spread(deviation: Array) -> Array:
     """Return mean distance to the barycentre plus three standard deviations of cycles ``(..., n, m, 3)``."""
     n = deviation.shape[-3]
@@ -198,10 +240,10 @@ def _position_values(
             here.path,
             accuracy,
             "length",
-            _accuracy_interval(here.deviation, tie, rng) if n > 1 else None,
+            _accuracy_interval(here.deviation, tie, rng) if n >= LEAST_CYCLES else None,
             n,
             run.conditions,
-            run.status(coarse=np.hypot(sigma / np.sqrt(n), known) > COARSE * accuracy),
+            run.status(coarse=here.sparse or np.hypot(sigma / np.sqrt(n), known) > COARSE * accuracy),
         )
     ]
     repeatability = float(here.spread.max())
@@ -212,10 +254,10 @@ def _position_values(
             here.path,
             repeatability,
             "length",
-            _repeatability_interval(here.deviation, repeatability, rng, factor=None) if n > 1 else None,
+            _repeatability_interval(here.deviation, repeatability, rng, factor=None) if n >= LEAST_CYCLES else None,
             n,
             run.conditions,
-            run.status(coarse=sigma > COARSE * repeatability) if n > 1 else "not-measured",
+            run.status(coarse=here.sparse or sigma > COARSE * repeatability) if n > 1 else "not-measured",
         )
     )
     return values
@@ -239,10 +281,10 @@ def _angle_values(
                 here.path,
                 accuracy,
                 "angle",
-                _accuracy_interval(angle, np.array([tie_rot]) if tie_rot else None, rng) if n > 1 else None,
+                _accuracy_interval(angle, np.array([tie_rot]) if tie_rot else None, rng) if n >= LEAST_CYCLES else None,
                 n,
                 run.conditions,
-                run.status(coarse=np.hypot(sigma / np.sqrt(n), tie_rot) > COARSE * accuracy),
+                run.status(coarse=here.sparse or np.hypot(sigma / np.sqrt(n), tie_rot) > COARSE * accuracy),
             )
         )
         spread = 3 * float(angle.std(axis=0, ddof=1).max()) if n > 1 else np.nan
@@ -253,10 +295,10 @@ def _angle_values(
                 here.path,
                 spread,
                 "angle",
-                _repeatability_interval(angle, spread, rng, factor=3.0) if n > 1 else None,
+                _repeatability_interval(angle, spread, rng, factor=3.0) if n >= LEAST_CYCLES else None,
                 n,
                 run.conditions,
-                run.status(coarse=sigma > COARSE * spread) if n > 1 else "not-measured",
+                run.status(coarse=here.sparse or sigma > COARSE * spread) if n > 1 else "not-measured",
             )
         )
     return values

@@ -12,14 +12,15 @@ nothing is subtracted. Intervals hold what would be found with infinitely many c
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from truearm.measurement.performance.records import AttainedPoses
 from truearm.modeling.chain import Array
+from truearm.planning.iso9283.criteria import TESTS
 from truearm.planning.iso9283.planned import PerformancePlan, PlannedTest
 from truearm.validation.iso9283.alignment import Alignment
 from truearm.validation.iso9283.drift import DriftCourse, drift_values
@@ -32,12 +33,12 @@ from truearm.validation.iso9283.intervals import (
     spread_interval,
 )
 from truearm.validation.iso9283.inverted_tests import largest_difference, norm_interval
+from truearm.validation.iso9283.missing import ROBOTS, missing_rows
 from truearm.validation.iso9283.pose_rows import Cycles, cycles_of
 from truearm.validation.iso9283.pose_values import ANGLES, AXES, valued
 from truearm.validation.iso9283.values import Component, Conditions, Instrument, Value
+from truearm.validation.iso9283.wild_rows import UnusualRows, WildRow, unusual_rows, without
 
-#: Robots that are exchanged.
-ROBOTS: Final = 5
 _NOTHING: Final = math.nan
 _LENGTHS: Final[tuple[Component, ...]] = ("position", *AXES)
 
@@ -82,11 +83,17 @@ class PoseEvaluation:
         Of all tests but drift.
     drift
         AP and RP over time.
+    unusual
+        Rows far from the others, and poses with two places of rest.
+    missing
+        Places of tests that were measured, and have no row themselves.
     """
 
     values: tuple[Value, ...]
     clouds: tuple[PoseCloud, ...]
     drift: tuple[DriftCourse, ...]
+    unusual: UnusualRows
+    missing: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,18 +127,53 @@ def evaluate(
     """
     cycles = cycles_of(plan, readings, alignment)
     judge = _Judge(alignment, instrument)
+    values, courses = _evaluated(plan.tests, cycles, judge)
+    unusual = unusual_rows(cycles, instrument)
+    if unusual.wild:
+        tests = {one.of.test for one in unusual.wild}
+        left = without(cycles, unusual.wild)
+        others, _ = _evaluated([test for test in plan.tests if test.id in tests], left, judge)
+        unusual = replace(
+            unusual, wild=tuple(replace(one, changes=_changes(one, values, others)) for one in unusual.wild)
+        )
+    clouds = tuple(_cloud(one) for one in cycles if one.test != "dAP")
+    return PoseEvaluation(tuple(values), clouds, tuple(courses), unusual, missing_rows(plan, cycles))
+
+
+def _evaluated(
+    tests: Iterable[PlannedTest], cycles: Sequence[Cycles], judge: _Judge
+) -> tuple[list[Value], list[DriftCourse]]:
     values: list[Value] = []
     courses: list[DriftCourse] = []
-    for test in plan.tests:
+    for test in tests:
         mine = [one for one in cycles if one.test == test.id]
         if test.id == "dAP":
-            made, found = drift_values(test, mine, instrument, alignment)
+            made, found = drift_values(test, mine, judge.instrument, judge.alignment)
             values += made
             courses += found
         elif test.id in _EVALUATED:
             values += _EVALUATED[test.id](test, mine, judge)
-    clouds = tuple(_cloud(one) for one in cycles if one.test != "dAP")
-    return PoseEvaluation(tuple(values), clouds, tuple(courses))
+    return values, courses
+
+
+def _changes(row: WildRow, values: Sequence[Value], others: Sequence[Value]) -> tuple[tuple[Value, Value], ...]:
+    """Return the values that a row is in, each with the same without it."""
+    of = row.of
+    under = Conditions(of.velocity, of.load, "" if of.test == "E" else of.robot)
+    parts = ("position",) if row.kind == "position" else ANGLES
+    mine = [
+        value
+        for value in values
+        if value.id in TESTS[of.test].criteria
+        and value.component in parts
+        and of.pose in value.where.split("-")
+        and value.conditions == under
+        and math.isfinite(value.value)
+    ]
+    key = {(v.id, v.component, v.where, v.conditions): v for v in others}
+    pairs = [(v, key.get((v.id, v.component, v.where, v.conditions))) for v in mine]
+    found = [(one, other) for one, other in pairs if other is not None]
+    return tuple(sorted(found, key=lambda pair: -abs(pair[0].value - pair[1].value)))
 
 
 def _cloud(one: Cycles) -> PoseCloud:
@@ -151,11 +193,9 @@ def _cloud(one: Cycles) -> PoseCloud:
 
 
 def _conditions(test: PlannedTest, cycles: list[Cycles], *, robots: bool = True) -> list[Conditions]:
-    """Return the conditions that were planned, and others that were measured."""
+    """Return the conditions that were planned, of each robot that was measured."""
     names = list(dict.fromkeys(one.robot for one in cycles)) if robots else [""]
-    planned = [Conditions(v, load, name) for name in names or [""] for v in test.velocities for load in test.loads]
-    seen = [Conditions(one.velocity, one.load, one.robot if robots else "") for one in cycles]
-    return planned + [one for one in dict.fromkeys(seen) if not any(_same(one, other) for other in planned)]
+    return [Conditions(v, load, name) for name in names or [""] for v in test.velocities for load in test.loads]
 
 
 def _same(one: Conditions, other: Conditions) -> bool:

@@ -13,10 +13,14 @@ from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.commanded import CommandedPath
+from truearm.validation.iso9283.orientation_check import refuse_far_orientations
 from truearm.validation.iso9283.streams import FoundStream, found_in
-from truearm.validation.iso9283.synchronise import Cycle, along_path
+from truearm.validation.iso9283.synchronise import Cycle, along_path, refuse_other_times
 from truearm.validation.iso9283.values import Conditions, Status
+from truearm.validation.iso9283.wild_samples import refuse_wild, wild_steps
 
+#: Further from its command than this no orientation is on the way, where the servo lags behind [rad].
+_FAR_TURNED = np.radians(30.0)
 #: Fewer samples than this are no cycle.
 LEAST_SAMPLES = 20
 
@@ -112,7 +116,7 @@ def parts_of(samples: Samples, test: str, known: tuple[str, ...]) -> Iterator[Pa
     for _, part in sorted(zip((int(part[0]) for part in parts), parts, strict=True), key=lambda both: both[0]):
         place = samples.place.names[int(samples.place.code[part[0]])]
         if place not in known:
-            near = nearest_names(place, known, 1)
+            near = nearest_names(place, known, 1, 0.6)
             raise InputError(
                 f"the plan has no such place for {test}",
                 where=f"{samples.source}, line {samples.line[part[0]]}",
@@ -165,9 +169,20 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                     cure="Sample faster, or leave the cycle out.",
                 )
             position = in_base(transform, samples.position[rows])
+            wild = wild_steps(samples.time[rows], position, velocity)
+            if wild.single:
+                refuse_wild(samples, rows, position, wild, number)
             here = found_in(test, path, samples.time[rows], position, velocity)
             spans = here.cycles
             if number:
+                if len(spans) > 1:
+                    raise InputError(
+                        f"cycle {number} of {part.place} runs the path {len(spans)} times",
+                        where=where,
+                        came=f"{len(spans)} cycles under one number",
+                        allowed="one run of the path",
+                        cure="Number the cycles, or leave the cells of the column cycle empty: then they are found.",
+                    )
                 spans = spans if len(spans) == 1 else ((0, len(rows) - 1),)
             else:
                 found = here
@@ -185,6 +200,12 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                 place = f"{samples.source}, lines {samples.line[chosen[0]]} to {samples.line[chosen[-1]]}"
                 rotation = None if samples.rotation is None else transform[:3, :3] @ samples.rotation[chosen]
                 along = along_path(path, position[first : last + 1], place)
+                refuse_other_times(path, samples.time[chosen], along, velocity, place)
+                if rotation is not None:
+                    commanded = path.rotations(along)
+                    refuse_far_orientations(
+                        rotation, commanded, transform[:3, :3], samples.line[chosen], samples.source, _FAR_TURNED
+                    )
                 cycles.append(
                     Cycle(
                         number or count,
@@ -192,7 +213,8 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                         position[first : last + 1],
                         rotation,
                         along,
-                        int(samples.line[chosen[0]]),
+                        samples.line[chosen],
                     )
                 )
+            refuse_wild(samples, rows, position, wild, number)
         yield Run(test, path, velocity, part.conditions, tuple(cycles), planned.cycles, found)

@@ -19,14 +19,30 @@ from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.runs import LEAST_SAMPLES, Part, in_base, parts_of
 from truearm.validation.iso9283.smoothing import local_lines
+from truearm.validation.iso9283.streams import noise_of, spans_of
 from truearm.validation.iso9283.values import COARSE, Conditions, Instrument, Status, Value
+from truearm.validation.iso9283.wild_samples import refuse_wild, wild_steps
 
 #: The final pose is the mean of this last share of the samples.
 _FINAL = 0.1
-#: Share of the band that noise may have, and of the time over which it is taken away, where the final stay is read.
+#: Share of the band that noise may have where the final stay is read.
 _QUIET = 0.02
 #: Samples outside the band that show how far an overshoot goes.
 _LEAST_OUTSIDE = 4
+#: Samples that a period of the oscillation has, and the time from the first entry to the final stay, or more.
+_LEAST_SAMPLES = 8
+#: How far an overshoot goes is read from a parabola through the samples within this share of its width at half its
+#: height, a third of a period.
+_TOP = 1 / 6
+#: The begin of a motion is read between these distances, in shares of the band and of the way, and as many standard
+#: deviations of the noise: powers of the time that it may grow with.
+_EARLY, _LATE, _OF_WAY, _ABOVE_NOISE = 0.25, 4.0, 0.15, 5.0
+_POWERS, _LEAST_ROWS = tuple(np.arange(1.75, 3.3, 0.25)), 6
+#: After it stood in the band so long [s] the tip goes no further than so many bands: no oscillation of a robot is so
+#: slow.
+_STOOD, _AGAIN = 0.2, 5.0
+#: No tip is faster, and none that goes further than a millimetre is slower at its fastest [m/s]: times of other units.
+_FASTEST, _SLOWEST, _FAR = 20.0, 2e-3, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +66,13 @@ class SettlingCurve:
     travelled
         From the first to the final pose [m].
     coarse
-        Whether samples come too slowly for the time, and for the overshoot.
+        Whether the instrument does not show the time, and the overshoot.
+    sparse
+        Whether that is because samples are too far apart.
+    position
+        In the base frame [m], ``(n, 3)``.
+    lines
+        Of the samples in the file, ``(n,)``.
     """
 
     test: str
@@ -66,6 +88,9 @@ class SettlingCurve:
     overshoot: float
     travelled: float
     coarse: tuple[bool, bool]
+    sparse: tuple[bool, bool]
+    position: Array
+    lines: NDArray[np.intp]
 
 
 def settling_values(
@@ -149,6 +174,8 @@ def _cycle(
         )
     time = samples.time[rows] - samples.time[rows[0]]
     position = in_base(transform, samples.position[rows])
+    _refuse_other_times(time, position, at)
+    refuse_wild(samples, rows, position, wild_steps(time, position, None), number)
     band = plan.limit_band
     distance = np.asarray(np.linalg.norm(position - _final(position), axis=1))
     outside = _outside(distance, band, sigma)
@@ -173,25 +200,34 @@ def _cycle(
     entered = int(np.flatnonzero(passing[:, 0] <= 1.0)[0])
     entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
     stay = entry
-    if outside[entered + 1 :].any():
-        stay = _stay(time, position, band, sigma, 0.0)
-        stay = max(_stay(time, position, band, sigma, _window(time, stay - entry, sigma, band)), entry)
     later = distance[entered + 1 :]
-    settles = stay <= entry
-    overshoot = 0.0 if settles else float(later.max())
+    _refuse_away_again(time, distance, band, at, samples.line[rows])
+    overshoot, width, open_ = 0.0, np.inf, 0.0
     step = float(np.median(np.diff(time)))
+    if outside[entered + 1 :].any():
+        overshoot, width = _top(time, position - _final(position), entered + 1 + int(later.argmax()))
+        window = _window(step, 2 * _TOP * width, sigma, band)
+        left = sigma * np.sqrt(step / max(window, step))
+        narrow, stay, wide = (_stay(time, position, band + off, sigma, window) for off in (-2 * left, 0.0, 2 * left))
+        stay, open_ = max(stay, entry), narrow - wide
+    settles = stay <= entry
+    overshoot = 0.0 if settles else overshoot
     speed = (distance[entered] - distance[entered + 1]) / (time[entered + 1] - time[entered])
     start = _start(time, position, band)
     settled = stay - entry
     posing = stay - start
     if test == "posing-time":
-        coarse = (step > COARSE * posing, False)
+        coarse = sparse = (step > COARSE * posing, False)
     else:
         crossing = 2 * band / max(float(speed), 1e-12)
-        slow = step > COARSE * (crossing if settles else settled)
+        slow = step > COARSE * crossing if settles else _LEAST_SAMPLES * step > min(settled, 3 * width)
+        there = slice(entered, int(np.searchsorted(time, stay)) + 1)
+        slow |= float(np.diff(time[there]).max(initial=0.0)) > COARSE * max(settled, crossing)
         few = not settles and _excursion(passing, entered + 1 + int(later.argmax())) < _LEAST_OUTSIDE
         blurred = not settles and overshoot - band < 3 * sigma
-        coarse = (slow, slow or few or blurred)
+        # noise may put an excursion inside the band, or outside of it
+        sparse = (slow, slow or few)
+        coarse = (slow or open_ > COARSE * settled, slow or few or blurred)
     where = part.place
     if test == "posing-time":
         planned = plan.test(test)
@@ -211,7 +247,61 @@ def _cycle(
         overshoot,
         float(np.linalg.norm(position[-last:].mean(axis=0) - position[:5].mean(axis=0))),
         coarse,
+        sparse,
+        position,
+        samples.line[rows],
     )
+
+
+def _refuse_other_times(time: Array, position: Array, where: str) -> None:
+    over = max(len(time) // 200, 1)
+    size = np.linalg.norm(position[over:] - position[:-over], axis=1)
+    pace = float(np.quantile(size / (time[over:] - time[:-over]), 0.995))
+    way = float(np.linalg.norm(position[-5:].mean(axis=0) - position[:5].mean(axis=0)))
+    if pace > _FASTEST or (pace < _SLOWEST and way > _FAR):
+        raise InputError(
+            f"the tip would move {'faster than any' if pace > _FASTEST else 'more slowly than any'} robot's",
+            where=where,
+            came=f"{1e3 * pace:.4g} mm/s at its fastest",
+            allowed=f"{1e3 * _SLOWEST:g} to {1e3 * _FASTEST:g} mm/s",
+            cure="Write the times in seconds.",
+        )
+
+
+def _refuse_away_again(time: Array, distance: Array, band: float, where: str, lines: NDArray[np.intp]) -> None:
+    stood = [last for first, last in spans_of(distance <= band) if time[last] - time[first] > _STOOD]
+    if not stood or distance[stood[0] :].max() <= _AGAIN * band:
+        return
+    again = stood[0] + int(distance[stood[0] :].argmax())
+    raise InputError(
+        "the tip goes away again after it came to rest",
+        where=f"{where}, about line {lines[again]}",
+        came=f"{1e3 * distance[again]:.4g} mm from where it ends, after it stood within the limit band",
+        allowed="one way to the pose in each cycle",
+        cure="Give each way a number of its own in the column cycle; remove samples that the instrument read wrongly.",
+    )
+
+
+def _top(time: Array, away: Array, peak: int) -> tuple[float, float]:
+    """Return how far an overshoot goes [m], and its width at half its height [s].
+
+    From a parabola through the samples about the largest: noise makes the largest of many too large, and the top may
+    lie between two samples.
+    """
+    along = away @ (away[peak] / np.linalg.norm(away[peak]))
+    half = 0.5 * along[peak]
+    first = int(np.flatnonzero(np.append(True, along[:peak] < half))[-1])
+    below = np.flatnonzero(along[peak:] < half)
+    last = peak + int(below[0]) if len(below) else len(along) - 1
+    first = max(first - 1, 0)
+    width = float(time[last] - time[first] - 0.5 * (time[last] - time[last - 1] + time[first + 1] - time[first]))
+    near = np.flatnonzero(np.abs(time - time[peak]) <= _TOP * width)
+    near = near if len(near) >= 3 else np.arange(max(peak - 1, 0), min(peak + 2, len(time)))
+    t = (time[near] - time[peak]) / max(float(np.abs(time[near] - time[peak]).max()), 1e-12)
+    a, b, c = np.polyfit(t, along[near], 2)
+    if a >= 0 or abs(b) > -2 * a:
+        return float(along[near].mean() if len(near) > 3 else along[peak]), width
+    return float(c - b * b / (4 * a)), width
 
 
 def _final(position: Array) -> Array:
@@ -244,14 +334,13 @@ def _excursion(passing: Array, peak: int) -> int:
     return (peak + int(after[0]) if len(after) else len(met)) - first + 1
 
 
-def _window(time: Array, settling: float, sigma: float, band: float) -> float:
+def _window(step: float, longest: float, sigma: float, band: float) -> float:
     """Return the window over which positions are smoothed before the final stay is read [s], 0 for none.
 
     Noise makes the tip leave the band later than it does. The window brings it to a fiftieth of the band, and takes a
-    fiftieth of the time at most, so that an oscillation stays as it is.
+    ninth of a period at most: that leaves 98 % of an oscillation.
     """
-    step = float(np.median(np.diff(time)))
-    window = min(step * (sigma / (_QUIET * band)) ** 2, _QUIET * settling)
+    window = min(step * (sigma / (_QUIET * band)) ** 2, longest)
     return window if window >= 3 * step else 0.0
 
 
@@ -266,7 +355,8 @@ def _stay(time: Array, position: Array, band: float, sigma: float, window: float
     """Return when the band is entered for good [s]."""
     smooth = local_lines(time, position, time, window / 2)[0] if window else position
     distance = np.linalg.norm(smooth - _final(position), axis=1)
-    return _crossing(time, distance, band, int(np.flatnonzero(_outside(distance, band, sigma))[-1]) + 1)
+    last = int(np.flatnonzero(_outside(distance, band, sigma))[-1])
+    return _crossing(time, distance, band, last + 1) if last + 1 < len(time) else float(time[-1])
 
 
 def _crossing(time: Array, distance: Array, band: float, first: int) -> float:
@@ -278,20 +368,31 @@ def _crossing(time: Array, distance: Array, band: float, first: int) -> float:
 def _start(time: Array, position: Array, band: float) -> float:
     """Return when the motion begins.
 
-    The tip leaves a band round where it stood, and one four times as wide. With a constant acceleration it does so
-    after times of which the second is twice the first, so that the begin lies as long before the first as that before
-    the second.
+    A tip moves off with a power of the time since then: the square with a constant acceleration, the cube where the
+    jerk is limited, and between the two behind a servo that lags. A root of the distance is then a straight line over
+    time, which begins at the begin. Of several roots that is taken whose line fits the first millimetre best; of a few
+    samples the square root.
     """
     away = np.linalg.norm(position - position[0], axis=1)
     gone = int((away > 10 * band).argmax()) or len(away)
     stood = position[: int(np.flatnonzero(away[:gone] <= band)[-1]) + 1]
-    travelled = np.linalg.norm(position - np.median(stood, axis=0), axis=1)[: gone + 1]
-    times = []
-    for width in (band, 4 * band):
-        inside = np.flatnonzero(travelled <= width)
-        k = int(inside[-1]) if len(inside) else 0
-        after = min(k + 1, len(travelled) - 1)
-        rise = max(float(travelled[after] - travelled[k]), 1e-15)
-        share = min(max((width - float(travelled[k])) / rise, 0.0), 1.0)
-        times.append(float(time[k] + (time[after] - time[k]) * share))
-    return max(2 * times[0] - times[1], 0.0)
+    rest = np.median(stood[: max(len(stood) // 2, 5)], axis=0)
+    way = float(np.linalg.norm(position[-5:].mean(axis=0) - rest))
+    low = max(_EARLY * band, _ABOVE_NOISE * noise_of(position))
+    high = max(min(_LATE / _EARLY * low, _OF_WAY * way), 1.5 * low)
+    travelled = np.linalg.norm(position - rest, axis=1)
+    last = int((travelled > high).argmax()) or len(travelled) - 1
+    inside = np.flatnonzero(travelled[:last] <= low)
+    first = int(inside[-1]) + 1 if len(inside) else 0
+    last = min(max(last, first + 1), len(travelled) - 1)
+    rows = np.arange(first, last + 1)
+    along = np.maximum((position[rows] - rest) @ (position[last] - rest) / travelled[last], 0.25 * low)
+    since = time[rows] - time[first]
+    begins = []
+    for power in _POWERS if len(rows) >= _LEAST_ROWS else (2.0,):
+        root, weight = along ** (1 / power), along ** (2 - 2 / power)  # the weight takes its slope from the root
+        at, value = np.average(since, weights=weight), np.average(root, weights=weight)
+        slope = float((weight * (since - at) * (root - value)).sum() / (weight * (since - at) ** 2).sum())
+        left = power**2 * float((weight * (root - value - slope * (since - at)) ** 2).sum())
+        begins.append((left, float(at - value / slope) if slope > 0 else 0.0))
+    return max(float(time[first]) + min(begins)[1], 0.0)

@@ -15,6 +15,11 @@ from truearm.validation.iso9283.commanded import CommandedPath
 _SAMPLES, _PLACES = 500, 400
 #: Farther from the path than this share of its extent, in the middle of all samples, it is another path.
 _FAR = 0.2
+#: The tip is not faster than so many times the command, and where it is slower than this share, times are in another
+#: unit.
+_FASTER, _SLOWEST = 2.0, 0.02
+#: The middle half of a path is cut into so many stretches, and the tip's pace is that in the middle of theirs.
+_STRETCHES = 10
 #: From so little of the path a cycle cannot be judged.
 _LEAST_RUN = 0.8
 
@@ -35,8 +40,8 @@ class Cycle:
         ``(n, 3, 3)``; None where there are no orientations.
     along
         Arc length of the foot of each sample on the commanded path [m], ``(n,)``. It swings with the noise.
-    line
-        Of the first sample in the file.
+    lines
+        Of the samples in the file, ``(n,)``.
     """
 
     number: int
@@ -44,7 +49,12 @@ class Cycle:
     position: Array
     rotation: Array | None
     along: Array
-    line: int
+    lines: NDArray[np.intp]
+
+    @property
+    def line(self) -> int:
+        """Of the first sample in the file."""
+        return int(self.lines[0])
 
 
 def along_path(path: CommandedPath, position: Array, where: str) -> Array:
@@ -88,6 +98,47 @@ def along_path(path: CommandedPath, position: Array, where: str) -> Array:
             cure="Record the whole cycle, and run the path in the direction of the plan.",
         )
     return along
+
+
+def pace_along(path: CommandedPath, time: Array, along: Array) -> float:
+    """Return how fast the tip goes along the middle half of the path [m/s], pauses and corners left aside."""
+    run = np.maximum.accumulate(along)
+    places = np.linspace(0.25, 0.75, _STRETCHES + 1) * path.length
+    passed = np.interp(places, run, time)
+    lasts = float(np.median(np.diff(passed)))
+    return float(np.inf) if lasts <= 0.0 else float(places[1] - places[0]) / lasts
+
+
+def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity: float, where: str) -> None:
+    """Refuse a cycle that is run so fast or so slowly that its times are not seconds, or it is another's.
+
+    A robot is not faster than commanded, and may be slower where joints come to their limits.
+
+    Parameters
+    ----------
+    time, along
+        Of the samples [s], and the arc lengths of their feet [m], ``(n,)``.
+    velocity
+        Commanded [m/s].
+    where
+        File and lines.
+
+    Raises
+    ------
+    InputError
+        If the pace is above twice the commanded velocity, or below a fiftieth of it.
+    """
+    pace = pace_along(path, time, along)
+    if _SLOWEST * velocity <= pace <= _FASTER * velocity:
+        return
+    raise InputError(
+        f"the path {path.path.name} was run much {'faster' if pace > velocity else 'slower'} than commanded",
+        where=where,
+        came=f"{1e3 * pace:.4g} mm/s in the middle half",
+        allowed=f"{1e3 * _SLOWEST * velocity:.4g} to {1e3 * _FASTER * velocity:.4g} mm/s; commanded are "
+        f"{1e3 * velocity:.4g}",
+        cure="Write the times in seconds, and check the column velocity [%] and the rated velocity of the plan.",
+    )
 
 
 def _monotone(cost: Array) -> NDArray[np.intp]:

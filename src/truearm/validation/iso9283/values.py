@@ -56,6 +56,8 @@ class Value:
         Whether it can be relied on.
     least, largest
         Of the cycles, where there are too few of them for an interval; None otherwise.
+    bandwidth
+        Frequency up to which it tells what fluctuates [Hz]; None of others.
     """
 
     id: str
@@ -69,6 +71,7 @@ class Value:
     status: Status
     least: float | None = None
     largest: float | None = None
+    bandwidth: float | None = None
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy as np
 from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.validation.iso9283.intervals import LEAST_CYCLES
 from truearm.validation.iso9283.runs import Run, runs_of
 from truearm.validation.iso9283.smoothing import local_lines
 from truearm.validation.iso9283.streams import FoundStream
@@ -23,6 +24,9 @@ from truearm.validation.iso9283.values import COARSE, Instrument, Value
 
 #: The part of the path over which velocity is judged.
 _MIDDLE = (0.25, 0.75)
+#: Of a swing with a frequency of this share of one over the window, smoothing and the time between two samples leave
+#: this share or more.
+_BANDWIDTH, _KEPT = 0.325, 0.88
 #: Noise may be this share of the commanded velocity, if a window of at most this share of the middle half does it.
 _QUIET, _LONGEST_WINDOW = 0.002, 0.05
 #: Excess kurtosis that the cycles' velocities may have: with it the interval of RV is a third wider than that of
@@ -72,6 +76,11 @@ class VelocityCurves:
     noise: Array
     found: FoundStream | None
 
+    @property
+    def bandwidth(self) -> float:
+        """Frequency up to which the fluctuation is told [Hz]."""
+        return float(_BANDWIDTH / self.window.max())
+
 
 def velocity_values(
     plan: PerformancePlan, samples: Samples, transform: Array, instrument: Instrument
@@ -81,8 +90,10 @@ def velocity_values(
     Intervals: of AV by Student's t, of RV by chi-square with the degrees of freedom that a variance has whose samples
     have an excess kurtosis of 1.1, of the cycles' mean velocities. That of FV
     is of the expected largest range among so many cycles, by pivots of Gaussian ranges; noise widens every range, so
-    that the lower end is less what noise alone may give. FV of which that is more than a quarter, and AV and RV of
-    which the noise of a cycle's mean is more than a quarter of RV, are ``instrument-too-coarse``.
+    that the lower end is less what noise alone may give. Smoothing narrows it: the upper end is higher by what it takes
+    from a swing of the highest frequency that is told, and what fluctuates faster is not in FV. FV of which that noise
+    is more than a quarter, and AV and RV of which the noise of a cycle's mean is more than a quarter of RV, are
+    ``instrument-too-coarse``. Fewer than five cycles have no intervals.
 
     Parameters
     ----------
@@ -162,14 +173,15 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
     independent = max((curve.middle[1] - curve.middle[0]) / v / float(curve.window.mean()), 2.0)
     noise_range = float(2.0 * curve.noise.mean() * np.sqrt(2.0 * np.log(independent * max(n, 1))))
     coarse_range = noise_range > COARSE * fluctuation
-    if n > 1:
+    enough = n >= LEAST_CYCLES
+    if enough:
         half = float(stats.t.ppf(0.975, n - 1) * spread / np.sqrt(n) / v)
         interval_av = (accuracy - half, accuracy + half)
         degrees = 2.0 / (2.0 / (n - 1) + _KURTOSIS / n)
         low, high = (float(np.sqrt(degrees / stats.chi2.ppf(p, degrees))) for p in (0.975, 0.025))
         interval_rv = (3 * spread / v * low, 3 * spread / v * high)
         few, many = _largest_of(ranges)
-        interval_fv = (max(few - noise_range, 0.0), many)
+        interval_fv = (max(few - noise_range, 0.0), many / _KEPT)
     return [
         Value(
             "AV",
@@ -177,7 +189,7 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
             curve.path,
             accuracy,
             "ratio",
-            interval_av if n > 1 else None,
+            interval_av if enough else None,
             n,
             run.conditions,
             run.status(coarse=noise_of_mean / np.sqrt(n) > COARSE * max(abs(accuracy) * v, 2 * spread if n > 1 else 0)),
@@ -188,7 +200,7 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
             curve.path,
             3 * spread / v,
             "ratio",
-            interval_rv if n > 1 else None,
+            interval_rv if enough else None,
             n,
             run.conditions,
             run.status(coarse=coarse) if n > 1 else "not-measured",
@@ -199,12 +211,13 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
             curve.path,
             fluctuation,
             "speed",
-            interval_fv if n > 1 else None,
+            interval_fv if enough else None,
             n,
             run.conditions,
             run.status(coarse=coarse_range),
             float(ranges.min()),
             fluctuation,
+            curve.bandwidth,
         ),
     ]
 

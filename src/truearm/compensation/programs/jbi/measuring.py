@@ -1,7 +1,9 @@
 """Yaskawa jobs with stops, waits and circles.
 
-Source: Yaskawa, INFORM language manuals of the controllers DX100 and DX200: MOVJ, MOVL, MOVC, TIMER, and the tags VJ,
-V, PL and FPT. The first MOVC of a row is reached on a line: it stands where the arc begins.
+Source: Yaskawa, INFORM language manuals of the controllers DX100, DX200 and FS100: MOVJ, MOVL, MOVC, TIMER, and the
+tags VJ, V and PL. The first MOVC of a row is reached on a line: it stands where the arc begins. Between two arcs a MOVL
+stands at the point where they meet, as the operator's manuals are remembered to ask for; the tag FPT in its place is
+known to newer controllers alone.
 """
 
 from __future__ import annotations
@@ -51,9 +53,8 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
             case CircleMove():
                 speed = f"V={_speed(step.speed)}"
                 if arc:
-                    steps[-1] += " FPT"
-                else:
-                    steps.append(f"MOVC {position('pose', step.start)} {speed}")
+                    steps.append(f"MOVL {position('pose', step.start)} {speed}")
+                steps.append(f"MOVC {position('pose', step.start)} {speed}")
                 steps.append(f"MOVC {position('pose', step.via)} {speed}")
                 steps.append(f"MOVC {position('pose', step.target)} {speed}{end}")
             case Wait():

@@ -1,8 +1,9 @@
 """VAL3 applications with stops, waits and circles.
 
 Source: Staubli, VAL3 reference manual: movej, movel, movec, waitEndMove, delay, and the motion descriptor, whose
-``vel`` is the share of the joints' speed in percent and ``tvel`` the speed of the tip in mm/s. ``delay`` does not wait
-for the arm, so waitEndMove stands before it.
+``vel`` is the share of the joints' speed in percent and ``tvel`` the speed of the tip in mm/s, its ``rvel`` in deg/s;
+the slowest of the three counts. In data files the two are called ``tmax`` and ``rmax``; 99999 leaves the speed to the
+others. ``delay`` does not wait for the arm, so waitEndMove stands before it.
 """
 
 from __future__ import annotations
@@ -70,4 +71,5 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
 
 
 def _motion(blend: str, velocity: int) -> str:
-    return f'<Value key="0" accel="100" vel="{velocity}" decel="100" blend="{blend}" leave="1" reach="1" />'
+    speeds = f'vel="{velocity}" decel="100" tmax="99999" rmax="99999"'
+    return f'<Value key="0" accel="100" {speeds} blend="{blend}" leave="1" reach="1" />'

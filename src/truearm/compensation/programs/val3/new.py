@@ -1,4 +1,4 @@
-"""New VAL3 applications."""
+"""New VAL3 applications, in files as the controllers of the CS8 and CS9 write them (VAL3 s7)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from truearm.modeling.orientations import MOVING_XYZ_ANGLES
 JOINT: Final = Form("jointRx", "joints", angle=radians(1.0))
 POINT: Final = Form("pointRx", "pose", angle=radians(1.0), orientation=MOVING_XYZ_ANGLES)
 
-_DATA = 'xmlns="http://www.staubli.com/robotics/VAL3/Data/2"'
-_CODE = 'xmlns="http://www.staubli.com/robotics/VAL3/Program/2"'
+_TYPES = 'xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"'
+_DATA = f'{_TYPES} xmlns="http://www.staubli.com/robotics/VAL3/Data/2"'
+_CODE = f'{_TYPES} xmlns="http://www.staubli.com/robotics/VAL3/Program/2"'
 _PROJECT = 'xmlns="http://www.staubli.com/robotics/VAL3/Project/3"'
 NAMES = ("x", "y", "z", "rx", "ry", "rz")
 #: On its way the arm stays in the posture in which it began.
@@ -57,7 +58,7 @@ def application(name: str, data: list[str], steps: list[str]) -> dict[str, str]:
         f"{name}.dtx": [f"<Database {_DATA}>", "<Datas>", *data, "</Datas>", "</Database>"],
         "start.pgx": [
             f"<Programs {_CODE}>",
-            '<Program name="start">',
+            '<Program name="start" access="public">',
             f"<Code><![CDATA[\n{code}\n]]></Code>",
             "</Program>",
             "</Programs>",
@@ -83,4 +84,5 @@ def element(key: int, numbers: zip[tuple[str, str]], before: str, more: str = ""
 def variable(name: str, kind: str, values: list[str]) -> str:
     """Return a variable with its elements."""
     rows = "\n".join(values)
-    return f'<Data name="{name}" access="public" type="{kind}" size="{len(values)}">\n{rows}\n</Data>'
+    form = f'access="public" xsi:type="array" type="{kind}" size="{len(values)}"'
+    return f'<Data name="{name}" {form}>\n{rows}\n</Data>'

@@ -1,0 +1,110 @@
+"""A bag as measurements: one configuration a standstill, one reading a target."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from truearm.measurement.bags.standstills import Sighting, Standstill, find_standstills, seen_at
+from truearm.measurement.bags.streams import JointStream, TargetStream
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.rows import Configurations, Readings, dataset_of
+from truearm.modeling.controller import JointsOf
+
+#: A smaller deviation is none: all samples are the same [m or rad].
+_EXACT: Final = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What was found in a bag.
+
+    Attributes
+    ----------
+    joints, targets
+        Its topics.
+    standstills
+        In order, one a configuration.
+    sightings
+        Of each target in each standstill.
+    data
+        The measurements.
+    """
+
+    joints: JointStream
+    targets: tuple[TargetStream, ...]
+    standstills: tuple[Standstill, ...]
+    sightings: tuple[tuple[Sighting, ...], ...]
+    data: Dataset
+
+    @property
+    def declares_sigma(self) -> bool:
+        """Whether the scatter at standstill could be told everywhere, so that the readings have deviations."""
+        return self.data.sigma is not None
+
+
+def found_in(
+    bag: Path,
+    joints: JointStream,
+    targets: Sequence[TargetStream],
+    *,
+    references: Collection[str],
+    prismatic: Collection[str],
+    joints_are: JointsOf,
+    still: float,
+    hold: float,
+    settle: float,
+) -> Recording:
+    """Return the standstills of a bag as measurements, numbered in the order of measurement.
+
+    Parameters
+    ----------
+    bag
+        The file, for messages.
+    joints, targets
+        Its topics.
+    references
+        Which targets stand beside the robot.
+    prismatic
+        Which joints slide.
+    joints_are
+        Whose joint positions they are.
+    still, hold, settle
+        See :func:`~truearm.measurement.bags.standstills.find_standstills` and
+        :func:`~truearm.measurement.bags.standstills.seen_at`.
+    """
+    stills = find_standstills(joints, still, hold)
+    sightings = tuple(seen_at(stills, target, settle) for target in targets)
+    rows = [
+        (place, target, row[place])
+        for place in range(len(stills))
+        for target, row in zip(targets, sightings, strict=True)
+    ]
+    seen = [one for _, _, one in rows]
+    exact = any(one.sigma < _EXACT or (one.sigma_rot or _EXACT) < _EXACT for one in seen)
+    turned = any(one.quaternion is not None for one in seen)
+    nothing = np.full(4, np.nan)
+    readings = Readings(
+        source=str(bag),
+        lines=range(1, len(rows) + 1),
+        configuration=np.array([place for place, _, _ in rows], dtype=np.intp),
+        targets=[target.target for _, target, _ in rows],
+        reference=np.array([target.target in references for _, target, _ in rows]),
+        position=np.array([one.position for one in seen]),
+        quaternion=np.array([nothing if one.quaternion is None else one.quaternion for one in seen])
+        if turned
+        else None,
+        sigma=None if exact else np.array([one.sigma for one in seen]),
+        sigma_rot=np.array([np.nan if one.sigma_rot is None else one.sigma_rot for one in seen])
+        if turned and not exact
+        else None,
+    )
+    kinds = tuple("prismatic" if name in prismatic else "revolute" for name in joints.names)
+    labels = tuple(str(number) for number in range(1, len(stills) + 1))
+    positions = np.array([still.joints for still in stills])
+    data = dataset_of(readings, Configurations(labels, positions, kinds, readings.configuration, joints_are))
+    return Recording(joints, tuple(targets), stills, sightings, data)

@@ -1,0 +1,247 @@
+"""Standstills of a robot in a stream of joint positions, and what was seen of a target in each of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.measurement.bags.streams import JointStream, TargetStream
+from truearm.modeling.chain import Array
+
+#: A sample so many times further from the median of its standstill than half of them is no reading of it: for normal
+#: noise that is nine standard deviations.
+_FAR: Final = 6.0
+#: What is nearer to it than this always is one [m].
+_NEAR: Final = 2e-5
+#: More of them, as a share, and the target moved.
+_SET_ASIDE: Final = 0.05
+_LEAST_SAMPLES: Final = 5
+#: A scatter above this share of the moves between standstills is motion.
+_MOVES: Final = 0.1
+#: Moves below this are none: a point beside the robot [m].
+_STANDS: Final = 1e-3
+#: In a whole standstill a joint may move so many times further than in its shortest part.
+_CREEP: Final = 3.0
+#: A part of the stream that takes so many times longer than its number of samples tells has a gap.
+_GAP: Final = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Standstill:
+    """A time in which no joint moves.
+
+    Attributes
+    ----------
+    start, end
+        From when to when [s].
+    joints
+        Mean joint positions [rad; m for prismatic joints], ``(joints,)``.
+    span
+        How far the joint that moved most went [rad or m].
+    """
+
+    start: float
+    end: float
+    joints: Array
+    span: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """What was seen of a target in a standstill.
+
+    Attributes
+    ----------
+    position
+        Mean [m], ``(3,)``; NaN where too few samples were seen.
+    quaternion
+        Mean (w, x, y, z), ``(4,)``; None for points.
+    samples, set_aside
+        How many samples it is the mean of, and how many were far from the others.
+    scatter, sigma
+        Standard deviation of a coordinate of one sample, and of the mean [m].
+    sigma_rot
+        Of the mean's orientation, per axis [rad]; None for points.
+    """
+
+    position: Array
+    quaternion: Array | None
+    samples: int
+    set_aside: int
+    scatter: float
+    sigma: float
+    sigma_rot: float | None
+
+
+def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[Standstill, ...]:
+    """Return the longest times in which every joint keeps still, in order.
+
+    Parameters
+    ----------
+    stream
+        The joints.
+    still
+        How far a joint may move during `hold` [rad; m for prismatic joints].
+    hold
+        The shortest standstill [s].
+
+    Raises
+    ------
+    InputError
+        If there is none, or the joints creep.
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    times, positions = stream.times, stream.positions
+    where = f"topic {stream.topic}"
+    steps = np.diff(times)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    if usual <= 0.0 or times[-1] < hold:
+        raise InputError(
+            "the joints were recorded for too short a time",
+            where=where,
+            came=f"{len(times)} samples in {times[-1]:.3g} s",
+            allowed=f"{hold:g} s and more",
+        )
+    count = max(math.ceil(hold / usual) + 1, 3)
+    if count > len(times):
+        raise InputError("there are too few samples of the joints", where=where, came=f"{len(times)}")
+    # a filter of scipy looks to both sides; its output at `count // 2` is about the first `count` samples
+    first, last = count // 2, count // 2 + len(times) - count + 1
+    spans = np.zeros(len(times) - count + 1)
+    for joint in positions.T:
+        spans = np.maximum(spans, (maximum_filter1d(joint, count) - minimum_filter1d(joint, count))[first:last])
+    whole = times[count - 1 :] - times[: len(times) - count + 1] <= _GAP * count * usual
+    quiet = np.concatenate([[False], (spans <= still) & whole, [False]])
+    begin, end = (np.flatnonzero(np.diff(quiet.astype(int)) == step) for step in (1, -1))
+    if not len(begin):
+        least = math.degrees(float(spans[whole].min())) if whole.any() else math.inf
+        raise InputError(
+            "the robot never stands still",
+            parameter="still",
+            where=where,
+            came=f"no joint moves more than {least:.3g} deg in the quietest {hold:g} s"
+            if whole.any()
+            else f"no {hold:g} s without a gap",
+            allowed=f"{math.degrees(still):g} deg at most for {hold:g} s",
+            cure="Let the robot wait at each configuration, or allow more with `still` or a shorter time with `hold` "
+            "if that was a standstill.",
+        )
+    found = []
+    for i, j in zip(begin.tolist(), (end - 1 + count).tolist(), strict=True):
+        part = positions[i:j]
+        span = float(np.ptp(part, axis=0).max())
+        if span > _CREEP * still:
+            raise InputError(
+                "the joints creep instead of standing still",
+                parameter="still",
+                where=f"{where}, {times[i]:.1f} s to {times[j - 1]:.1f} s after its first message",
+                came=f"a joint moves {math.degrees(span):.3g} deg in all, {math.degrees(still):g} deg at most in "
+                f"{hold:g} s",
+                cure="Record stops, not slow motion; a smaller `still` tells them apart.",
+            )
+        found.append(Standstill(float(times[i]), float(times[j - 1]), part.mean(axis=0), span))
+    return tuple(found)
+
+
+def seen_at(stills: Sequence[Standstill], stream: TargetStream, settle: float) -> tuple[Sighting, ...]:
+    """Return what was seen of a target in each standstill, its first and last `settle` seconds left out.
+
+    The deviation of a mean counts that samples which follow each other are alike: their autocorrelation, of all
+    standstills together, tells how many independent ones there are (the sum of its first positive terms, Geyer 1992,
+    Practical Markov chain Monte Carlo, section 3.3).
+
+    Raises
+    ------
+    InputError
+        If the target moves while the joints stand still, which is a matter of the clocks.
+    """
+    parts = []
+    for still in stills:
+        inside = (stream.times >= still.start + settle) & (stream.times <= still.end - settle)
+        positions = stream.positions[inside]
+        kept = np.ones(len(positions), dtype=bool)
+        if len(positions) >= _LEAST_SAMPLES:
+            distance = np.linalg.norm(positions - np.median(positions, axis=0), axis=1)
+            kept = distance <= max(_FAR * float(np.median(distance)), _NEAR)
+        parts.append((positions[kept], None if stream.quaternions is None else stream.quaternions[inside][kept], ~kept))
+    _refuse_motion(stills, stream, parts)
+    slow = _correlation_time([part for part, _, _ in parts if len(part) >= _LEAST_SAMPLES])
+    return tuple(_mean(part, turns, int(far.sum()), slow) for part, turns, far in parts)
+
+
+def _refuse_motion(
+    stills: Sequence[Standstill], stream: TargetStream, parts: Sequence[tuple[Array, Array | None, Array]]
+) -> None:
+    whole = [number for number, (part, _, _) in enumerate(parts) if len(part) >= _LEAST_SAMPLES]
+    if not whole:
+        raise InputError(
+            "nothing was seen of a target while the robot stood still",
+            where=f"topic {stream.topic}",
+            came=f"{max((len(part) for part, _, _ in parts), default=0)} samples at most in a standstill",
+            allowed=f"{_LEAST_SAMPLES} and more in each",
+            cure="Wait longer at each configuration. If the clocks of the two topics differ, take the recorder's "
+            "times: `times=bag`.",
+        )
+    centres = np.array([np.median(parts[number][0], axis=0) for number in whole])
+    moves = float(np.median(np.linalg.norm(np.diff(centres, axis=0), axis=1))) if len(whole) > 1 else 0.0
+    for number in whole:
+        part, _, far = parts[number]
+        off = float(far.mean())
+        scatter = float(np.linalg.norm(part.std(axis=0)))
+        if off > max(_SET_ASIDE, 1.5 / len(far)) or (moves > _STANDS and scatter > _MOVES * moves):
+            raise InputError(
+                "the target moves while the joints stand still",
+                parameter="times",
+                where=f"topic {stream.topic}, standstill {number + 1}, {stills[number].start:.2f} s to "
+                f"{stills[number].end:.2f} s after the first message of the joints",
+                came=f"{100 * off:.0f} % of the samples far from the others, the rest scattered by "
+                f"{1e3 * scatter:.3g} mm",
+                cure="If the clocks of the two topics differ, take the recorder's times: `times=bag`. If the arm "
+                "still shakes, leave out more of each standstill (`settle`). Record it again if somebody "
+                "touched the target.",
+            )
+
+
+def _correlation_time(parts: Sequence[Array]) -> float:
+    """Return how many samples in a row count as one, 1 or more."""
+    longest = min(len(part) for part in parts) // 2
+    sums = np.zeros(longest + 1)
+    for part in parts:
+        off = part - part.mean(axis=0)
+        sums += [float((off[lag:] * off[: len(off) - lag]).sum()) / len(off) for lag in range(longest + 1)]
+    if sums[0] <= 0.0:
+        return 1.0
+    positive = 1.0
+    for lag in range(1, longest + 1):
+        if sums[lag] <= 0.0:
+            break
+        positive += 2.0 * sums[lag] / sums[0]
+    return positive
+
+
+def _mean(part: Array, turns: Array | None, set_aside: int, slow: float) -> Sighting:
+    n = len(part)
+    if n < _LEAST_SAMPLES:
+        nothing = None if turns is None else np.full(4, np.nan)
+        return Sighting(
+            np.full(3, np.nan), nothing, n, set_aside, math.nan, math.nan, None if turns is None else math.nan
+        )
+    scatter = float(np.sqrt(part.var(axis=0, ddof=1).mean()))
+    independent = max(n / slow, 1.0)
+    quaternion = sigma_rot = None
+    if turns is not None:
+        from scipy.spatial.transform import Rotation
+
+        R = Rotation.from_quat(turns[:, [1, 2, 3, 0]])
+        mean = R.mean()
+        off = (R * mean.inv()).as_rotvec()
+        quaternion = mean.as_quat(canonical=True)[[3, 0, 1, 2]]
+        sigma_rot = float(np.sqrt((off**2).sum() / (3 * (n - 1)) / independent))
+    sigma = scatter / math.sqrt(independent)
+    return Sighting(part.mean(axis=0), quaternion, n, set_aside, scatter, sigma, sigma_rot)

@@ -1,0 +1,317 @@
+"""Rows of poses that do not fit the plan or one another: refused or named, and in whatever order they come."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.performance_plan import small_plan
+
+from truearm.errors import InputError
+from truearm.measurement.performance.records import AttainedPoses, Names
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import (
+    Transform,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+)
+from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.validation.iso9283.alignment import Alignment
+from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
+from truearm.validation.iso9283.pose_rows import cycles_of
+from truearm.validation.iso9283.values import Instrument
+from truearm.validation.iso9283.wild_rows import UnusualRows, unusual_rows
+
+Rows = NDArray[np.intp]
+TIE = Alignment("base-features", Transform(), 1e-5, 1e-5)
+TRACKER = Instrument(1e-6, 1e-6)
+TESTS = ("AP", "vAP", "AD", "dAP", "E")
+CYCLES = {"AP": 30, "vAP": 6, "AD": 10, "dAP": 6, "E": 6}
+SCATTER = 2e-5
+
+
+@cache
+def campaign(seed: int = 1, tests: tuple[str, ...] = TESTS) -> tuple[PerformancePlan, AttainedPoses]:
+    """Return a plan of tests of poses at two velocities, and what was read for it."""
+    plan = small_plan(tests, cycles=CYCLES, velocities=(1.0, 0.5))
+    rng = np.random.default_rng(seed)
+    keys = []
+    for test in plan.tests:
+        robots = [f"r{k}" for k in range(5)] if test.id == "E" else [""]
+        velocities = test.velocities if test.id in ("AP", "AD") else (1.0,)
+        keys += [
+            (test.id, robot, pose, cycle, approach, velocity, 1e4 * group + cycle)
+            for robot in robots
+            for pose in test.places
+            for approach in (test.approaches if test.id == "vAP" else ("",))
+            for velocity in velocities
+            for group in range(4 if test.id == "dAP" else 1)
+            for cycle in range(1, test.cycles + 1)
+        ]
+    plan = dataclasses.replace(
+        plan,
+        tests=tuple(t if t.id in ("AP", "AD") else dataclasses.replace(t, velocities=(1.0,)) for t in plan.tests),
+    )
+    criterion, robot, pose, cycle, approach, velocity, time = zip(*keys, strict=True)
+    n = len(keys)
+    commanded = np.array([plan.poses[name].position for name in pose])
+    turned = rotation_from_vector([1e-3, 0, 2e-3] + 1e-4 * rng.standard_normal((n, 3)))
+    return plan, AttainedPoses(
+        criterion=Names.of(criterion),
+        robot=Names.of(robot),
+        pose=Names.of(pose),
+        approach=Names.of(approach),
+        cycle=np.array(cycle, dtype=np.intp),
+        velocity=np.array(velocity),
+        load=np.ones(n),
+        time=np.array(time, dtype=float),
+        position=commanded + [4e-4, 0, -2e-4] + SCATTER * rng.standard_normal((n, 3)),
+        rotation=turned @ np.array([plan.poses[name].rotation for name in pose]),
+        line=np.arange(2, n + 2),
+        source="poses.csv",
+    )
+
+
+def in_order(read: AttainedPoses, order: Rows) -> AttainedPoses:
+    """Return rows in another order, or some of them, with names met in that order."""
+    names: dict[str, Any] = {
+        name: Names.of([column.names[code] for code in column.code[order]])
+        for name in ("criterion", "robot", "pose", "approach")
+        for column in [getattr(read, name)]
+    }
+    columns = ("cycle", "velocity", "load", "time", "position", "rotation", "line")
+    arrays: dict[str, Any] = {name: getattr(read, name)[order] for name in columns}
+    return dataclasses.replace(read, **names, **arrays)
+
+
+def rows_of(read: AttainedPoses, **named: Any) -> Rows:
+    """Return which rows are of a test, pose, cycle .."""
+    here = np.ones(len(read.cycle), dtype=bool)
+    for name, value in named.items():
+        column = getattr(read, name)
+        here &= column.are(str(value)) if isinstance(column, Names) else column == value
+    return np.flatnonzero(here)
+
+
+def found(plan: PerformancePlan, read: AttainedPoses, tie: Alignment | None = TIE) -> Evaluation:
+    return evaluated(plan, Measurements(poses=read), tie, TRACKER)
+
+
+def unusual(plan: PerformancePlan, read: AttainedPoses) -> UnusualRows:
+    return unusual_rows(cycles_of(plan, read, TIE), TRACKER)
+
+
+def moved(read: AttainedPoses, rows: Rows, by: Array | list[float]) -> AttainedPoses:
+    position = read.position.copy()
+    position[rows] += by
+    return dataclasses.replace(read, position=position)
+
+
+@pytest.mark.parametrize("tie", [TIE, None], ids=["tied", "best fit"])
+def test_no_figure_depends_on_the_order_of_the_rows(tie: Alignment | None) -> None:
+    plan, read = campaign()
+    plain = found(plan, read, tie).values
+    assert {value.id for value in plain} == {"AP", "RP", "vAP", "AD", "RD", "dAP", "dRP", "E"}
+    rng = np.random.default_rng(3)
+    for order in (np.arange(len(read.cycle))[::-1], rng.permutation(len(read.cycle))):
+        other = found(plan, in_order(read, order), tie).values
+        for one, two in zip(plain, other, strict=True):
+            assert one == two or math.isnan(one.value)
+            assert (one.id, one.component, one.where) == (two.id, two.component, two.where)
+
+
+def test_clean_campaigns_are_silent() -> None:
+    plan, read = campaign()
+    rng = np.random.default_rng(8)
+    for _ in range(20):
+        made = unusual(
+            plan, moved(read, np.arange(len(read.cycle)), SCATTER * rng.standard_normal(read.position.shape))
+        )
+        assert (made.wild, made.two_places) == ((), ())
+    assert found(plan, read).missing == ()
+
+
+@pytest.mark.parametrize(
+    ("test", "criteria"),
+    [("AP", ("AP", "RP")), ("vAP", ("vAP",)), ("AD", ("AD", "RD")), ("dAP", ("dAP", "dRP")), ("E", ("E",))],
+)
+def test_a_wild_row_is_named_with_what_it_changes(test: str, criteria: tuple[str, ...]) -> None:
+    plan, read = campaign(1, (test,))
+    where: dict[str, dict[str, Any]] = {
+        "AP": {"pose": "P3", "velocity": 0.5},
+        "AD": {"pose": "P4"},
+        "E": {"pose": "P2", "robot": "r3"},
+    }
+    of: dict[str, Any] = {"criterion": test, "cycle": 4} | where.get(test, {})
+    row = int(rows_of(read, **of)[0])
+    spoilt = moved(read, np.array([row]), [0, 5e-3, 0])
+    (wild,) = found(plan, spoilt).unusual.wild
+    assert (wild.of.test, wild.kind, int(wild.of.cycle[0]), int(wild.of.line[0])) == (test, "position", 4, row + 2)
+    assert wild.away == pytest.approx(5e-3, rel=0.1)
+    assert {value.id for value, _ in wild.changes} == {*criteria}
+    assert np.isfinite([other.value for _, other in wild.changes]).all()
+    if test == "AP":
+        clean = {(v.id, v.where, v.conditions): v.value for v in found(plan, read).values if v.component == "position"}
+        for value, without in wild.changes:
+            assert without.value == pytest.approx(clean[value.id, value.where, value.conditions], rel=0.2)
+            assert without.cycles == value.cycles - 1
+        rp, rp_without = wild.changes[0]
+        assert rp.id == "RP"
+        assert rp.value > 2.5e-3
+        assert rp_without.value < 2e-4
+
+
+def test_a_wild_orientation_is_named() -> None:
+    plan, read = campaign(1, ("AP",))
+    row = int(rows_of(read, criterion="AP", pose="P2", cycle=9)[0])
+    assert read.rotation is not None
+    rotation = read.rotation.copy()
+    rotation[row] = rotation_from_vector(np.array([0, 0.02, 0])) @ rotation[row]
+    (wild,) = found(plan, dataclasses.replace(read, rotation=rotation)).unusual.wild
+    assert (wild.kind, int(wild.of.line[0])) == ("orientation", row + 2)
+    assert wild.away == pytest.approx(0.02, rel=0.1)
+    assert wild.changes[0][0].component == "b"
+
+
+def test_several_wild_rows_are_named_and_ten_times_the_scatter_is_enough() -> None:
+    plan, read = campaign(2, ("AP",))
+    rows = np.array([rows_of(read, pose=f"P{k}", cycle=7)[0] for k in (1, 3, 5)])
+    away = 10 * math.sqrt(3) * SCATTER * np.array([[1, 0, 0], [0, -1, 0], [0, 0.6, 0.8]])
+    assert {int(one.of.line[0]) for one in unusual(plan, moved(read, rows, away)).wild} == {*(rows + 2)}
+
+
+def test_three_cycles_of_a_pose_have_a_wild_row_where_others_show_the_scatter() -> None:
+    plan, read = campaign(2, ("AP",))
+    few = in_order(read, np.flatnonzero(read.cycle <= 3))
+    assert unusual(plan, few).wild == ()
+    row = int(rows_of(few, pose="P4", cycle=2)[0])
+    (wild,) = unusual(plan, moved(few, np.array([row]), [0, 5e-3, 0])).wild
+    assert int(wild.of.line[0]) == int(few.line[row])
+
+
+def test_two_places_of_rest_are_told_and_their_rows_are_not_wild() -> None:
+    plan, read = campaign(4, ("AP",))
+    rows = np.concatenate([rows_of(read, pose="P2", velocity=1.0, cycle=c) for c in (3, 4, 9, 15, 20, 21, 27)])
+    made = unusual(plan, moved(read, rows, [0, 15 * SCATTER, 0]))
+    (places,) = made.two_places
+    assert (places.of.pose, places.rows, made.wild) == ("P2", (7, 23), ())
+    assert places.apart == pytest.approx(15 * SCATTER, rel=0.1)
+    assert places.lines == tuple(sorted(read.line[rows].tolist()))
+
+
+def test_rows_of_several_groups_that_are_off_alike_are_a_second_place() -> None:
+    plan, read = campaign(4, ("dAP",))
+    plan = dataclasses.replace(plan, tests=tuple(dataclasses.replace(t, cycles=6) for t in plan.tests))
+    rows = np.array([rows_of(read, time=1e4 * group + 3)[0] for group in (0, 1, 3)])
+    made = unusual(plan, moved(read, rows, [0, 40 * SCATTER, 0]))
+    assert (len(made.two_places), made.wild) == (1, ())
+    assert made.two_places[0].rows == (3, 21)
+    assert made.two_places[0].lines == tuple(read.line[rows].tolist())
+
+
+def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> AttainedPoses:
+    column = getattr(read, name)
+    if isinstance(column, Names):
+        texts = [column.names[code] for code in column.code]
+        texts[row] = str(value)
+        new: dict[str, Any] = {name: Names.of(texts)}
+        return dataclasses.replace(read, **new)
+    column = column.copy()
+    column[row] = value
+    new = {name: column}
+    return dataclasses.replace(read, **new)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda r: changed(r, "velocity", 3, 0.01), "line 5, column velocity: 1 row of the test AP"),
+        (lambda r: changed(r, "velocity", 3, 0.995), "99.5 %"),
+        (lambda r: changed(r, "load", 3, 0.5), "line 5, column load: 1 row of the test AP"),
+        (
+            lambda r: changed(r, "robot", 3, "irb12O"),
+            "line 5, column robot: the robot is named in some rows of the test AP and in others not",
+        ),
+    ],
+)
+def test_rows_under_conditions_that_were_not_planned_are_refused(
+    change: Callable[[AttainedPoses], AttainedPoses], text: str
+) -> None:
+    plan, read = campaign(1, ("AP",))
+    with pytest.raises(InputError, match=re.escape(text)):
+        found(plan, change(read))
+
+
+def test_rounded_velocities_are_those_of_the_plan() -> None:
+    plan, read = campaign(1, ("AP",))
+    third = dataclasses.replace(plan.tests[0], velocities=(1.0, 1 / 3))
+    plan = dataclasses.replace(plan, tests=(third,))
+    read = dataclasses.replace(read, velocity=np.where(read.velocity == 1.0, 1.0 + 1e-9, 0.3333))
+    assert {value.conditions.velocity for value in found(plan, read).values} == {1.0, 1 / 3}
+
+
+def test_a_robot_with_a_few_rows_alone_is_refused() -> None:
+    plan, read = campaign(1, ("E",))
+    with pytest.raises(InputError, match="the robot r11 has few rows in the test E: 1, where r1 has 30"):
+        found(plan, changed(read, "robot", 0, "r11"))
+    kept = np.setdiff1d(np.arange(len(read.cycle)), rows_of(read, robot="r0")[20:])
+    assert found(plan, in_order(read, kept)).missing == ("E: P5 of r0",)
+
+
+def test_a_row_that_was_copied_is_refused() -> None:
+    plan, read = campaign(1, ("AP",))
+    read = dataclasses.replace(read, time=np.arange(len(read.cycle), dtype=float))
+    one, other = (int(rows_of(read, pose="P2", velocity=1.0, cycle=cycle)[0]) for cycle in (4, 5))
+    copied = changed(
+        moved(read, np.array([other]), read.position[one] - read.position[other]), "time", other, read.time[one]
+    )
+    copied.position[other] = copied.position[one]
+    with pytest.raises(InputError, match=f"lines {one + 2} and {other + 2}: 1 row with the time and the place"):
+        found(plan, copied)
+
+
+def test_two_poses_that_were_swapped_are_refused() -> None:
+    plan, read = campaign(1, ("AD",))
+    position = read.position.copy()
+    one, other = (rows_of(read, pose=pose) for pose in ("P2", "P4"))
+    position[one], position[other] = position[other], position[one]
+    with pytest.raises(InputError, match=rf"{len(position)} poses at another place than the plan has it"):
+        found(plan, dataclasses.replace(read, position=position))
+    position = read.position.copy()
+    pair = [int(rows_of(read, pose=pose, cycle=5, velocity=1.0)[0]) for pose in ("P2", "P4")]
+    position[pair] = position[pair[::-1]]
+    with pytest.raises(InputError, match=rf"line {min(pair) + 2}, column pose: 2 poses at another place"):
+        found(plan, dataclasses.replace(read, position=position))
+
+
+def test_quaternions_in_another_order_are_refused() -> None:
+    plan, read = campaign(1, ("AP",))
+    assert read.rotation is not None
+    tilt = rotation_from_vector(np.array([0.4, 0.5, -0.3]))
+    tie = dataclasses.replace(TIE, T_base_instrument=Transform.from_matrix(tilt, np.zeros(3)))
+    turned = dataclasses.replace(read, position=read.position @ tilt, rotation=tilt.T @ read.rotation)
+    assert len(found(plan, turned, tie).values) > 50
+    wrong = rotation_from_quaternion(np.roll(quaternion_from_rotation(tilt.T @ read.rotation), -1, axis=1))
+    with pytest.raises(InputError, match="in the order x, y, z, w"):
+        found(plan, dataclasses.replace(turned, rotation=wrong), tie)
+
+
+def test_places_without_a_row_are_told() -> None:
+    plan, read = campaign()
+    drop = [
+        rows_of(read, criterion="AP", pose="P3"),
+        rows_of(read, criterion="AP", pose="P4", velocity=1.0),
+        rows_of(read, criterion="vAP", pose="P2", approach="y"),
+        rows_of(read, criterion="E", robot="r2"),
+    ]
+    kept = np.setdiff1d(np.arange(len(read.cycle)), np.concatenate(drop))
+    made = found(plan, in_order(read, kept))
+    assert made.missing == ("AP: P3", "AP: P4 at 100 %", "vAP: P2 from y", "E: 1 of 5 robots")

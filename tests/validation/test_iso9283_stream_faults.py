@@ -1,0 +1,467 @@
+"""Samples that cannot be right: where no tip can have been, in another unit of time, or as in no other cycle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.moving_tip import (
+    ALONG,
+    CENTRE,
+    EXACT,
+    HERE,
+    NORMAL,
+    TRACKER,
+    along,
+    plan_of,
+    ramp,
+    samples_of,
+    stream_of,
+    the,
+    times,
+)
+
+from truearm.errors import InputError
+from truearm.measurement.performance.records import Samples
+from truearm.modeling.chain import Array
+from truearm.notices import Notice
+from truearm.planning.iso9283.way import Way
+from truearm.results.iso9283_evaluation import value_summary
+from truearm.validation.iso9283.alignment import Alignment
+from truearm.validation.iso9283.corners import corner_values
+from truearm.validation.iso9283.evaluation import Evaluation
+from truearm.validation.iso9283.paths import path_values
+from truearm.validation.iso9283.runs import runs_of
+from truearm.validation.iso9283.said_of_streams import said_of_streams
+from truearm.validation.iso9283.settling import settling_values
+from truearm.validation.iso9283.unusual_samples import unusual_samples
+from truearm.validation.iso9283.values import Instrument
+from truearm.validation.iso9283.velocity import velocity_values
+
+PLAN = plan_of()
+V = PLAN.rated_velocity
+LENGTH = Way(PLAN.paths["line"]).length
+
+
+def runs(*, rate: float = 100.0, cycles: int = 5, sigma: float = 0.02e-3, shape: str = "line") -> Samples:
+    """Return cycles of a path with noise, each from rest to rest."""
+    rng = np.random.default_rng(4)
+    length = Way(PLAN.paths[shape]).length
+    t = times(length / V + 0.4, rate)
+    p = along(PLAN, shape, ramp(t - 0.1, length, V))
+    return samples_of("AT", shape, [(k + 1, t, p + rng.normal(0.0, sigma, p.shape)) for k in range(cycles)])
+
+
+def resting(rate: float = 500.0, sigma: float = 5e-6) -> Samples:
+    """Return three cycles that come to rest from 50 mm away."""
+    rng = np.random.default_rng(4)
+    t = times(2.0, rate)
+    x = 0.05 * np.exp(-10 * np.maximum(t - 0.2, 0.0)) * (1 + 10 * np.maximum(t - 0.2, 0.0))
+    p = CENTRE + np.outer(x, ALONG)
+    return samples_of("t", "P1", [(k, t, p + rng.normal(0.0, sigma, p.shape)) for k in (1, 2, 3)])
+
+
+def moved(samples: Samples, rows: list[int] | slice, by: float) -> Samples:
+    position = samples.position.copy()
+    position[rows] += by * NORMAL
+    return replace(samples, position=position)
+
+
+def refusal_of_path(samples: Samples) -> str:
+    with pytest.raises(InputError) as caught:
+        path_values(PLAN, samples, HERE, TRACKER)
+    return str(caught.value)
+
+
+def said(**parts: object) -> dict[str, Notice]:
+    """Return what is said of curves of some criteria, by its code."""
+    found = Evaluation((), Alignment.__new__(Alignment), **parts)  # type: ignore[arg-type]
+    return {notice.code: notice for notice in said_of_streams(found)}
+
+
+def said_of_paths(samples: Samples) -> dict[str, Notice]:
+    return said(deviations=tuple(path_values(PLAN, samples, HERE, TRACKER)[1]))
+
+
+def said_of_settling(samples: Samples) -> dict[str, Notice]:
+    return said(settling=tuple(settling_values(PLAN, samples, HERE, Instrument(5e-6))[1]))
+
+
+# -- where no tip can have been ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0, 100.0, 1000.0])
+def test_a_sample_where_no_tip_can_have_been_is_refused_by_its_line(rate: float) -> None:
+    samples = runs(rate=rate)
+    row = int(np.flatnonzero(samples.cycle == 3)[len(samples.time) // 10])
+    text = refusal_of_path(moved(samples, [row], 0.8))
+    assert f"paths.csv, line {row + 2}: cycle 3 of AT on line has samples where no tip can have been" in text
+    assert "got '800" in text
+    assert "Remove these lines: samples may be missing" in text
+    kept = np.arange(len(samples.time)) != row
+    fewer = samples_of(
+        "AT",
+        "line",
+        [
+            (k, samples.time[kept & (samples.cycle == k)], samples.position[kept & (samples.cycle == k)])
+            for k in range(1, 6)
+        ],
+    )
+    assert the(path_values(PLAN, fewer, HERE, TRACKER)[0], "AT").value < 0.1e-3
+
+
+def test_wild_samples_in_a_row_in_several_places_and_at_both_ends_are_named() -> None:
+    samples = runs()
+    assert "lines 52 to 56: cycle 1" in refusal_of_path(moved(samples, slice(50, 55), 0.3))
+    last = int((samples.cycle == 1).sum()) - 1
+    assert "line 2: cycle 1" in refusal_of_path(moved(samples, [0], 0.3))
+    assert f"line {last + 2}: cycle 1" in refusal_of_path(moved(samples, [last], 0.3))
+    text = refusal_of_path(moved(samples, [30, 60, 90, 120, 150], 0.3))
+    assert "line 32, line 62, line 92 and 2 more such places" in text
+    stream = replace(samples, cycle=0 * samples.cycle, time=samples.time + 10.0 * samples.cycle)
+    assert "line 52: the stream of AT on line" in refusal_of_path(moved(stream, [50], 0.3))
+
+
+def test_a_record_that_jumps_and_stays_there_is_to_be_measured_again() -> None:
+    samples = runs()
+    text = refusal_of_path(moved(samples, slice(60, int((samples.cycle == 1).sum())), 0.03))
+    assert "lines 61 and 62: cycle 1 of AT on line jumps" in text
+    assert "measure the cycle again" in text
+
+
+def test_a_record_that_is_wild_all_over_is_refused() -> None:
+    samples = runs()
+    rng = np.random.default_rng(0)
+    position = (
+        samples.position
+        + 0.05 * rng.normal(size=samples.position.shape) * (rng.random(len(samples.time)) < 0.1)[:, None]
+    )
+    assert "no tip can have been" in refusal_of_path(replace(samples, position=position))
+
+
+def test_a_wild_sample_on_the_way_to_rest_is_refused() -> None:
+    samples = resting()
+    with pytest.raises(InputError, match=r"line 2802: cycle 3 of t at P1 has samples where no tip can have been"):
+        settling_values(PLAN, moved(samples, [2800], 5e-3), HERE, EXACT)
+
+
+# -- as in no other cycle ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("size", "rows"), [(2e-3, [310]), (0.4e-3, [310]), (1e-3, [310, 311])])
+def test_a_sample_that_lies_apart_as_in_no_other_cycle_is_said(size: float, rows: list[int]) -> None:
+    samples = runs()
+    assert not said_of_paths(samples)
+    notice = said_of_paths(moved(samples, rows, size))["unusual-samples"]
+    assert notice.level == "warning"
+    cycle = int(samples.cycle[rows[0]])
+    assert any(
+        f"line {row + 2} (cycle {cycle} of AT on line" in notice.message for row in (*rows, rows[0] - 1, rows[-1] + 1)
+    )
+    assert "remove these lines" in notice.message
+
+
+def test_a_small_spike_at_rest_is_said() -> None:
+    samples = resting()
+    assert "unusual-samples" not in said_of_settling(samples)
+    notice = said_of_settling(moved(samples, [2700], 0.1e-3))["unusual-samples"]
+    assert "line 2702 (cycle 3 of t at P1" in notice.message
+
+
+def test_many_unusual_samples_are_counted() -> None:
+    message = said_of_paths(moved(runs(), [30, 60, 250, 280, 310, 340], 2e-3))["unusual-samples"].message
+    assert message.count("cycle 1 of") + message.count("cycle 2 of") == 5
+    assert "and 1 more" in message
+
+
+def test_what_all_cycles_have_is_not_unusual_nor_anything_of_two_cycles() -> None:
+    samples = runs(cycles=2)
+    assert not said_of_paths(moved(samples, [60], 1e-3))
+    samples = runs()
+    everywhere = [60 + k * int((samples.cycle == 1).sum()) for k in range(5)]
+    assert not said_of_paths(moved(samples, everywhere, 2e-3))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_clean_streams_have_no_unusual_sample(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rate = (25.0, 50.0, 100.0, 250.0)[seed % 4]
+    name = ("rectangle", "line", "large-circle")[seed % 3]
+    length = Way(PLAN.paths[name]).length
+
+    def aside(s: Array) -> Array:
+        return np.outer(3e-4 * np.sin(2 * np.pi * s / length), NORMAL)
+
+    t, p, _ = stream_of(PLAN, name, rate, rng, cycles=5, offset=aside, velocity=V, sigma=(2e-5, 1e-4)[seed % 2])
+    (run,) = runs_of(PLAN, samples_of("AT", name, [(0, t, p)]), HERE, "AT")
+    assert len(run.cycles) == 5
+    cycles = run.cycles
+    assert not unusual_samples([c.time for c in cycles], [c.position for c in cycles], [c.along for c in cycles])
+
+
+# -- cycles as a whole ---------------------------------------------------------------------------------
+
+
+def test_a_cycle_that_lies_apart_as_a_whole_is_said_with_what_is_without_it() -> None:
+    samples = runs()
+    notice = said_of_paths(moved(samples, slice(0, int((samples.cycle == 1).sum())), 1e-3))["wild-cycle"]
+    assert notice.level == "warning"
+    assert "cycle 1 of AT on line by 0.99" in notice.message
+    assert "RT is 1.1" in notice.message
+    assert "without it 0.0" in notice.message
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e-3])
+def test_cycles_that_scatter_are_not_wild(scale: float) -> None:
+    rng = np.random.default_rng(1)
+    samples = runs(cycles=10)
+    for _ in range(20):
+        off = scale * rng.standard_normal((11, 3))
+        assert "wild-cycle" not in said_of_paths(replace(samples, position=samples.position + off[samples.cycle]))
+
+
+def test_samples_that_are_missing_on_a_part_of_the_way_are_said() -> None:
+    samples = runs()
+    kept = np.ones(len(samples.time), bool)
+    kept[100:130] = False
+    rows = [
+        (k, samples.time[kept & (samples.cycle == k)], samples.position[kept & (samples.cycle == k)])
+        for k in range(1, 6)
+    ]
+    notice = said_of_paths(samples_of("AT", "line", rows))["gap-in-path"]
+    assert notice.level == "warning"
+    assert "77.5 mm between lines 101 and 102 (cycle 1 of AT on line)" in notice.message
+    rng = np.random.default_rng(0)
+    lost = rng.random(len(samples.time)) < 0.2
+    rows = [
+        (k, samples.time[~lost & (samples.cycle == k)], samples.position[~lost & (samples.cycle == k)])
+        for k in range(1, 6)
+    ]
+    assert not said_of_paths(samples_of("AT", "line", rows))
+
+
+def test_two_runs_under_one_number_are_refused() -> None:
+    samples = runs()
+    twice = samples.cycle <= 2
+    # the way back lies between the two
+    back = samples.position[samples.cycle == 1][::-1] + 0.05 * NORMAL
+    t, p = samples.time[samples.cycle == 1], samples.position[twice]
+    n = len(t)
+    position = np.concatenate([p[:n], back, p[n:]])
+    time = np.concatenate([t, t + 3.0, t + 6.0])
+    text = refusal_of_path(samples_of("AT", "line", [(1, time, position)]))
+    assert "cycle 1 of line runs the path 2 times" in text
+    assert "Number the cycles, or leave the cells" in text
+
+
+def test_two_ways_to_rest_under_one_number_are_refused() -> None:
+    samples = resting()
+    n = int((samples.cycle == 1).sum())
+    once, slower = samples.position[:n], CENTRE + 0.5 * (samples.position[:n] - CENTRE)
+    time = np.concatenate([samples.time[:n], samples.time[:n] + 3.0])
+    both = samples_of("t", "P1", [(1, time, np.concatenate([once, slower]))])
+    with pytest.raises(InputError, match=r"about line \d+: the tip goes away again after it came to rest; got '2[45]"):
+        settling_values(PLAN, both, HERE, EXACT)
+
+
+# -- coming to rest ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("power", "rate"), [(2, 1000.0), (2, 100.0), (3, 1000.0), (3, 250.0), (2.5, 500.0)])
+def test_the_begin_of_a_motion_is_found_whatever_power_of_time_it_grows_with(power: float, rate: float) -> None:
+    t = times(3.0, rate)
+    tau = np.maximum(t - 0.3, 0.0)
+    x = np.where(tau < 0.2, 0.05 * (tau / 0.2) ** power, 0.1 - 0.05 * np.exp(-(tau - 0.2) * power / 0.2))
+    samples = samples_of("posing-time", "D100", [(k, t, CENTRE + np.outer(x, ALONG)) for k in (1, 2, 3)])
+    _, curves = settling_values(PLAN, samples, HERE, EXACT)
+    assert [curve.start for curve in curves] == pytest.approx([0.3] * 3, abs=1e-3)
+
+
+def test_the_begin_of_a_gentle_motion_is_found_in_noise() -> None:
+    rng = np.random.default_rng(5)
+    t = times(3.0, 1000.0)
+    tau = np.clip(t - 0.3, 0.0, 0.4)
+    x = 0.05 * (tau / 0.2) ** 3 * (tau < 0.2) + (tau >= 0.2) * (0.1 - 0.05 * (2 - tau / 0.2) ** 3)
+    samples = samples_of(
+        "posing-time",
+        "D100",
+        [(k, t, CENTRE + np.outer(x, ALONG) + rng.normal(0, 1e-5, (len(t), 3))) for k in range(1, 7)],
+    )
+    _, curves = settling_values(PLAN, samples, HERE, Instrument(1e-5))
+    assert np.mean([curve.start for curve in curves]) == pytest.approx(0.3, abs=5e-3)
+
+
+def ringing(rate: float, hertz: float, sigma: float, *, amplitude: float = 5e-3, damping: float = 0.4) -> Samples:
+    """Return cycles of a damped oscillation, each sampled at other times."""
+    rng = np.random.default_rng(2)
+    w = 2 * np.pi * hertz
+    d = w * np.sqrt(1 - damping**2)
+    rows = []
+    for k in (1, 2, 3):
+        t = times(1.5, rate) + k / 3 / rate
+        tau = np.maximum(t - 0.1, 0.0)
+        x = amplitude * np.exp(-damping * w * tau) * (np.cos(d * tau) + damping * w / d * np.sin(d * tau))
+        rows.append((k, t, CENTRE + np.outer(x, ALONG) + rng.normal(0.0, sigma, (len(t), 3))))
+    return samples_of("t", "P1", rows)
+
+
+def test_noise_makes_an_overshoot_little_larger() -> None:
+    true = 5e-3 * np.exp(-0.4 * np.pi / np.sqrt(1 - 0.4**2))
+    values, curves = settling_values(PLAN, ringing(1000.0, 8.0, 1e-5), HERE, Instrument(1e-5))
+    assert the(values, "OV").value == pytest.approx(true, rel=0.01)
+    assert the(values, "OV").value < max(curve.distance[curve.time > 0.16].max() for curve in curves)
+
+
+@pytest.mark.parametrize(("rate", "status"), [(500.0, "measured"), (50.0, "instrument-too-coarse")])
+def test_an_oscillation_with_fewer_than_eight_samples_a_period_is_marked(rate: float, status: str) -> None:
+    values, curves = settling_values(PLAN, ringing(rate, 8.0, 0.0), HERE, EXACT)
+    assert {value.status for value in values} == {status}
+    assert ("sampled-too-slowly" in said(settling=tuple(curves))) == (status != "measured")
+
+
+def test_an_excursion_that_noise_puts_in_the_band_or_outside_is_marked() -> None:
+    # the second excursion ends within noise of the band
+    damping = 0.4
+    peak = np.exp(-2 * np.pi * damping / np.sqrt(1 - damping**2))
+    for sigma, status in ((0.0, "measured"), (5e-6, "instrument-too-coarse")):
+        samples = ringing(250.0, 8.0, sigma, amplitude=1.02 * PLAN.limit_band / peak, damping=damping)
+        values, _ = settling_values(PLAN, samples, HERE, Instrument(sigma))
+        assert the(values, "t").status == status
+
+
+# -- times of another unit -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("factor", "word"), [(1e3, "slower"), (1e-3, "faster"), (1e6, "slower"), (60.0, "slower")])
+def test_times_of_another_unit_are_refused(factor: float, word: str) -> None:
+    samples = runs()
+    text = refusal_of_path(replace(samples, time=samples.time * factor))
+    assert f"the path line was run much {word} than commanded" in text
+    assert "allowed: 5 to 500 mm/s; commanded are 250. Write the times in seconds" in text
+    rest = resting()
+    word = {"slower": "more slowly", "faster": "faster"}[word]
+    with pytest.raises(InputError, match=rf"the tip would move {word} than any robot's.*Write the times in seconds"):
+        settling_values(PLAN, replace(rest, time=rest.time * factor * (10 if factor > 1 else 0.1)), HERE, EXACT)
+
+
+def test_a_path_at_a_third_of_the_velocity_is_said_and_a_small_circle_is_not() -> None:
+    samples = runs()
+    slow = replace(samples, time=3 * samples.time)
+    notice = said_of_paths(slow)["slow-path"]
+    assert (notice.level, "AT on line at 83." in notice.message, "of 250 mm/s" in notice.message) == (
+        "warning",
+        True,
+        True,
+    )
+    circle = runs(shape="small-circle")
+    assert not said_of_paths(replace(circle, time=3 * circle.time))
+
+
+def test_a_pause_on_the_way_is_no_slow_path() -> None:
+    t = times(LENGTH / V + 4.0, 100.0)
+    s = np.where(t < 0.5, V * t, np.where(t < 4.5, V * 0.5, V * (t - 4.0)))
+    assert not said_of_paths(samples_of("AT", "line", [(1, t, along(PLAN, "line", s))]))
+
+
+def test_orientations_in_another_order_are_refused() -> None:
+    samples = runs()
+    rotation = np.broadcast_to(np.diag([1.0, -1.0, -1.0]), (len(samples.time), 3, 3))
+    with pytest.raises(InputError, match=r"columns qw to qz: .*180.0 deg off"):
+        path_values(PLAN, replace(samples, rotation=rotation), HERE, TRACKER)
+
+
+# -- samples that are too far apart --------------------------------------------------------------------
+
+
+def cornering(rate: float, radius: float) -> Samples:
+    """Return cycles of the rectangle with corners cut by an arc, sampled at other places in each cycle."""
+    points = PLAN.paths["rectangle"].points
+    way = [points[0]]
+    for k in (1, 2, 3):
+        u, w = (points[k] - points[k - 1], points[k + 1] - points[k])
+        u, w = u / np.linalg.norm(u), w / np.linalg.norm(w)
+        angle = np.linspace(0.0, np.pi / 2, 200)
+        way += list(
+            points[k] - radius * u + radius * w + radius * (np.outer(np.sin(angle), u) - np.outer(np.cos(angle), w))
+        )
+    line = np.array([*way, points[4]])
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    rows = []
+    for k in range(3):
+        t = times(run[-1] / V * 1.02, rate) + k / 3 / rate
+        rows.append((k + 1, t, np.column_stack([np.interp(V * t, run, line[:, axis]) for axis in range(3)])))
+    return samples_of("CR", "rectangle", rows)
+
+
+@pytest.mark.parametrize(("rate", "status"), [(250.0, "measured"), (12.5, "instrument-too-coarse")])
+def test_corners_between_samples_are_marked(rate: float, status: str) -> None:
+    values, corners = corner_values(PLAN, cornering(rate, 0.01), HERE, EXACT)
+    assert {value.status for value in values} == {status}
+    if status == "measured":
+        assert the(values, "CR", where="rectangle E3").value == pytest.approx((np.sqrt(2) - 1) * 0.01, rel=0.03)
+        assert "sampled-too-slowly" not in said(corners=tuple(corners))
+    else:
+        notice = said(corners=tuple(corners))["sampled-too-slowly"]
+        assert (notice.level, "CR, CO" in notice.message) == ("warning", True)
+
+
+def test_a_path_with_fewer_samples_than_half_of_the_stations_is_marked() -> None:
+    samples = runs(rate=10.0)
+    values, records = path_values(PLAN, samples, HERE, EXACT)
+    assert {value.status for value in values} == {"instrument-too-coarse"}
+    assert "AT, RT" in said(deviations=tuple(records))["sampled-too-slowly"].message
+
+
+def test_a_corner_of_a_path_that_lies_beside_is_said_with_its_own() -> None:
+    samples = cornering(500.0, 0.005)
+    values, corners = corner_values(PLAN, samples, HERE, EXACT)
+    assert not said(corners=tuple(corners))
+    off = np.array([1e-3, 0.0, 0.0]) + 2e-3 * NORMAL
+    beside = replace(samples, position=samples.position + off)
+    _, corners = corner_values(PLAN, beside, HERE, EXACT)
+    for corner in corners:
+        assert corner.aside == pytest.approx(np.tile(off, (3, 1)), abs=1e-6)
+        assert corner.own == pytest.approx(the(values, "CR", where=corner.where).value, rel=0.02)
+    notice = said(corners=tuple(corners))["corner-offset"]
+    assert notice.level == "note"
+    assert "lies 2.236 mm beside" in notice.message
+
+
+# -- fluctuation of the velocity -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("rate", "sigma"), [(1000.0, 0.0), (1000.0, 1e-5), (250.0, 2e-5)])
+@pytest.mark.parametrize("turns", [5.0, 20.0, 40.0, 80.0])
+def test_the_interval_of_the_fluctuation_holds_every_swing_up_to_its_bandwidth(
+    turns: float, rate: float, sigma: float
+) -> None:
+    rng = np.random.default_rng(3)
+    t, w = times(LENGTH / V * 1.1, rate), 2 * np.pi * turns
+    s = V * t + 0.01 / w * (1 - np.cos(w * t))
+    p = along(PLAN, "line", np.minimum(s, LENGTH))
+    rows = [(k, t, p + rng.normal(0.0, sigma, p.shape)) for k in range(1, 11)]
+    values, curves = velocity_values(PLAN, samples_of("AV", "line", rows), HERE, Instrument(sigma))
+    value = the(values, "FV")
+    assert value.interval is not None
+    assert value.bandwidth is not None
+    if turns <= value.bandwidth:
+        assert value.interval[0] <= 0.02 <= value.interval[1]
+        assert value.interval[1] < 0.03
+    else:
+        assert (value.bandwidth > 5.0) == (turns > 5.0)
+    assert value_summary(value)["bandwidth_hz"] == value.bandwidth
+    notice = said(velocities=tuple(curves))["velocity-bandwidth"]
+    assert notice.level == "note"
+    assert f"up to {value.bandwidth:.2g} Hz" in notice.message
+
+
+@pytest.mark.parametrize(("cycles", "there"), [(4, False), (5, True)])
+def test_paths_have_intervals_from_five_cycles_on(cycles: int, there: bool) -> None:
+    samples = runs(cycles=cycles)
+    values = path_values(PLAN, samples, HERE, TRACKER)[0]
+    moving = replace(samples, criterion=replace(samples.criterion, names=("AV",)))
+    values += velocity_values(PLAN, moving, HERE, TRACKER)[0]
+    for id_ in ("AT", "RT", "AV", "RV", "FV"):
+        assert (the(values, id_).interval is not None) == there
+        assert np.isfinite(the(values, id_).value)

@@ -197,7 +197,7 @@ def test_a_device_that_winds_no_cable() -> None:
         ({"floor": "0"}, "floor", "number"),
         ({"no_floor": 1}, "no_floor", "yes or no belongs here"),
         ({"clearance": -0.01}, "clearance", "the length is out of range"),
-        ({"clearance": 0.9}, "home", "no configuration was found in which the arm keeps clear"),
+        ({"clearance": 0.9}, "clearance", "no configuration was found in which the arm keeps clear"),
         ({"home": [0.0] * 5}, "home", "6 numbers belong here"),
         ({"home": [0.0, 0, 0, 0, 0, 6.5]}, "home", "joint 6 of the safe configuration is not where"),
         ({"home": [0.0, 1.5, 0, 0, 0, 0]}, "home", "the safe configuration is not clear"),
@@ -263,3 +263,33 @@ def test_a_calibrated_robot_is_looked_at_where_its_table_says() -> None:
     assert np.array_equal(here.tour.home, there.tour.home)
     assert there.made.robot.forward(there.joints)[0][:, 2].min() > 0.05
     assert replace(here.tour.stops[0], label=None).kind == "home"
+
+
+ODD = {
+    "one joint": "  - {name: a, theta_offset: 0, d: 0, a: 500, alpha: 0}\n",
+    "a pendulum": "  - {name: a, theta_offset: 0, d: 0, a: 0, alpha: 90}\n  - {name: b, theta_offset: 0, d: 0, a: 400, alpha: 0}\n",
+    "a horizontal arm": """\
+  - {name: a, theta_offset: 0, d: 200, a: 250, alpha: 0, limits: [-130, 130]}
+  - {name: b, theta_offset: 0, d: 0, a: 250, alpha: 180, limits: [-145, 145]}
+  - {name: c, type: prismatic, theta_offset: 0, d: 0, a: 0, alpha: 0, limits: [0, 150]}
+  - {name: d, theta_offset: 0, d: 20, a: 0, alpha: 0, limits: [-360, 360]}
+""",
+    "a gantry": """\
+  - {name: x, type: prismatic, theta_offset: 90, d: 0, a: 0, alpha: 90, limits: [100, 1000]}
+  - {name: y, type: prismatic, theta_offset: 90, d: 0, a: 0, alpha: 90, limits: [0, 1000]}
+  - {name: z, type: prismatic, theta_offset: 0, d: 0, a: 0, alpha: 0, limits: [0, 800]}
+""",
+}
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_arms_of_other_kinds_are_driven_where_nothing_is_near(kind: str, tmp_path: Path) -> None:
+    file = tmp_path / "odd.yaml"
+    head = "truearm: truearm-robot/1\nname: odd\nunits: {length: mm, angle: deg}\nconvention: standard-dh\njoints:\n"
+    file.write_text(head + ODD[kind] + "tools: {tip: {targets: {\"1\": [10, 0, 5]}}}\n")
+    low = {} if kind == "a horizontal arm" else {"no_floor": True}
+    planned = truearm.plan(file, poses=12, candidates=60, **low)  # type: ignore[arg-type]
+    assert planned.tour is not None
+    robot = planned.made.robot
+    assert sampled_room(robot, on_the_ways(planned), Cell(0.0 if not low else None), points=9).min() >= 0.05
+    assert len(planned.tour.measured) == 12

@@ -44,7 +44,7 @@ def safe_configuration(check: CollisionCheck, low: Array, high: Array) -> Array:
     holds_zero = (low <= -_INSIDE) & (high >= _INSIDE) & turning
     rest = np.where(holds_zero, 0.0, (low + high) / 2.0)
     tried = [k for k in range(1, min(6, len(low))) if turning[k]]
-    grid = np.array(list(product(*(_FEWER if k == 5 else _ANGLES for k in tried)))).reshape(-1, len(tried))
+    grid = np.array([*product(*(_FEWER if k == 5 else _ANGLES for k in tried))], ndmin=2)
     within = (grid >= (low + _INSIDE)[tried]) & (grid <= (high - _INSIDE)[tried])
     at = np.tile(rest, (len(grid) + 1, 1))
     at[1:, tried] = np.where(within, grid, rest[tried])
@@ -58,7 +58,7 @@ def safe_configuration(check: CollisionCheck, low: Array, high: Array) -> Array:
         number = int(np.argmin(check.rooms(best[None])[:, 0]))
         raise InputError(
             "no configuration was found in which the arm keeps clear, to start and to end in",
-            parameter="home",
+            parameter="clearance",
             came=f"{len(at) + _DRAWN} tried; in the best of them {check.words(number)}",
             allowed=f"{check.cell.clearance * 1e3:g} mm of room to everything",
             cure="See that limits, floor and boxes leave the arm room; lower `clearance`, or give one (`home`).",

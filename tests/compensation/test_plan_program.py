@@ -32,8 +32,8 @@ ROBOTS = {
     "krl": "kr5",
     "fanuc-ls": "lrmate200ic",
     "urscript": "ur5e",
-    "inform": "puma560",
-    "val3": "puma560",
+    "inform": "gp7",
+    "val3": "tx2_60",
 }
 WAITS = ("time", "input", "operator")
 

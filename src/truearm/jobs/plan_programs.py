@@ -92,7 +92,7 @@ class ProgramWanted:
                 where=robot.name,
                 came=self.name,
                 allowed=", ".join(known) or "none of the languages that programs are written in",
-                cure=f"Take `program={known[0]}`." if known else "Plan without it, and drive the rows of plan.csv.",
+                cure=f"Take `program={known[0]}`." if known else "Plan without it, and drive the rows of plan-ways.csv.",
             )
         if len(robot.joints) > _AXES:
             raise InputError(
@@ -100,7 +100,7 @@ class ProgramWanted:
                 parameter="program",
                 where=robot.name,
                 came=f"{len(robot.joints)} joints",
-                cure="Plan without it, and drive the rows of plan.csv.",
+                cure="Plan without it, and drive the rows of plan-ways.csv.",
             )
         if device is not None and device not in _SEEN:
             raise InputError(

@@ -4,17 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.arms import ARMS
 from tests.simulated import campaign
 
 from truearm.errors import InputError
 from truearm.identification.solving.fit import place
 from truearm.identification.start_values.frames import initial_frames, placed_errors
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.transform import Transform, quaternion_from_rotation
 
 
-@pytest.mark.parametrize("name", library())
+@pytest.mark.parametrize("name", ARMS)
 def test_the_closed_form_finds_base_and_targets_of_a_nominal_robot(name: str) -> None:
     twin, data = campaign(name, 30, 0.0, 1, truth="nominal")
     found = initial_frames(load_robot(name), data)

@@ -5,6 +5,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from tests.arms import ARMS
 from tests.simulated import campaign, more_of
 
 from truearm.errors import InputError
@@ -13,13 +14,13 @@ from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import MODELS
 from truearm.identification.solving.rounds import Redundant
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.measurement.statistics import errors_of
 
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
 
 
-@pytest.mark.parametrize("name", library())
+@pytest.mark.parametrize("name", ARMS)
 def test_without_noise_dropping_finds_the_truth(name: str) -> None:
     twin, data = campaign(name, 60, 0.0, 11)
     fit = identify(load_robot(name), data, GEOMETRIC, redundancy="drop")

@@ -17,13 +17,13 @@ from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
+from tests.arms import ARMS
 from tests.jobs.examples import EXAMPLES
 
 import truearm
 from truearm import results
 from truearm.errors import InputError
 from truearm.jobs import JOBS
-from truearm.library import library
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import Payload
@@ -271,7 +271,7 @@ def test_every_result_is_frozen_typed_and_on_the_page(record: type[Record]) -> N
     assert re.search(rf"\b{record.__name__}\b", (ROOT / "docs" / "api.md").read_text())
 
 
-@pytest.mark.parametrize("name", library())
+@pytest.mark.parametrize("name", ARMS)
 def test_every_robot_refuses_what_it_cannot_use(name: str) -> None:
     robot = truearm.load_robot(name)
     count = len(robot.joints)

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.arms import ARMS
 from tests.modeling.test_chain import random_frame, random_robot
 
 from truearm.errors import InputError
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.conventions.cpc import published_direction
@@ -61,7 +62,7 @@ def test_every_convention_can_be_converted_to() -> None:
     assert set(CONVERSIONS) == {c.name for c in CONVENTIONS}
 
 
-@pytest.mark.parametrize("robot_id", library())
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_library_robot_goes_into_any_convention(robot_id: str) -> None:
     robot = load_robot(robot_id)
     for name in CONVERSIONS:
@@ -78,7 +79,7 @@ def test_library_robot_goes_from_any_convention_to_any(robot_id: str) -> None:
             check_same(converted(made, second), robot, rng)
 
 
-@pytest.mark.parametrize("robot_id", library())
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_calibrated_robot_goes_where_tilts_have_a_place(robot_id: str) -> None:
     rng = np.random.default_rng(1)
     placed = load_robot(robot_id).with_effects(["gain"]).with_frames(random_frame(rng), {"tip": random_frame(rng)})

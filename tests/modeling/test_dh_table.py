@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from tests.arms import ARMS
 
 from truearm.errors import InputError
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import JointKind
 from truearm.modeling.formats.dh_csv import dh_csv, read_dh_csv
@@ -50,7 +51,7 @@ def numbers(table: DHTable) -> Array:
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("robot_id", library())
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_table_of_library_robot_gives_its_poses(robot_id: str, form: DHConvention) -> None:
     rng = np.random.default_rng(1)
     robot = load_robot(robot_id).with_frames(Transform((0.3, -2.0, 0.7), (0.1, 0.7, -0.1, 0.7)), {})

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.arms import ARMS
 from tests.modeling.test_chain import random_frame, random_robot
 
 from truearm.errors import InputError
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import CONVENTIONS, Convention
 from truearm.modeling.formats import python_template
@@ -103,14 +104,14 @@ def check_table(robot: Robot, format_: str, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("format_", TABLES)
-@pytest.mark.parametrize("robot_id", library())
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_tables_of_nominal_robots_read_back(robot_id: str, format_: str, tmp_path: Path) -> None:
     robot = load_robot(robot_id)
     check_table(robot, format_, tmp_path)
     check_table(robot.with_frames(random_frame(np.random.default_rng(0)), {}), format_, tmp_path)
 
 
-@pytest.mark.parametrize("robot_id", library())
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_hayati_tables_of_calibrated_robots_read_back(robot_id: str, tmp_path: Path) -> None:
     check_table(calibrated(load_robot(robot_id), ELASTIC), "hayati", tmp_path)
 
@@ -187,7 +188,7 @@ def test_comments_alone_are_no_table(tmp_path: Path) -> None:
 # -- URDF ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("robot_id", library())
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_pinocchio_reads_the_urdf(robot_id: str) -> None:
     pin = pytest.importorskip("pinocchio")
     robot = calibrated(load_robot(robot_id), ("gain",))
@@ -351,7 +352,7 @@ def module(robot: Robot) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("effects", EFFECTS, ids=["geometric", "elastic", "full", "tilting", "curved"])
-@pytest.mark.parametrize("robot_id", library())
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_the_python_file_gives_the_poses(robot_id: str, effects: tuple[str, ...]) -> None:
     robot = calibrated(load_robot(robot_id), effects)
     check_poses(module(robot)["forward"](q := configurations(robot)), robot, q)

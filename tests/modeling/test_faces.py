@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.arms import ARMS
 from tests.modeling.test_effects import NAMES as EVERY_EFFECT
 
 from truearm.errors import InputError
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.frames import FRAMES
@@ -84,7 +85,7 @@ def sliding() -> Robot:
 # -- forward and inverse ----------------------------------------------------------------------------------
 
 
-CASES = [*((name, ()) for name in library()), *((name, EXACT) for name in library()), ("katana450", LINEAR)]
+CASES = [*((name, ()) for name in ARMS), *((name, EXACT) for name in ARMS), ("katana450", LINEAR)]
 
 
 @pytest.mark.parametrize(("name", "effects"), CASES, ids=lambda v: v if isinstance(v, str) else f"{len(v)} effects")
@@ -397,7 +398,7 @@ def test_gravity_that_is_none_is_refused(gravity: Any) -> None:
 # -- what a robot shows of itself -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", library())
+@pytest.mark.parametrize("name", ARMS)
 def test_a_robot_is_short(name: str) -> None:
     robot = calibrated(name, EXACT)
     assert repr(robot).startswith(f"{name}: {robot.title}\n")

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.arms import ARMS
 from tests.modeling.pinocchio_oracle import Body, PinocchioChain
 from tests.modeling.test_chain import random_frame, random_robot, random_unit
 
 from truearm.errors import InputError
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.modeling.chain import Array, Chain, Direction, Element, across, axis_of
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.loads import joint_loads
@@ -20,7 +21,7 @@ from truearm.modeling.transform import Transform
 from truearm.simulation.twin_slides import carried, directions_at
 
 CONFIGURATIONS = 7
-WITH_MASSES = [name for name in library() if load_robot(name).masses]
+WITH_MASSES = [name for name in ARMS if load_robot(name).masses]
 CONVENTION = {c.name: c for c in CONVENTIONS}
 
 

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from tests.arms import ARMS
 
 from truearm.errors import InputError
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.formats.robot_file import read_robot, robot_text
@@ -661,7 +662,7 @@ def check_new_file(robot: Robot, folder: Path) -> None:
         assert_allclose(centres[1], centres[0], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("robot_id", library())
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_new_file_of_library_robot(robot_id: str, tmp_path: Path) -> None:
     robot = load_robot(robot_id)
     check_new_file(robot, tmp_path)

@@ -11,9 +11,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.arms import ARMS
 
 from truearm.errors import InputError
-from truearm.library import library, load_robot
+from truearm.library import load_robot
 from truearm.measurement import inclinometer
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS, Effect
@@ -175,7 +176,7 @@ def test_the_twin_goes_a_way_of_its_own(module: ModuleType) -> None:
 
 def test_with_nothing_true_but_the_robot_the_twin_is_the_model() -> None:
     rng = RNG(0)
-    for name in library():
+    for name in ARMS:
         twin = truth_twin(load_robot(name), "random", rng)
         twin = replace(twin, robot=twin.robot.with_effects(["gain"]).with_values({"gain_2": 1.01}))
         q = twin.robot.random_configurations(3, rng)

@@ -7,5 +7,5 @@ from truearm.results.library import RobotList
 
 
 def robots() -> RobotList:
-    """List the robots of the library."""
+    """List the robots of the library: maker, joints, reach, and whether their controllers are known."""
     return RobotList(tuple(load_robot(robot_id) for robot_id in library()))

@@ -15,6 +15,9 @@ from truearm.modeling.robot import Robot
 
 #: How much of a file is looked at to tell what it is [bytes].
 _BEGINNING: Final = 4096
+#: Of an id that was half given, how many letters and digits are needed, and how many ids are offered at most.
+_SHORTEST_HELD: Final = 2
+_MOST_OFFERED: Final = 8
 _URDF: Final = re.compile(r".*\.(?:urdf|xml|xacro)", re.I | re.S)
 
 
@@ -53,7 +56,7 @@ def load_robot(robot: str | Path) -> Robot:
         If there is no such robot, or its file cannot be used.
     """
     text = str(robot)
-    choice = f"a library id ({', '.join(library())}), a robot file or a URDF"
+    choice = f"a library id ('truearm robots' lists all {len(library())}), a robot file or a URDF"
     if not text.strip():
         raise InputError("no robot is given", parameter="robot", came=text, allowed=choice)
     if text in library():
@@ -74,7 +77,7 @@ def load_robot(robot: str | Path) -> Robot:
         )
     if exists(path) or path.suffix or len(path.parts) > 1:
         return read_robot(path)
-    near = nearest_names(text, library())
+    near = [f"{name} ({_of_library(name).title})" for name in close_names(text)]
     raise InputError(
         "there is no such robot",
         parameter="robot",
@@ -82,6 +85,21 @@ def load_robot(robot: str | Path) -> Robot:
         allowed=choice,
         cure=f"Did you mean {' or '.join(near)}?" if near else "Run 'truearm robots' for the library.",
     )
+
+
+def close_names(text: str) -> list[str]:
+    """Return the ids of the library that somebody may have meant: those that hold the text, or else those like it.
+
+    Letters and digits count: ``IRB 1200`` is close to every IRB 1200. None of them is ever taken for it, since arms of
+    one series differ in their lengths.
+    """
+    asked = _letters(text)
+    held = [name for name in library() if len(asked) >= _SHORTEST_HELD and asked in _letters(name)]
+    return held[:_MOST_OFFERED] or nearest_names(text, library())
+
+
+def _letters(text: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", text.lower())
 
 
 @cache

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
+from typing import Final, Literal
 
 from truearm.arrays import finite_number, number_array
 from truearm.errors import InputError, wrong_kind
@@ -18,6 +18,7 @@ from truearm.units import quantity_si
 #: Standard gravity, with the base's z upwards [m/s^2].
 GRAVITY: Final = (0.0, 0.0, -9.80665)
 Inertia = tuple[float, float, float, float, float, float]
+ReachPoint = Literal["wrist-centre", "flange"]
 POINT_MASS: Final[Inertia] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 SLIDES: Final[tuple[tuple[str, Motion], ...]] = (("x", "Tx"), ("y", "Ty"), ("z", "Tz"))
 TURNS: Final[tuple[tuple[str, Motion], ...]] = (("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz"))
@@ -57,6 +58,34 @@ class Joint:
     def range(self) -> tuple[float, float]:
         """Where it can be [rad or m]: within its limits, or a turn, or 1 m."""
         return self.limits or ((-math.pi, math.pi) if self.kind == "revolute" else (-0.5, 0.5))
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far an arm reaches, as its maker says.
+
+    Attributes
+    ----------
+    distance
+        [m].
+    axis
+        The joint, from 1, from the line of whose axis it is measured; None if it is of no such line and point.
+    point
+        Up to where: ``flange``, or ``wrist-centre``, the point of the last axis that is nearest to the axis before it.
+        None with `axis`.
+    """
+
+    distance: float
+    axis: int | None = None
+    point: ReachPoint | None = None
+
+    @property
+    def text(self) -> str:
+        """In words, in mm."""
+        words = f"{self.distance * 1e3:.6g} mm"
+        if self.point is None:
+            return words
+        return f"{words} from axis {self.axis} to the {self.point.replace('-', ' ')}"
 
 
 @dataclass(frozen=True)

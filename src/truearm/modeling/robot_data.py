@@ -27,6 +27,7 @@ from truearm.modeling.parts import (
     Joint,
     LinkMass,
     Payload,
+    Reach,
     Target,
     Tool,
     Truth,
@@ -76,6 +77,8 @@ class RobotData:
         What acts on its tool besides weight; None of nothing. Robot files do not hold it.
     rated_load
         Mass that its maker rates it for [kg]; None if that is not known.
+    reach
+        How far it reaches, as its maker says; None if that is not known.
     base_quaternion
         Reference orientation of the base in the world.
     targets
@@ -124,6 +127,7 @@ class RobotData:
     history: tuple[str, ...] = ()
     proof: Proof | None = None
     balancers: tuple[Balancer, ...] = ()
+    reach: Reach | None = None
 
     def __repr__(self) -> str:
         changed = sum(p.value != p.nominal for p in self.parameters.values())

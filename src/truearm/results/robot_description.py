@@ -10,6 +10,7 @@ import numpy as np
 
 from truearm.modeling.formats.balancer_entry import balancer_entry
 from truearm.modeling.formats.controller_entry import controller_entry
+from truearm.modeling.formats.reach_entry import reach_summary
 from truearm.modeling.formats.robot_file import is_intact
 from truearm.modeling.parts import GRAVITY
 from truearm.modeling.robot import Robot
@@ -71,6 +72,7 @@ class RobotDescription(Record):
                 "cog_mm": [written(v, "mm") for v in robot.payload.cog],
             },
             "rated_load_kg": robot.rated_load,
+            **reach_summary(robot.reach),
             "gravity": list(robot.gravity),
             "controller": controller_entry(robot.controller, robot.joints),
             "tools": list(robot.tools),
@@ -105,6 +107,8 @@ class RobotDescription(Record):
             text.append(f"Payload: {payload['mass_kg']:g} kg at x {x:g}  y {y:g}  z {z:g} mm of the flange")
         if robot.rated_load is not None:
             text.append(f"Rated load: {robot.rated_load:g} kg")
+        if robot.reach is not None:
+            text.append(f"Reach: {robot.reach.text}")
         if robot.gravity != GRAVITY:
             text.append("Free fall: {:g}, {:g}, {:g} m/s^2 in the base frame".format(*robot.gravity))
         if content["controller"]:

@@ -29,6 +29,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import SCALE, FreeParameters, Parameter
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rigid_motion
 from truearm.notices import Notice
 from truearm.shown import listed
 
@@ -57,6 +58,8 @@ _SAME: Final = 0.8
 #: Configurations that robots of the library are compared on, and how many times better one must fit to be named.
 _COMPARED: Final = 60
 _SEVERAL_TIMES: Final = 2.0
+#: Robots of the library that are compared on readings that say nothing of where the robot stands.
+_MOST_COMPARED: Final = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,12 +269,11 @@ class _Better:
             few = data.of_configurations(np.linspace(0, data.configurations - 1, _COMPARED).astype(np.intp))
         given = _uncalibrated_error(replace(robot, known={}, effect_names=(), proof=None), few)
         kinds = [joint.kind for joint in robot.joints]
-        alike = {name: load_robot(name) for name in library()}
-        found = {
-            name: _uncalibrated_error(one, few)
-            for name, one in alike.items()
-            if [joint.kind for joint in one.joints] == kinds
-        }
+        robots = {name: load_robot(name) for name in library()}
+        alike = {name: one for name, one in robots.items() if [joint.kind for joint in one.joints] == kinds}
+        if not few.anchored:
+            alike = _nearest(robot, alike, few.joints)
+        found = {name: _uncalibrated_error(one, few) for name, one in alike.items()}
         best = min(found, key=lambda name: found[name], default=None)
         if best is None or not found[best] * _SEVERAL_TIMES <= given < math.inf:
             return None
@@ -285,6 +287,20 @@ class _Better:
             f" {self.name} of the library fits them {self.given / self.left:.2g} times better without calibration: "
             f"{self.left * 1e3:.3g} mm beside {self.given * 1e3:.3g} mm (root mean square)."
         )
+
+
+def _nearest(robot: Robot, others: dict[str, Robot], joints: Array) -> dict[str, Robot]:
+    """Return the robots whose flanges go the ways most like those of `robot`, wherever they stand.
+
+    Readings that say nothing of where a robot stands take a second or so for each that is nothing like it.
+    """
+    places = robot.forward(joints)[0]
+    away = {}
+    for name, one in others.items():
+        points = one.forward(joints)[0]
+        rotation, translation = rigid_motion(points, places)
+        away[name] = float(np.linalg.norm(points @ rotation.T + translation - places))
+    return {name: others[name] for name in sorted(away, key=lambda name: away[name])[:_MOST_COMPARED]}
 
 
 def _uncalibrated_error(robot: Robot, data: Dataset) -> float:

@@ -110,6 +110,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
         if content.payload is None
         else Payload(si(content.payload.mass, "1", "payload.mass"), metres(content.payload.cog, "payload.cog")),
         rated_load=None if content.rated_load is None else si(content.rated_load, "1", "rated_load"),
+        reach=None if content.reach is None else content.reach.reach(len(joints), length, f"{where}, reach"),
         gravity=content.gravity,
         base_quaternion=content.base_quaternion,
         targets=tuple(Target(t.name, t.quaternion) for t in content.targets),

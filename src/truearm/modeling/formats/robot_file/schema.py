@@ -25,6 +25,7 @@ from truearm.modeling.formats.entries import (
     Share,
     Triple,
 )
+from truearm.modeling.formats.reach_entry import ReachEntry
 from truearm.modeling.parts import GRAVITY, POINT_MASS, Inertia
 from truearm.printable import is_one_line
 
@@ -227,6 +228,7 @@ class RobotFile(_Entry):
     balancers: list[BalancerEntry] = Field([], max_length=20)
     payload: PayloadEntry | None = None
     rated_load: Positive | None = None
+    reach: ReachEntry | None = None
     gravity: Annotated[Triple, AfterValidator(_falls)] = GRAVITY
     tools: dict[Name, ToolEntry] = {}
     truths: dict[Name, TruthEntry] = {}

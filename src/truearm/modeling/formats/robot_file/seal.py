@@ -14,7 +14,19 @@ from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 
 #: Entries of a robot file that say nothing of where the robot goes.
-_BESIDE: Final = ("truearm", "name", "title", "maker", "source", "rated_load", "priors", "tools", "truths", "history")
+_BESIDE: Final = (
+    "truearm",
+    "name",
+    "title",
+    "maker",
+    "source",
+    "rated_load",
+    "reach",
+    "priors",
+    "tools",
+    "truths",
+    "history",
+)
 
 
 def sealed(robot: Robot, proof: Proof) -> Robot:

@@ -13,6 +13,7 @@ from truearm.modeling.formats.balancer_entry import balancer_entry
 from truearm.modeling.formats.controller_entry import controller_entry
 from truearm.modeling.formats.curve_entry import curve_entries
 from truearm.modeling.formats.entries import NAME, place_entry
+from truearm.modeling.formats.reach_entry import reach_entry
 from truearm.modeling.formats.robot_file.correlations import correlations_text
 from truearm.modeling.formats.robot_file.schema import SCHEMA
 from truearm.modeling.parameters import Parameter
@@ -159,6 +160,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
         content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
     if robot.rated_load is not None:
         content["rated_load"] = robot.rated_load
+    if robot.reach is not None:
+        content["reach"] = flow(reach_entry(robot.reach))
     if robot.gravity != GRAVITY:
         content["gravity"] = listed(list(robot.gravity))
     if robot.tools:

@@ -182,6 +182,27 @@ def test_configurations_without_a_way_are_left_out_and_counted() -> None:
     assert (planned.made.robot.forward(planned.joints)[0][:, 1] > 0.0).all()
 
 
+@pytest.mark.parametrize("pull", [20.0, 0.0])
+def test_pairs_for_inclinometers_are_driven(pull: float, tmp_path: Path) -> None:
+    out = tmp_path / "pairs.csv"
+    planned = truearm.plan_inclinometers("katana450", poses=8, candidates=100, pull=pull, out=out)
+    tour = planned.tour
+    at = np.concatenate(
+        [pairs.joints_in_turn()[0] for pairs in (planned.made.inclined, planned.made.posed) if len(pairs)]
+    )
+    assert np.array_equal(np.array([stop.joints for stop in tour.measured]), at)
+    assert [stop.label for stop in tour.measured] == [str(k + 1) for k in range(len(at))]
+    share = np.linspace(0.0, 1.0, 12)[:, None]
+    ways = np.concatenate([a + share * (b - a) for a, b in pairwise(tour.joints)])
+    assert sampled_room(planned.robot, ways, Cell(), points=9).min() >= 0.05
+    assert any(line.startswith("Driven from home (") for line in planned.lines())
+    assert planned.summary()["ways"]["clearance_mm"] == pytest.approx(50.0)
+    with (tmp_path / "pairs-ways.csv").open(newline="") as file:
+        assert [row["stop"] for row in csv.DictReader(file)] == [stop.kind for stop in tour.stops]
+    with pytest.raises(InputError, match="the floor is above the base"):
+        truearm.plan_inclinometers("katana450", poses=8, candidates=100, floor=0.2)
+
+
 def test_a_device_that_winds_no_cable() -> None:
     planned = truearm.plan("irb120", poses=12, candidates=150, device="ballbar")
     assert planned.tour is not None
@@ -267,7 +288,10 @@ def test_a_calibrated_robot_is_looked_at_where_its_table_says() -> None:
 
 ODD = {
     "one joint": "  - {name: a, theta_offset: 0, d: 0, a: 500, alpha: 0}\n",
-    "a pendulum": "  - {name: a, theta_offset: 0, d: 0, a: 0, alpha: 90}\n  - {name: b, theta_offset: 0, d: 0, a: 400, alpha: 0}\n",
+    "a pendulum": """\
+  - {name: a, theta_offset: 0, d: 0, a: 0, alpha: 90}
+  - {name: b, theta_offset: 0, d: 0, a: 400, alpha: 0}
+""",
     "a horizontal arm": """\
   - {name: a, theta_offset: 0, d: 200, a: 250, alpha: 0, limits: [-130, 130]}
   - {name: b, theta_offset: 0, d: 0, a: 250, alpha: 180, limits: [-145, 145]}
@@ -286,7 +310,7 @@ ODD = {
 def test_arms_of_other_kinds_are_driven_where_nothing_is_near(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "odd.yaml"
     head = "truearm: truearm-robot/1\nname: odd\nunits: {length: mm, angle: deg}\nconvention: standard-dh\njoints:\n"
-    file.write_text(head + ODD[kind] + "tools: {tip: {targets: {\"1\": [10, 0, 5]}}}\n")
+    file.write_text(head + ODD[kind] + 'tools: {tip: {targets: {"1": [10, 0, 5]}}}\n')
     low = {} if kind == "a horizontal arm" else {"no_floor": True}
     planned = truearm.plan(file, poses=12, candidates=60, **low)  # type: ignore[arg-type]
     assert planned.tour is not None

@@ -154,7 +154,6 @@ def plan(
 
         beside: dict[str, object] = {"objective": objective, "accurate_at": accurate_at, "region": region}
         beside |= {"tools": tools, "frames": frames, "candidates_from": candidates_from, "constraints": constraints}
-        beside |= {"floor": floor, "no_floor": no_floor or None, "clearance": clearance, "home": home}
         beside |= {"program": program, "approach": approach or None, "speed": speed, "dwell": dwell, "wait": wait}
         refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
         with progress() as say:
@@ -169,6 +168,10 @@ def plan(
                 payload=payload,
                 gravity=read_gravity(gravity),
                 joints=joints,  # type: ignore[arg-type]
+                floor=None if floor is None else sized_si(floor, "mm", parameter="floor"),
+                no_floor=no_floor,
+                clearance=None if clearance is None else sized_si(clearance, "mm", parameter="clearance"),
+                home=read_seed(robot, home, joints, "home"),
                 command=command_line(),
                 progress=say,
             )
@@ -176,7 +179,7 @@ def plan(
             print_json(pairs.summary())
         else:
             print_record(pairs)
-            print_line(f"Written: {out}")
+            print_line(f"Written: {out}, {out.with_name(f'{out.stem}-ways.csv')}")
         return
     from truearm.jobs.plan import plan as run
 

@@ -49,8 +49,9 @@ from truearm.planning.choosing.observability import INDICES
 from truearm.planning.constraints.constraints import Constraints, read_constraints
 from truearm.planning.driving.joint_window import on_principal_turn
 from truearm.planning.driving.touring import tour_of, unreached
-from truearm.results.plan import PAGE, Plan, ways_beside
+from truearm.results.plan import PAGE, Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS
+from truearm.results.tour_files import ways_beside
 
 
 def plan(

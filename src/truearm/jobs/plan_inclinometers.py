@@ -25,12 +25,16 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.jobs.driving import cell_argument, finder_argument
 from truearm.measurement.inclinometer import deviation_of_change
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.inclinometer import CANDIDATES, TiltingPlan, plan_tilting
+from truearm.planning.driving.touring import tour_of
+from truearm.planning.driving.ways import WayFinder
 from truearm.results.inclinometer_plan import InclinometerPlan
+from truearm.results.tour_files import ways_beside
 
 #: Of a two-axis inclinometer (Patel, section 4.4.1) [rad]. It has the axes x and y of its link.
 RESOLUTION: Final = math.radians(0.001)
@@ -55,6 +59,10 @@ def plan_inclinometers(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     joints: JointsOf | None = None,
+    floor: float | None = None,
+    no_floor: bool = False,
+    clearance: float | None = None,
+    home: Sequence[float] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> InclinometerPlan:
@@ -85,6 +93,8 @@ def plan_inclinometers(
     joints
         Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
+    floor, no_floor, clearance, home
+        What is kept clear, and where the arm starts and ends, as for :func:`plan`.
     command
         How to run it again; None writes the call in Python.
     progress
@@ -97,6 +107,8 @@ def plan_inclinometers(
     """
     progress_argument(progress)
     table = None if out is None else file_for(out, robot)
+    if table is not None:
+        file_for(ways_beside(table), robot)
     count, force = even_argument(poses), pull_argument(pull)
     number, deviation = count_argument(candidates, "candidates"), deviation_argument(noise, "noise")
     rng = np.random.default_rng(whole_argument(seed, "seed"))
@@ -112,13 +124,23 @@ def plan_inclinometers(
         payload=carried,
         gravity=fall,
         joints=joints,
+        floor=floor,
+        no_floor=no_floor,
+        clearance=clearance,
+        home=home,
     )
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
+    progress("looking where the arm keeps clear")
+    cell = cell_argument(carrying, None, "", floor, no_floor, clearance)
+    finder = finder_argument(carrying, None, "", cell, home)
     progress("choosing pairs of configurations")
-    made = planned_pairs(carrying, count, rng, force, number, deviation)
-    planned = InclinometerPlan(carrying, made, force, call, files_of(robot), joints_are)
+    made = planned_pairs(carrying, count, rng, force, number, deviation, finder)
+    progress("looking for ways that keep clear")
+    at = np.concatenate([pairs.joints_in_turn()[0] for pairs in (made.inclined, made.posed) if len(pairs)])
+    tour = tour_of(finder, at, [str(k + 1) for k in range(len(at))])
+    planned = InclinometerPlan(carrying, made, force, call, tour, files_of(robot), joints_are)
     if table is not None:
         planned.save(table)
     return planned
@@ -147,7 +169,13 @@ def pull_argument(pull: object) -> float:
 
 
 def planned_pairs(
-    robot: Robot, count: int, rng: np.random.Generator, pull: float, candidates: int, pose_deviation: float
+    robot: Robot,
+    count: int,
+    rng: np.random.Generator,
+    pull: float,
+    candidates: int,
+    pose_deviation: float,
+    finder: WayFinder | None = None,
 ) -> TiltingPlan:
     """Choose the postures that inclinometers are read in, `count` of them, and poses under pulls if there is one."""
     if not robot.layout.turning:
@@ -164,4 +192,5 @@ def planned_pairs(
             candidates=candidates,
             deviation=deviation_of_change(RESOLUTION),
             pose_deviation=pose_deviation,
+            finder=finder,
         )

@@ -31,6 +31,7 @@ _NAMES: Final = ("rapid", "krl", "fanuc", "urscript", "inform", "val3")
 _AXES: Final = 6
 #: A speed that is higher by less is the same.
 _CLOSE: Final = 1.005
+_BY_ROWS: Final = "Plan without it, and drive the rows of plan-ways.csv."
 #: Characters of the plan's hash by which the program names it.
 _MARK: Final = 12
 #: No lower and no higher speed of a tip is meant [m/s].
@@ -92,7 +93,7 @@ class ProgramWanted:
                 where=robot.name,
                 came=self.name,
                 allowed=", ".join(known) or "none of the languages that programs are written in",
-                cure=f"Take `program={known[0]}`." if known else "Plan without it, and drive the rows of plan-ways.csv.",
+                cure=f"Take `program={known[0]}`." if known else _BY_ROWS,
             )
         if len(robot.joints) > _AXES:
             raise InputError(
@@ -100,7 +101,7 @@ class ProgramWanted:
                 parameter="program",
                 where=robot.name,
                 came=f"{len(robot.joints)} joints",
-                cure="Plan without it, and drive the rows of plan-ways.csv.",
+                cure=_BY_ROWS,
             )
         if device is not None and device not in _SEEN:
             raise InputError(

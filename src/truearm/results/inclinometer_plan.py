@@ -18,7 +18,10 @@ from truearm.modeling.controller import JointsOf
 from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.inclinometer import TiltingPlan
+from truearm.planning.driving.tour import Tour
+from truearm.planning.driving.tour_table import tour_csv, tour_words
 from truearm.results.record import Record, joints_lines
+from truearm.results.tour_files import tour_summary, ways_beside
 from truearm.shown import counted, listed
 from truearm.units import SHOWN_AS, from_si
 from truearm.writing import output_file, write_files
@@ -46,6 +49,8 @@ class InclinometerPlan(Record):
         Force on the flange [N], 0 for gravity alone.
     command
         How to run it again.
+    tour
+        How the configurations are driven, each way checked.
     inputs
         The files that were read: none of them is overwritten.
     joints_are
@@ -56,6 +61,7 @@ class InclinometerPlan(Record):
     made: TiltingPlan
     pull: float
     command: str
+    tour: Tour
     inputs: tuple[Path, ...] = ()
     joints_are: JointsOf = "model"
 
@@ -80,6 +86,7 @@ class InclinometerPlan(Record):
             "posed": 2 * len(self.made.posed),
             "pull_n": self.pull,
             "joints_are": self.joints_are,
+            "ways": tour_summary(self.tour, self.robot, self.joints_are),
             "expected": [
                 {"name": name, "unit": unit, "deviation": deviation, "prior": prior}
                 for name, unit, deviation, prior in self._expected()
@@ -96,6 +103,7 @@ class InclinometerPlan(Record):
                 f"{counted(2 * len(self.made.posed), 'configuration')} for poses, in pairs under pulls: they tell what "
                 "inclinometers cannot see, the turn of a joint about a vertical axis."
             )
+        text += tour_words(self.tour, self.robot, self.joints_are)
         for name, unit, deviation, prior in self._expected():
             known = "stays unknown" if name in self.unseen else f"known to {deviation:.2g} {unit}"
             text.append(f"  {name:<14} {known} (before: {prior:.2g} {unit})")
@@ -119,15 +127,17 @@ class InclinometerPlan(Record):
         return stream.getvalue()
 
     def save(self, file: str | Path) -> tuple[Path, ...]:
-        """Write the plan as CSV.
+        """Write the plan as CSV, and every stop on the ways in a second one.
 
         Returns
         -------
-        The file written.
+        The files written; the second ends in ``-ways.csv``.
         """
         table = output_file(file, self.inputs)
-        write_files(table.parent, {table.name: self.csv_text()}, self.command)
-        return (table,)
+        ways = output_file(ways_beside(table), self.inputs)
+        stops = tour_csv(self.tour, self.robot, self.joints_are)
+        write_files(table.parent, {table.name: self.csv_text(), ways.name: stops}, self.command)
+        return table, ways
 
 
 @dataclass(frozen=True, eq=False, repr=False)

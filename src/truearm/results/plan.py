@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -14,9 +13,10 @@ from truearm.planning.choosing.measurement_plan import ERROR, MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.choosing.prediction import There
 from truearm.planning.driving.tour import Tour
-from truearm.planning.driving.tour_table import home_shown, tour_csv, tour_words
+from truearm.planning.driving.tour_table import tour_csv, tour_words
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.results.record import Record, joints_lines
+from truearm.results.tour_files import tour_summary, ways_beside
 from truearm.writing import output_file, output_folder, write_files
 
 #: What the page beside a plan ends with.
@@ -132,7 +132,7 @@ class Plan(Record):
             "usable": made.usable,
             "rejected": dict(made.rejected),
             "left_out": list(made.left_out),
-            **self._tour_summary(),
+            **({} if self.tour is None else {"ways": tour_summary(self.tour, made.robot, self.joints_are)}),
             **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
             "seconds": made.seconds,
             **({} if self.program is None else {"program": self.program.summary()}),
@@ -157,21 +157,6 @@ class Plan(Record):
             "mean_mm": 1e3 * float(there.error.mean()),
             "max_mm": 1e3 * float(there.error.max()),
             "by_O1_mean_mm": None if there.by_o1 is None else 1e3 * float(there.by_o1.mean()),
-        }
-
-    def _tour_summary(self) -> dict[str, Any]:
-        tour = self.tour
-        if tour is None:
-            return {}
-        return {
-            "ways": {
-                "moves": len(tour.stops) - 1,
-                "via_points": sum(stop.kind == "via" for stop in tour.stops),
-                "home": home_shown(tour.home, self.made.robot, self.joints_are),
-                "floor_mm": None if tour.floor is None else 1e3 * tour.floor,
-                "clearance_mm": 1e3 * tour.clearance,
-                "room_mm": 1e3 * tour.room if math.isfinite(tour.room) else None,
-            }
         }
 
     def lines(self) -> list[str]:
@@ -226,8 +211,3 @@ class Plan(Record):
             texts[ways.name] = tour_csv(self.tour, self.made.robot, self.joints_are)
         write_files(table.parent, texts, self.command)
         return tuple(table.parent / name for name in texts)
-
-
-def ways_beside(table: Path) -> Path:
-    """Return where the stops of a plan are written."""
-    return table.with_name(f"{table.stem}-ways.csv")

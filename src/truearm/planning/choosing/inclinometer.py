@@ -25,6 +25,8 @@ from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.exchange import most_informative
 from truearm.planning.choosing.observability import OfInterest
+from truearm.planning.driving.drawing import drawn_clear
+from truearm.planning.driving.ways import WayFinder
 
 #: Pairs of postures that are drawn.
 CANDIDATES: Final = 1500
@@ -61,6 +63,7 @@ def plan_tilting(
     candidates: int = CANDIDATES,
     deviation: float,
     pose_deviation: float = 1e-5,
+    finder: WayFinder | None = None,
 ) -> TiltingPlan:
     """Choose pairs of postures.
 
@@ -83,6 +86,8 @@ def plan_tilting(
         Standard deviation of a change of inclination [rad].
     pose_deviation
         Standard deviation of a coordinate of the flange's position [m].
+    finder
+        What the arm keeps clear of in every posture; None for nothing.
 
     Raises
     ------
@@ -110,13 +115,13 @@ def plan_tilting(
     prior = np.concatenate([[p.prior for p in (*effects, *nuisance)], np.full(3 * len(robot.joints), SEAT)])
     known = np.eye(len(prior))
 
-    pairs = _candidates(model, rng, candidates, force, move)
+    pairs = _candidates(model, rng, candidates, force, move, finder)
     rows = change_derivatives(model, pairs, names) / deviation
     rows = np.where(readable(model, pairs)[..., None], rows, 0.0)[:, :, list(axes)].reshape(len(pairs), -1, len(prior))
     by_inclination, known = _chosen(pairs, rows * prior, inclined, known, len(effects))
     by_pose = pairs.at(np.arange(0))
     if posed:
-        pairs = _candidates(model, rng, candidates, force, 0.0)
+        pairs = _candidates(model, rng, candidates, force, 0.0, finder)
         rows = _displacement_derivatives(model, pairs, names) / (math.sqrt(2.0) * pose_deviation)
         for posture in (pairs.first, pairs.second):
             rows[~decided(model, posture, upright=False).all(axis=1)] = 0.0
@@ -142,11 +147,21 @@ def _chosen(candidates: Pairs, rows: Array, count: int, known: Array, interest: 
     return candidates.at(chosen), known + measured.T @ measured
 
 
-def _candidates(robot: Robot, rng: np.random.Generator, count: int, force: float, move: float) -> Pairs:
+def _candidates(
+    robot: Robot, rng: np.random.Generator, count: int, force: float, move: float, finder: WayFinder | None
+) -> Pairs:
     """Return pairs of postures under two different pulls."""
-    low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
-    joints = robot.random_configurations(count, rng)
+    if finder is None:
+        low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
+        joints = robot.random_configurations(count, rng)
+    else:
+        low, high = finder.low, finder.high
+        joints = drawn_clear(finder, count, np.zeros(len(low)), rng)
     moved = np.clip(joints + move * rng.uniform(-1.0, 1.0, joints.shape), low, high)
+    if finder is not None and move:
+        clear = finder.check.ways(joints, moved).clear
+        joints, moved = joints[clear], moved[clear]
+    count = len(joints)
     ways = rng.permuted(np.tile(np.arange(6), (count, 1)), axis=1)  # the first two differ
     pulls = np.zeros((2, count, 6))
     pulls[..., :3] = force * np.concatenate([np.eye(3), -np.eye(3)])[ways[:, :2].T]

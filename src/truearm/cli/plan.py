@@ -144,7 +144,8 @@ def plan(
 ) -> None:
     """Choose the configurations that tell most, in a measuring order, and say how accurate the result will be.
 
-    Without a device every target on the robot's tool is measured at each of them. Writes PLAN.csv and PLAN.html.
+    Without a device every target on the robot's tool is measured at each of them. Writes a CSV file, its page and the
+    ways between; with --program a folder with these, a program that drives the plan, and a sheet.
     """
     from truearm.units import sized_si
 

@@ -564,3 +564,32 @@ def test_a_visit_that_is_no_number_is_refused(tmp_path: Path, visit: str) -> Non
     path.write_text(f"configuration,joint_1 [deg],target,visit,x [mm],y [mm],z [mm]\n1,0.0,a,{visit},1.0,2.0,3.0\n")
     with pytest.raises(InputError, match=r"visits.csv, line 2"):
         read_csv(path)
+
+
+ORDERED = "configuration,order,joint_1 [deg],target,x [mm],y [mm],z [mm]\n"
+
+
+def test_the_column_order_says_when_each_configuration_was_measured(write: WriteFile) -> None:
+    rows = "P7,2,10.0,a,1.0,2.0,3.0\nP7,2,10.0,b,1.0,2.0,3.0\n3,1,0.0,a,1.0,2.0,3.0\n1,4,5.0,a,1.0,2.0,3.0\n"
+    data = read_csv(write(ORDERED + rows))
+    assert data.number is not None
+    assert data.approach is not None
+    assert data.number.tolist() == [1, 0, 3]
+    assert data.approach[:, 0].tolist() == [1, 0, 0]  # nothing is known of the way to 1: the third is not there
+    assert csv_text(data) == ORDERED + rows
+    assert "order" in csv_text(Dataset.of([[0.1], [0.2]], [[1, 2, 3]] * 2, configurations=["1", "2"], order=[2, 1]))
+    assert "order" not in csv_text(Dataset.of([[0.1], [0.2]], [[1, 2, 3]] * 2, configurations=["1", "2"], order=[1, 2]))
+
+
+@pytest.mark.parametrize(
+    ("rows", "part"),
+    [
+        ("a,1,0,t,1,2,3\nb,1,0,t,1,2,3\n", "line 3, column order: the configuration 'a' has this place in the order"),
+        ("a,1,0,t,1,2,3\na,2,0,u,1,2,3\n", "line 3, column order: order differs from line 2"),
+        ("a,-1,0,t,1,2,3\n", "line 2, column order: this is no place in an order"),
+        ("a,,0,t,1,2,3\n", "line 2, column order: the cell is empty"),
+    ],
+)
+def test_an_order_that_cannot_be_is_refused(write: WriteFile, rows: str, part: str) -> None:
+    with pytest.raises(InputError, match=re.escape(part)):
+        read_csv(write(ORDERED + rows))

@@ -16,11 +16,18 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_text
-from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.dataset_fields import VISITS
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical_rows import ROLES, order_of, roles_of, scale_sigma_of, visits_of
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.fixtures import check_lengths, read_setup
-from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations, same_everywhere
+from truearm.measurement.readers.rows import (
+    Readings,
+    before_each,
+    dataset_of,
+    found_configurations,
+    order_of_labels,
+    same_everywhere,
+)
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_columns import COLUMN, JOINT_COLUMN, joint_names
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_unit, written
@@ -28,7 +35,6 @@ from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _LENGTHS: Final = ("distance", "height")
-_ROLES: Final = ("target", "reference", "fixture")
 _FORCE: Final = ("force_x", "force_y", "force_z")
 _MOMENT: Final = ("moment_x", "moment_y", "moment_z")
 _UNITS: Final[dict[str, tuple[str, ...]]] = (
@@ -37,7 +43,7 @@ _UNITS: Final[dict[str, tuple[str, ...]]] = (
     | dict.fromkeys(_FORCE, ("N",))
     | dict.fromkeys(_MOMENT, ("N m",))
 )
-_PLAIN: Final = ("configuration", "target", "role", "fixture", "visit", *_QUATERNION)
+_PLAIN: Final = ("configuration", "order", "target", "role", "fixture", "visit", *_QUATERNION)
 #: Every column as one writes it, for messages.
 _SHOWN: Final = (
     {
@@ -47,7 +53,7 @@ _SHOWN: Final = (
         "target": "target",
         "role": "role",
     }
-    | {"visit": "visit", "fixture": "fixture", "distance": "distance [mm]", "height": "height [mm]"}
+    | {"order": "order", "visit": "visit", "fixture": "fixture", "distance": "distance [mm]", "height": "height [mm]"}
     | {axis: f"{axis} [mm]" for axis in _POSITION}
     | {part: part for part in _QUATERNION}
     | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]"}
@@ -57,6 +63,8 @@ _SHOWN: Final = (
 )
 _ALLOWED: Final = ", ".join(_SHOWN.values()).replace("[deg]", "[deg] ..")
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
+#: Highest place in the order that a file holds.
+_LAST_PLACE: Final = 999_999_999
 _SEPARATORS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
 
 
@@ -83,7 +91,7 @@ def read_csv(path: Path) -> Dataset:
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
     setup = None
-    if "role" in columns and "fixture" in (roles := _roles(cells, columns)):
+    if "role" in columns and "fixture" in (roles := roles_of(cells, columns["role"].place)):
         beside = [role == "fixture" for role in roles]
         setup, cells = cells.some(beside), cells.some([not is_beside for is_beside in beside])
         if not cells.lines:
@@ -105,12 +113,13 @@ def read_csv(path: Path) -> Dataset:
             [cells.numbers(column.place, column.unit, missing=True, deviation=deviation) for column in found]
         )
 
+    role = columns["role"].place if "role" in columns else None
     readings = Readings(
         source=str(path),
         lines=cells.lines,
         configuration=configurations.of_row,
         targets=cells.texts(columns["target"].place),
-        reference=np.array(_roles(cells, columns)) == "reference",
+        reference=np.array(roles_of(cells, role)) == "reference",
         position=numbers(*_POSITION) if "x" in columns else np.full((len(cells.lines), 3), np.nan),
         quaternion=numbers(*_QUATERNION) if "qw" in columns else None,
         sigma=numbers("sigma", deviation=True)[:, 0] if "sigma" in columns else None,
@@ -118,7 +127,7 @@ def read_csv(path: Path) -> Dataset:
         fixture=cells.texts(columns["fixture"].place, missing=True) if "fixture" in columns else None,
         distance=numbers("distance")[:, 0] if "distance" in columns else None,
         height=numbers("height")[:, 0] if "height" in columns else None,
-        visit=_visits(cells, columns["visit"].place) if "visit" in columns else None,
+        visit=visits_of(cells, columns["visit"].place) if "visit" in columns else None,
     )
     check_lengths(cells, readings, {name: column.place for name, column in columns.items()})
 
@@ -130,12 +139,13 @@ def read_csv(path: Path) -> Dataset:
     if "force_x" in columns:
         still = np.zeros(len(configurations.labels))
         wrench = np.column_stack([circumstance(n) if n in columns else still for n in (*_FORCE, *_MOMENT)])
-    dataset = dataset_of(readings, configurations)
+    order = order_of(cells, configurations, columns["order"].place) if "order" in columns else None
+    dataset = dataset_of(readings, configurations, order)
     places = {name: (column.place, column.unit) for name, column in columns.items()}
     return replace(
         dataset,
         setup=None if setup is None else read_setup(setup, places, dataset),
-        scale_sigma=_scale_sigma(cells, columns) if "scale_sigma" in columns else None,
+        scale_sigma=scale_sigma_of(cells, *scale) if (scale := places.get("scale_sigma")) else None,
         temperature=circumstance("temperature") if "temperature" in columns else None,
         wrench=wrench,
     )
@@ -241,47 +251,6 @@ def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
         )
 
 
-def _roles(cells: Cells, columns: dict[str, _Column]) -> tuple[str, ...]:
-    if "role" not in columns:
-        return ("target",) * len(cells.lines)
-    place = columns["role"].place
-    roles = cells.columns[place]
-    for role in dict.fromkeys(roles):
-        if role not in _ROLES:
-            raise InputError(
-                "the role is not known" if role else "the cell is empty",
-                where=cells.place(roles.index(role), place),
-                came=role or None,
-                allowed=f"{', '.join(_ROLES[:-1])} or {_ROLES[-1]}",
-                cure="A target is fixed to the robot's tool, a reference stands beside the robot and is measured too, "
-                "a fixture is what targets are measured against.",
-            )
-    return roles
-
-
-def _scale_sigma(cells: Cells, columns: dict[str, _Column]) -> float:
-    """Return the one deviation of the scale, which every row repeats."""
-    place = columns["scale_sigma"].place
-    found = cells.numbers(place, columns["scale_sigma"].unit, deviation=True)
-    other = np.flatnonzero(found != found[0])
-    if len(other):
-        raise InputError(
-            "the scale is of the instrument, and there is one of it",
-            where=cells.place(int(other[0]), place),
-            came=cells.columns[place][int(other[0])],
-            allowed=f"{cells.columns[place][0]}, as on line {cells.lines[0]}",
-        )
-    return float(found[0])
-
-
-def _visits(cells: Cells, place: int) -> IntArray:
-    """Return the number of the visit that each row was read on."""
-    for line, text in enumerate(texts := cells.texts(place)):
-        if not re.fullmatch("[0-9]{1,9}", text):
-            raise InputError("this is no number of a visit", where=cells.place(line, place), came=text, allowed=VISITS)
-    return np.array([int(text) for text in texts], dtype=np.intp)
-
-
 # -- writing -------------------------------------------------------------------------------------------
 
 
@@ -311,8 +280,10 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     lengths = [name for name in _LENGTHS if any(getattr(part, name) is not None for part in every)]
     positions = not lengths or any(np.isfinite(part.position).any() for part in every)
     with_sigma = with_sigma or setup is not None
+    order = _order_beside_labels(dataset)
     heading = [
         "configuration",
+        *([] if order is None else ["order"]),
         *(f"{column}_{number} [{unit}]" for number, unit in enumerate(units, 1)),
         "target",
         *(["role"] if with_roles else []),
@@ -351,9 +322,10 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
             row.append("" if role == "fixture" else _shown(dataset.scale_sigma, "ppm"))
         return row
 
-    for part, role in zip(parts, _ROLES, strict=False):
+    for part, role in zip(parts, ROLES, strict=False):
         for reading, configuration in enumerate(part.configuration.tolist()):
-            row = [dataset.labels[configuration], *joints[configuration], *reading_cells(part, role, reading)]
+            place = [] if order is None else [order[configuration]]
+            row = [dataset.labels[configuration], *place, *joints[configuration], *reading_cells(part, role, reading)]
             row += [_shown(float(values[configuration]), "1") for values in circumstances.values()]
             rows[configuration].append(row)
     unmeasured = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
@@ -368,9 +340,27 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     writer.writerow(heading)
     writer.writerows(row for found in rows for row in found)
     for reading in range(0 if setup is None else len(setup.target)):
-        row = ["", *("" for _ in units), *reading_cells(setup, "fixture", reading), *("" for _ in circumstances)]  # type: ignore[arg-type]
+        row = [
+            "",
+            *([] if order is None else [""]),
+            *("" for _ in units),
+            *reading_cells(setup, "fixture", reading),
+            *("" for _ in circumstances),
+        ]  # type: ignore[arg-type]
         writer.writerow(row)
     return stream.getvalue()
+
+
+def _order_beside_labels(dataset: Dataset) -> list[str] | None:
+    """Return the place of each configuration in the order of measurement, None if it is not known or labels tell it."""
+    if dataset.number is None:
+        return None
+    told = order_of_labels(dataset.labels)
+    if told is not None and np.array_equal(before_each(told), dataset.number):
+        return None
+    places = [str(int(number) + 1) for number in dataset.number.tolist()]
+    is_one = len(set(places)) == len(places) and bool((dataset.number == np.floor(dataset.number)).all())
+    return places if is_one and dataset.number.min() >= 0 and dataset.number.max() < _LAST_PLACE else None
 
 
 def _cells(values: Array | None, reading: int, unit: str, count: int) -> list[str]:

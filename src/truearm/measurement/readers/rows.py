@@ -95,7 +95,7 @@ def same_everywhere(cells: Cells, configurations: Configurations, column: int, u
     return np.asarray(numbers[first])
 
 
-def _order(labels: Sequence[str]) -> IntArray | None:
+def order_of_labels(labels: Sequence[str]) -> IntArray | None:
     """Return the numbers of the configurations, if they are numbered as they were measured."""
     if not all(re.fullmatch("[0-9]{1,9}", label) for label in labels) or len({int(n) for n in labels}) < len(labels):
         return None
@@ -147,10 +147,16 @@ class Readings:
     visit: IntArray | None = None
 
 
-def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
+def dataset_of(readings: Readings, configurations: Configurations, order: IntArray | None = None) -> Dataset:
     """Check the readings and return them as a dataset, reference points beside the targets.
 
     A position or a quaternion of which a part is missing is missing. Quaternions are normalised.
+
+    Parameters
+    ----------
+    order
+        Number of each configuration in the order of measurement, ``(configurations,)``, each there once; None for what
+        the labels tell.
     """
     _refuse_both_roles(readings)
     if readings.reference.all():
@@ -167,17 +173,22 @@ def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
     if readings.reference.any():
         references = _part(readings, configurations, readings.reference, position, quaternion)
     targets = _part(readings, configurations, ~readings.reference, position, quaternion)
-    return in_order(replace(targets, references=references))
+    return in_order(replace(targets, references=references), order)
 
 
-def in_order(data: Dataset) -> Dataset:
-    """Return data with the order of measurement, if the labels tell it."""
-    order = _order(data.labels)
+def in_order(data: Dataset, order: IntArray | None = None) -> Dataset:
+    """Return data with the order of measurement: that which is given, or which the labels tell."""
+    order = order_of_labels(data.labels) if order is None else order
     return replace(
         data,
         approach=None if order is None else approach_of(data.joints, order),
-        number=None if order is None else np.asarray(order - min(int(order.min()), _FIRST), float),
+        number=None if order is None else before_each(order),
     )
+
+
+def before_each(order: IntArray) -> Array:
+    """Return how many configurations of the campaign were measured before each, ``(configurations,)``."""
+    return np.asarray(order - min(int(order.min()), _FIRST), float)
 
 
 def _part(

@@ -59,6 +59,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "samples_read": Limit(2_000_000, "the file has too many samples", "samples", "Split it by tests."),
     "columns": Limit(10_000, "the table has too many columns", "columns"),
     "cells": Limit(5_000_000, "the table has too many cells", "cells"),
+    "sheet_size": Limit(20_000_000, "the workbook is too large", "bytes unpacked", "Save the sheet as CSV."),
     "steps": Limit(3_000_000_000, "the pattern takes too long for so many names", "steps", "Write a shorter pattern."),
     "pixels": Limit(
         80_000_000,

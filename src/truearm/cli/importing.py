@@ -63,16 +63,45 @@ def matrices(
 
 @app.command()
 def table(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A CSV or SpatialAnalyzer ASCII file.")],
-    mapping: Annotated[Path, typer.Option("--map", metavar="MAPPING.yaml", help="Which column is what.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A CSV, another delimited text, or an Excel workbook.")],
+    mapping: Annotated[
+        Path,
+        typer.Option(
+            "--map",
+            metavar="MAPPING.yaml|PRESET",
+            help="Which column is what: a file, or one of spatial-analyzer and t-mac.",
+        ),
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    joints: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Second file with the joint positions.", show_default="as the mapping says"
+        ),
+    ] = None,
     joints_are: JointsAreText = None,
 ) -> None:
-    """Any table of points, by a mapping that says which column is what (the guide has complete ones)."""
+    """Any table of points or poses, by a mapping that says which column is what (`guess` writes one)."""
     from truearm.jobs.import_table import import_table
 
-    imported = import_table(file, mapping, joints_are=joints_are, out=out)  # type: ignore[arg-type]
+    imported = import_table(file, mapping, joints=joints, joints_are=joints_are, out=out)  # type: ignore[arg-type]
     print_record(imported)
+
+
+@app.command()
+def guess(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A CSV, another delimited text, or an Excel workbook.")],
+    out: Annotated[Path, typer.Option("--out", metavar="MAPPING.yaml", help="File to write; nothing is overwritten.")],
+    json: Json = False,
+) -> None:
+    """Look at a table and write the mapping that it seems to need, for you to confirm. Nothing is imported."""
+    from truearm.jobs.import_guess import import_guess
+
+    guessed = import_guess(file, out=out)
+    if json:
+        print_json(guessed.summary())
+    else:
+        print_record(guessed)
 
 
 @app.command()

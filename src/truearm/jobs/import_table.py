@@ -15,16 +15,23 @@ from truearm.writing import write_text
 
 
 def import_table(
-    file: str | Path, mapping: str | Path, *, joints_are: JointsOf | None = None, out: str | Path | None = None
+    file: str | Path,
+    mapping: str | Path,
+    *,
+    joints: str | Path | None = None,
+    joints_are: JointsOf | None = None,
+    out: str | Path | None = None,
 ) -> Imported:
-    """Read any table of points, by a mapping that says which column is what.
+    """Read any table of points or poses, by a mapping that says which column is what.
 
     Parameters
     ----------
     file
-        A CSV or SpatialAnalyzer ASCII file.
+        A CSV, another delimited text, or an Excel workbook.
     mapping
-        Mapping file, schema ``truearm-mapping/1``.
+        Mapping file, schema ``truearm-mapping/1``, or the name of a preset: ``spatial-analyzer`` or ``t-mac``.
+    joints
+        Second file with the joint positions; None for the one that the mapping names, or none.
     joints_are
         Whose joint positions they are: the ``model``'s, or as the robot's ``controller`` shows them; None for what the
         mapping says, the model's if it says nothing.
@@ -38,11 +45,12 @@ def import_table(
     """
     table, columns = path_argument(file, "file"), path_argument(mapping, "mapping")
     whose = None if joints_are is None else choice_argument(joints_are, "joints_are", JOINTS_OF)
+    beside = None if joints is None else path_argument(joints, "joints")
     with refusals_of("mapping"):
-        read = files_read(table, columns)
+        read = files_read(table, columns, beside)
     target = None if out is None else file_for(out, *read)
     with refusals_of("file"):
-        data = read_table(table, columns, whose)
+        data = read_table(table, columns, whose, beside)
     if target is not None:
         write_text(target, csv_text(data))
     return Imported(data, target)

@@ -86,7 +86,8 @@ def _nearest_quaternions(R: Array, near: Array) -> Array:
     return np.where((q * near).sum(axis=1, keepdims=True) < 0.0, -q, q)
 
 
-def _about(axis: int, angle: Array) -> Array:
+def turned_about(axis: int, angle: Array) -> Array:
+    """Return the rotations ``(n, 3, 3)`` about axis 0, 1 or 2 by angles ``(n,)`` [rad]."""
     R = np.zeros((len(angle), 3, 3))
     i, j = (axis + 1) % 3, (axis + 2) % 3
     R[:, axis, axis] = 1.0
@@ -97,7 +98,7 @@ def _about(axis: int, angle: Array) -> Array:
 
 
 def _matrices_of_zyx(numbers: Array) -> Array:
-    return np.asarray(_about(2, numbers[:, 0]) @ _about(1, numbers[:, 1]) @ _about(0, numbers[:, 2]))
+    return np.asarray(turned_about(2, numbers[:, 0]) @ turned_about(1, numbers[:, 1]) @ turned_about(0, numbers[:, 2]))
 
 
 def _nearest_zyx(R: Array, near: Array) -> Array:
@@ -108,7 +109,7 @@ def _nearest_zyx(R: Array, near: Array) -> Array:
     locked = upright < _GIMBAL_LOCK
     first = np.where(locked, near[:, 0], first)
     # With the first turn undone the rest is Ry(B) Rx(C), whose second row is 0, cos C, -sin C.
-    undone = _about(2, -first) @ R
+    undone = turned_about(2, -first) @ R
     last = np.where(locked, np.arctan2(-undone[:, 1, 2], undone[:, 1, 1]), last)
     one = np.stack([first, middle, last], axis=1)
     other = np.stack([first + np.pi, np.pi - middle, last + np.pi], axis=1)

@@ -72,6 +72,10 @@ class Cells:
         The cells, ``columns[column][row]``.
     decimal
         The decimal sign.
+    absent
+        Texts that mean that nothing was measured, besides an empty cell; None where a file can name none.
+    sheet
+        Sheet of a workbook that they come from; None for a text.
     """
 
     source: str
@@ -80,6 +84,8 @@ class Cells:
     lines: tuple[int, ...]
     columns: tuple[tuple[str, ...], ...]
     decimal: str = "."
+    absent: tuple[str, ...] | None = None
+    sheet: str | None = None
 
     def some(self, kept: Sequence[bool]) -> Cells:
         """Return some of the rows."""
@@ -90,7 +96,9 @@ class Cells:
         )
 
     def place(self, row: int, column: int) -> str:
-        """Return the file, line and column of a cell, for messages."""
+        """Return the file, line and column of a cell, or the file and its place in a sheet, for messages."""
+        if self.sheet is not None:
+            return sheet_place(self.source, self.sheet, self.lines[row], column)
         return f"{self.source}, line {self.lines[row]}, column {self.names[column]}"
 
     def texts(self, column: int, *, missing: bool = False) -> tuple[str, ...]:
@@ -131,7 +139,7 @@ class Cells:
         cells = self.columns[column]
         if self.decimal == ",":
             cells = tuple(cell.translate(_SWAPPED) for cell in cells)
-        parsed = {"": math.nan} if missing else {}
+        parsed = {"": math.nan, **dict.fromkeys(self._absent, math.nan)} if missing else {}
         for row, cell in enumerate(cells):
             if cell in parsed:
                 continue
@@ -148,6 +156,20 @@ class Cells:
                 )
             parsed[cell] = sized_si(value, unit, where, came=came, deviation=deviation)
         return np.array([parsed[cell] for cell in cells])
+
+    @property
+    def _absent(self) -> tuple[str, ...]:
+        """Return the texts that mean nothing, as numbers are compared."""
+        texts = self.absent or ()
+        return tuple(text.translate(_SWAPPED) for text in texts) if self.decimal == "," else texts
+
+    def values(self, column: int) -> Array:
+        """Return a column of numbers of any size without a unit, ``(rows,)``, NaN where nothing is."""
+        swapped = (cell.translate(_SWAPPED) if self.decimal == "," else cell for cell in self.columns[column])
+        found = [math.nan if cell in ("", *self._absent) else as_number(cell) for cell in swapped]
+        if None in found:
+            raise self._not_a_number(found.index(None), column, missing=True)
+        return np.array(found, dtype=float)
 
     def _not_a_number(self, row: int, column: int, *, missing: bool) -> InputError:
         cell, where = self.columns[column][row], self.place(row, column)
@@ -170,12 +192,39 @@ class Cells:
         if _NOT_FINITE.fullmatch(cell):
             what = "NaN and infinity are not readings"
             cure = "Leave the cell empty where there is no reading." if missing else "Fill in the number."
+            if missing and self.absent is not None:
+                cure = "Name this text under missing in the mapping if it means that nothing was measured."
         elif self.decimal == "." and _WITH_COMMA.fullmatch(cell):
             what = "the number has a decimal comma"
             cure = "Write a decimal point, or import the file with `truearm import table` and decimal: comma."
         else:
             what, cure = "a number belongs here", "Correct the cell."
+            if missing and self.absent is not None:
+                cure = "Correct the cell, or name its text under missing in the mapping if nothing was measured there."
         return InputError(what, where=where, came=cell, allowed=allowed, cure=cure)
+
+
+def sheet_place(source: str, sheet: str, row: int, column: int) -> str:
+    """Return the file and the place of a cell as spreadsheets show it, such as ``Points!B7``.
+
+    Parameters
+    ----------
+    source
+        The file, with or without its sheet.
+    row, column
+        The row counted from 1, the column counted from 0.
+    """
+    name = sheet if re.fullmatch(r"\w+", sheet) else f"'{sheet}'"
+    return f"{source.removesuffix(f', sheet {sheet}')}, {name}!{column_letters(column)}{row}"
+
+
+def column_letters(column: int) -> str:
+    """Return the letters of a column that is counted from 0: A, B, .. Z, AA, AB."""
+    letters = ""
+    while column >= 0:
+        letters = chr(ord("A") + column % 26) + letters
+        column = column // 26 - 1
+    return letters
 
 
 def read_cells(text: str, source: str, layout: Layout) -> Cells:

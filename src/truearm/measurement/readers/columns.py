@@ -114,6 +114,36 @@ def configurations_of(cells: Cells, columns: Columns) -> Configurations:
     return found_configurations(cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are)
 
 
+def joints_in_file(path: Path) -> tuple[Cells, Configurations]:
+    """Return the configurations of a CSV with the columns of the canonical CSV for them, whatever else it holds.
+
+    These are ``configuration`` and ``joint_1 [deg]`` .. or ``axis_1 [deg]`` ..: a canonical CSV, a plan, or what the
+    controller wrote.
+    """
+    cells = read_named(path)
+    where = f"{cells.source}, line {cells.header}"
+    columns: Columns = {}
+    for place, heading in enumerate(cells.names):
+        match = _HEADING.fullmatch(heading)
+        name, unit = (match["name"], match["unit"]) if match else (heading, None)
+        if name != "configuration" and not JOINT_COLUMN.fullmatch(name):
+            continue
+        if name in columns:
+            raise InputError(f"the column {name} appears twice", where=where, came=heading, cure="Remove one of them.")
+        if name != "configuration":
+            unit = checked_unit(unit, (*ANGLE_UNITS, *LENGTH_UNITS), f"{where}, column {place + 1}, {heading}")
+        columns[name] = (place, unit or "1")
+    joint_names(columns, where)
+    if "configuration" not in columns:
+        raise InputError(
+            "the column configuration is missing",
+            where=where,
+            allowed=f"configuration, {_JOINTS}",
+            cure="Add it: it holds the labels that the measurements name.",
+        )
+    return cells, configurations_of(cells, columns)
+
+
 def refuse_repeated(cells: Cells, configurations: Configurations, cure: str) -> None:
     """Refuse a configuration that has more rows than one."""
     first: dict[int, int] = {}

@@ -2,85 +2,32 @@
 
 from __future__ import annotations
 
-import codecs
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from pydantic import field_validator as validator_of
 
 from truearm.errors import InputError
-from truearm.measurement.readers.cells import Layout
+from truearm.measurement.readers.mapping_entries import (
+    AnglesEntry,
+    Column,
+    Entry,
+    LayoutEntry,
+    OrderEntry,
+    PointName,
+    RotationVectorEntry,
+    SigmaColumns,
+    SigmaEntry,
+    SigmaRotColumns,
+    SigmaRotEntry,
+    TemperatureEntry,
+    Text,
+)
 from truearm.modeling.controller import JointsOf
-from truearm.printable import is_one_line
 from truearm.shown import counted
 
-_DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
-
-def _number_as_text(value: object) -> object:
-    return str(value) if type(value) is int and abs(value) < 10**18 else value
-
-
-def _none_as_null(value: object) -> object:
-    return None if value == "none" else value
-
-
-def _on_one_line(text: str) -> str:
-    if not is_one_line(text):
-        raise InputError("a name belongs here", came=text, allowed="one line of text without control characters")
-    return text
-
-
-Text = Annotated[str, StringConstraints(min_length=1, strip_whitespace=True)]
-PointName = Annotated[Text, AfterValidator(_on_one_line)]
-#: A column by its name; by its number, counted from 1, where the file has no header.
-Column = Annotated[Text, BeforeValidator(_number_as_text)]
-Line = Annotated[int, Field(ge=1, le=10**9, strict=True)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
-
-
-class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class LayoutEntry(_Entry):
-    """How the text of a file is laid out; what is left out describes a plain CSV with a header."""
-
-    delimiter: Literal["comma", "semicolon", "tab", "whitespace"] = "comma"
-    decimal: Literal["point", "comma"] = "point"
-    header: Annotated[Line | None, BeforeValidator(_none_as_null)] = 1
-    first_row: Line | None = None
-    comment: Text | None = None
-    encoding: str = "utf-8"
-
-    @validator_of("encoding")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        try:
-            return codecs.lookup(name).name
-        except (LookupError, ValueError):  # ValueError: half a character, a zero byte
-            raise InputError(
-                "there is no such encoding", came=name, allowed="utf-8, utf-16, cp1252, latin-1 and others of Python"
-            ) from None
-
-    @model_validator(mode="after")
-    def _header_first(self) -> LayoutEntry:
-        if self.first_row is not None and self.first_row <= (self.header or 0):
-            raise InputError(
-                "first_row must be below the header",
-                came=f"header {self.header}, first_row {self.first_row}",
-                allowed=f"{(self.header or 0) + 1} or more for first_row",
-            )
-        return self
-
-    @property
-    def layout(self) -> Layout:
-        """Return it as the reader of cells takes it."""
-        decimal = "," if self.decimal == "comma" else "."
-        return Layout(_DELIMITERS[self.delimiter], decimal, self.header, self.first_row, self.comment)
-
-
-class ConfigurationEntry(_Entry):
+class ConfigurationEntry(Entry):
     """Where the label of the configuration is."""
 
     column: Column | None = None
@@ -121,7 +68,7 @@ def name_pattern(pattern: str) -> Any:
         ) from None
 
 
-class NamesEntry(_Entry):
+class NamesEntry(Entry):
     """A column whose text holds the label of the configuration, the name of the target, or both."""
 
     column: Column
@@ -146,7 +93,7 @@ class NamesEntry(_Entry):
         return tuple(name_pattern(self.pattern).groupindex)
 
 
-class ReadingEntry(_Entry):
+class ReadingEntry(Entry):
     """The columns of one target; several of them make a wide table."""
 
     target: PointName | None = None
@@ -158,12 +105,43 @@ class ReadingEntry(_Entry):
     qx: Column | None = None
     qy: Column | None = None
     qz: Column | None = None
+    angles: AnglesEntry | None = None
+    rotation_vector: RotationVectorEntry | None = None
+    sigma: SigmaColumns | None = None
+    sigma_rot: SigmaRotColumns | None = None
 
     @model_validator(mode="after")
-    def _whole_quaternion(self) -> ReadingEntry:
+    def _whole_orientation(self) -> ReadingEntry:
         if None in (q := [self.qw, self.qx, self.qy, self.qz]) and any(q):
             raise ValueError("give all of qw, qx, qy, qz, or none of them")
+        if sum([any(q), self.angles is not None, self.rotation_vector is not None]) > 1:
+            raise ValueError("an orientation comes from one place: qw to qz, angles, or rotation_vector")
+        if self.sigma_rot is not None and not self.has_orientation:
+            raise ValueError("sigma_rot is given, and there is no orientation: qw to qz, angles, or rotation_vector")
         return self
+
+    @property
+    def has_orientation(self) -> bool:
+        """Whether there are columns of an orientation."""
+        return bool(self.quaternion) or self.angles is not None or self.rotation_vector is not None
+
+    @property
+    def turned(self) -> dict[str, str]:
+        """Return the columns of the orientation in whatever way, nothing if there is none."""
+        for name, entry in (("angles", self.angles), ("rotation_vector", self.rotation_vector)):
+            if entry is not None:
+                return {f"{name}.columns[{number}]": column for number, column in enumerate(entry.columns, 1)}
+        return self.quaternion
+
+    @property
+    def deviations(self) -> dict[str, str]:
+        """Return the columns of deviations."""
+        return {
+            f"{name}.columns[{number}]": column
+            for name, entry in (("sigma", self.sigma), ("sigma_rot", self.sigma_rot))
+            if entry is not None
+            for number, column in enumerate(entry.columns, 1)
+        }
 
     @property
     def position(self) -> dict[str, str]:
@@ -177,10 +155,13 @@ class ReadingEntry(_Entry):
         return {name: column for name, column in named.items() if column is not None}
 
 
-class JointsEntry(_Entry):
-    """The columns of the joints, in the order of the robot, in the table or in a second file."""
+class JointsEntry(Entry):
+    """The columns of the joints, in the order of the robot, in the table or in a second file.
 
-    columns: list[Column] = Field(min_length=1)
+    Without columns the second file has those of the canonical CSV.
+    """
+
+    columns: list[Column] = Field(default=[], min_length=1)
     unit: Literal["deg", "rad", "mm", "m", "um", "in"] | None = None
     units: list[Literal["deg", "rad", "mm", "m", "um", "in"]] | None = None
     are: JointsOf | None = None
@@ -190,6 +171,17 @@ class JointsEntry(_Entry):
 
     @model_validator(mode="after")
     def _consistent(self) -> JointsEntry:
+        if not self.columns:
+            if self.file is None:
+                raise ValueError("give columns: for joints in the table, or file: for those of a second file")
+            given = [name for name in ("unit", "units", "are", "key", "layout") if name in self.model_fields_set]
+            if given:
+                raise InputError(
+                    "without columns, the second file has the columns of the canonical CSV, which say this",
+                    came=", ".join(given),
+                    cure="Name the columns of the joints as well, or leave this out.",
+                )
+            return self
         if (self.unit is None) == (self.units is None):
             raise ValueError("give either unit: for all joints, or units: with one for each joint")
         if self.units is not None and len(self.units) != len(self.columns):
@@ -208,21 +200,11 @@ class JointsEntry(_Entry):
         return [*self.units] if self.units is not None else [str(self.unit)] * len(self.columns)
 
 
-class SigmaEntry(_Entry):
-    """A standard deviation for all positions."""
-
-    value: Positive
-    unit: Literal["mm", "m", "um", "in"]
+def _yes_or_no(value: object) -> object:
+    return {"yes": True, "no": False}.get(value, value) if isinstance(value, str) else value
 
 
-class SigmaRotEntry(_Entry):
-    """A standard deviation for all orientations."""
-
-    value: Positive
-    unit: Literal["mrad", "rad", "deg"]
-
-
-class MappingFile(_Entry):
+class MappingFile(Entry):
     """Schema ``truearm-mapping/1``."""
 
     truearm: Literal["truearm-mapping/1"]
@@ -231,10 +213,14 @@ class MappingFile(_Entry):
     names: NamesEntry | None = None
     length_unit: Literal["mm", "m", "um", "in"]
     readings: list[ReadingEntry] = Field(min_length=1)
-    references: list[Text] = []
+    references: list[Text] = Field(default=[])
     joints: JointsEntry
     sigma: SigmaEntry | None = None
     sigma_rot: SigmaRotEntry | None = None
+    missing: list[Text] = Field(default=[])
+    order: OrderEntry | None = None
+    temperature: TemperatureEntry | None = None
+    confirmed: Annotated[bool, BeforeValidator(_yes_or_no)] = True
 
     @model_validator(mode="after")
     def _everything_once(self) -> MappingFile:
@@ -254,8 +240,13 @@ class MappingFile(_Entry):
         fixed = [entry.target for entry in self.readings]
         if len(fixed) > 1 and (None in fixed or len(set(fixed)) < len(fixed)):
             raise ValueError("several readings a row need target: with a different name in each of them")
-        if self.sigma_rot is not None and not any(entry.quaternion for entry in self.readings):
-            raise ValueError("sigma_rot is given, and no reading has an orientation (qw, qx, qy, qz)")
+        if self.sigma_rot is not None and not any(entry.has_orientation for entry in self.readings):
+            raise ValueError(
+                "sigma_rot is given, and no reading has an orientation (qw to qz, angles, rotation_vector)"
+            )
+        for name in ("sigma", "sigma_rot"):
+            if getattr(self, name) is not None and any(getattr(entry, name) for entry in self.readings):
+                raise ValueError(f"{name} is given for all readings, and again for some: keep one of them")
         self._refuse_columns_used_twice()
         return self
 
@@ -264,8 +255,16 @@ class MappingFile(_Entry):
         used = [
             (column, f"readings[{number}].{name}")
             for number, entry in enumerate(self.readings, 1)
-            for name, column in (entry.position | entry.quaternion).items()
+            for name, column in (entry.position | entry.turned).items()
         ]
+        shared = {  # one column may hold the deviations of several targets
+            (column, name.partition(".")[0]): f"readings[{number}].{name}"
+            for number, entry in enumerate(self.readings, 1)
+            for name, column in entry.deviations.items()
+        }
+        used += [(column, entry) for (column, _), entry in shared.items()]
+        if self.temperature is not None:
+            used.append((self.temperature.column, "temperature.column"))
         joints = [(column, f"joints.columns[{number}]") for number, column in enumerate(self.joints.columns, 1)]
         for group in [[*used, *joints]] if self.joints.file is None else [used, joints]:
             first: dict[str, str] = {}

@@ -2,113 +2,221 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError, nearest_names
-from truearm.files import read_bytes, read_yaml
+from truearm.errors import InputError, did_you_mean, nearest_names
+from truearm.files import exists, read_bytes, read_yaml
 from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.cells import Cells, read_cells
-from truearm.measurement.readers.mapping import (
-    JointsEntry,
-    LayoutEntry,
-    MappingFile,
-    NamesEntry,
-    SigmaEntry,
-    SigmaRotEntry,
-    name_pattern,
+from truearm.measurement.readers.columns import joints_in_file
+from truearm.measurement.readers.mapping import MappingFile, NamesEntry, name_pattern
+from truearm.measurement.readers.mapping_entries import LayoutEntry
+from truearm.measurement.readers.measuring_order import measuring_order, refuse_returns
+from truearm.measurement.readers.presets import PRESETS, is_preset, mapping_path
+from truearm.measurement.readers.row_values import (
+    deviations,
+    numbers_of,
+    place_of,
+    quaternions,
+    refuse_second_header,
+    temperatures,
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
+from truearm.measurement.readers.sheets import is_workbook, read_sheet
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.shown import counted
-from truearm.units import sized_si
 
 
-def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None) -> Dataset:
-    """Read any delimited text as its mapping file (schema ``truearm-mapping/1``) says.
+@dataclass(frozen=True)
+class TableFiles:
+    """The files of a table.
+
+    Attributes
+    ----------
+    table
+        The table itself.
+    mapping
+        Its mapping file.
+    content
+        What the mapping says.
+    joints
+        The second file that holds the joints; None if the table holds them.
+    """
+
+    table: Path
+    mapping: Path
+    content: MappingFile
+    joints: Path | None
+
+    @property
+    def read(self) -> tuple[Path, ...]:
+        """Return all files that are read."""
+        return (self.table, self.mapping) if self.joints is None else (self.table, self.mapping, self.joints)
+
+
+def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
+    """Return the files of a table, or refuse a mapping that nobody confirmed."""
+    path = mapping_path(mapping)
+    if not path.suffix and not exists(path):
+        raise InputError(
+            "there is no such file, and no such preset",
+            parameter="mapping",
+            came=str(mapping),
+            allowed=f"a mapping file, or one of the presets {', '.join(PRESETS)}",
+            cure=did_you_mean(str(mapping), PRESETS),
+        )
+    content = read_yaml(path, MappingFile)
+    if not content.confirmed:
+        raise InputError(
+            "this mapping was guessed, and nobody has confirmed it",
+            where=f"{path}, confirmed",
+            came="no",
+            allowed="yes",
+            cure="Look at every line marked with a guess, correct it, and write confirmed: yes.",
+        )
+    named = content.joints.file
+    if joints is not None and named is None:
+        raise InputError(
+            "the mapping takes the joint positions from the table itself",
+            parameter="joints",
+            where=f"{path}, joints",
+            came=str(joints),
+            cure="Leave it out, or name a file under joints.file in the mapping.",
+        )
+    beside = table if is_preset(mapping) else path
+    found = joints if joints is not None or named is None else beside.parent / named
+    return TableFiles(table, path, content, found)
+
+
+def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None) -> Dataset:
+    """Read any delimited text, or a sheet of a workbook, as its mapping file (schema ``truearm-mapping/1``) says.
 
     An empty cell is a missing reading; zeros are zeros. A second file with the joints is looked for beside
-    the mapping. With ``key`` it also gives the order of the configurations, and one that was not measured
-    stays, as missing readings.
+    the mapping, or beside the table if the mapping is a preset. With ``key`` it also gives the order of the
+    configurations, and one that was not measured stays, as missing readings.
 
     Parameters
     ----------
+    mapping
+        The file, or the name of a preset.
     joints_are
         Whose joint positions they are; None for what the mapping says.
+    joints
+        The file of the joints; None for the one that the mapping names.
 
     Raises
     ------
     InputError
         If a file cannot be used, or the mapping says that the joint positions are another's.
     """
-    content = read_yaml(mapping, MappingFile)
-    said = content.joints.are
-    if joints_are is not None and said is not None and joints_are != said:
-        raise InputError(
-            "the mapping says whose joint positions they are",
-            parameter="joints_are",
-            where=f"{mapping}, joints.are",
-            came=f"{joints_are}, and in the mapping {said}",
-            cure="Leave one of them out.",
-        )
-    whose = joints_are or said or "model"
-    cells = _read(path, content.layout)
+    return read_with(_files(path, mapping, joints), joints_are)
+
+
+def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
+    """Read a table with its mapping, see :func:`read_table`."""
+    path, content, mapping = files.table, files.content, files.mapping
+    whose = _whose(content.joints.are, joints_are, f"{mapping}, joints.are")
+    cells = replace(_read(path, content.layout, f"{mapping}, layout"), absent=tuple(content.missing))
     found: dict[str, list[str]] = {}
     if content.names is not None:
         cells, found = _split_names(cells, content.names, mapping)
+    refuse_second_header(cells, content)
     labels = found.get("configuration") or [str(number) for number in range(1, len(cells.lines) + 1)]
     if content.configuration is not None and content.configuration.column is not None:
-        labels = list(cells.texts(_place(cells, content.configuration.column, mapping, "configuration.column")))
-    configurations, of_row = _configurations(cells, labels, content.joints, whose, mapping)
+        labels = list(cells.texts(place_of(cells, content.configuration.column, mapping, "configuration.column")))
+    configurations, of_row = _configurations(cells, labels, files, whose, joints_are)
     targets = _targets(cells, content, found.get("target"), mapping)
     entries = len(content.readings)
     position = np.stack(
         [
-            _columns(cells, entry.position, content.length_unit, mapping, f"readings[{number}]")
+            numbers_of(cells, entry.position, content.length_unit, mapping, f"readings[{number}]")
             for number, entry in enumerate(content.readings, 1)
         ],
         axis=1,
     ).reshape(-1, 3)
     configuration = np.repeat(of_row, entries)
     lines = [line for line in cells.lines for _ in range(entries)]
-    quaternion = _quaternions(cells, content, mapping)
+    quaternion = quaternions(cells, content, mapping)
+    sigma, sigma_rot = (deviations(cells, content, mapping, name) for name in ("sigma", "sigma_rot"))
 
     reference = _is_reference(targets, content.references, f"{mapping}, references")
     absent = np.setdiff1d(np.arange(len(configurations.labels)), of_row)
     kept = list(dict.fromkeys(compress(targets, ~reference)))
     added = len(absent) * len(kept)
-    count = len(targets) + added
 
     def padded(values: Array) -> Array:
-        return np.concatenate([values, np.full((added, values.shape[1]), np.nan)])
+        return np.concatenate([values, np.full((added, *values.shape[1:]), np.nan)])
 
     readings = Readings(
-        source=str(path),
+        source=cells.source,
         lines=lines + [0] * added,
         configuration=np.concatenate([configuration, np.repeat(absent, len(kept))]),
         targets=targets + kept * len(absent),
         reference=np.concatenate([reference, np.zeros(added, dtype=bool)]),
         position=padded(position),
         quaternion=None if quaternion is None else padded(quaternion),
-        sigma=_everywhere(content.sigma, count, f"{mapping}, sigma.value"),
-        sigma_rot=_everywhere(content.sigma_rot, count, f"{mapping}, sigma_rot.value"),
+        sigma=None if sigma is None else padded(sigma),
+        sigma_rot=None if sigma_rot is None else padded(sigma_rot),
     )
-    return dataset_of(readings, configurations)
+    data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
+    if content.temperature is None:
+        return data
+    return replace(data, temperature=temperatures(cells, configurations, of_row, content.temperature, mapping))
 
 
-def files_read(path: Path, mapping: Path) -> tuple[Path, ...]:
+def files_read(path: Path, mapping: Path, joints: Path | None = None) -> tuple[Path, ...]:
     """Return all files that :func:`read_table` reads."""
-    joints = read_yaml(mapping, MappingFile).joints.file
-    return (path, mapping) if joints is None else (path, mapping, mapping.parent / joints)
+    return _files(path, mapping, joints).read
 
 
-def _read(path: Path, entry: LayoutEntry) -> Cells:
+def _whose(said: JointsOf | None, asked: JointsOf | None, where: str) -> JointsOf:
+    """Return whose joint positions they are, or refuse two answers; `where` names what says it in a file."""
+    if asked is not None and said is not None and asked != said:
+        raise InputError(
+            "the mapping says whose joint positions they are",
+            parameter="joints_are",
+            where=where,
+            came=f"{asked}, and in the mapping {said}",
+            cure="Leave one of them out.",
+        )
+    return asked or said or "model"
+
+
+def _order(cells: Cells, configurations: Configurations, of_row: IntArray, files: TableFiles) -> IntArray | None:
+    """Return the order of measurement that the mapping tells; None for what the labels tell."""
+    entry = files.content.order
+    if entry is None:
+        return None
+    place = None if entry.column is None else place_of(cells, entry.column, files.mapping, "order.column")
+    if entry.by == "rows" and files.joints is None:
+        refuse_returns(cells, configurations.labels, of_row, f"{files.mapping}, order.by")
+    return measuring_order(entry, cells, place, configurations.labels, of_row, f"{files.mapping}, order")
+
+
+def _read(path: Path, entry: LayoutEntry, where: str) -> Cells:
+    if is_workbook(path):
+        if entry.of_text:
+            raise InputError(
+                "a workbook has cells, and no such thing",
+                where=f"{where}.{entry.of_text[0]}",
+                allowed="sheet, header and first_row",
+                cure="Remove it.",
+            )
+        return read_sheet(path, entry.sheet, entry.layout, f"{where}.sheet")
+    if entry.sheet is not None:
+        raise InputError(
+            "only workbooks have sheets",
+            where=f"{where}.sheet",
+            came=entry.sheet,
+            cure=f"Remove it, or name a workbook instead of {path}.",
+        )
     encoding = "utf-8-sig" if entry.encoding == "utf-8" else entry.encoding
     try:
         text = read_bytes(path).decode(encoding)
@@ -123,29 +231,9 @@ def _read(path: Path, entry: LayoutEntry) -> Cells:
     return read_cells(text, str(path), entry.layout)
 
 
-def _place(cells: Cells, column: str, mapping: Path, entry: str) -> int:
-    """Return where a column is, or refuse a name that is not there or not unique."""
-    count = cells.names.count(column)
-    if count == 1:
-        return cells.names.index(column)
-    near = nearest_names(column, cells.names, 1) if cells.header is not None else []
-    raise InputError(
-        f"{cells.source} has {'no such column' if not count else f'{count} columns of this name'}",
-        where=f"{mapping}, {entry}",
-        came=column,
-        allowed=", ".join(name for name in cells.names if name),
-        cure=f"Did you mean {near[0]}?" if near and not count else "Check the header line and the delimiter.",
-    )
-
-
-def _columns(cells: Cells, columns: dict[str, str], unit: str, mapping: Path, entry: str) -> Array:
-    places = [_place(cells, column, mapping, f"{entry}.{name}") for name, column in columns.items()]
-    return np.column_stack([cells.numbers(place, unit, missing=True) for place in places])
-
-
 def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells, dict[str, list[str]]]:
     """Return what the pattern finds in each name, and the rows without those to be skipped."""
-    place = _place(cells, entry.column, mapping, "names.column")
+    place = place_of(cells, entry.column, mapping, "names.column")
     pattern = name_pattern(entry.pattern)
     texts = cells.texts(place)
     refuse_beyond("steps", pattern.programsize * sum(map(len, texts)), where=f"{mapping}, names.pattern")
@@ -180,19 +268,25 @@ def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells,
 
 
 def _configurations(
-    cells: Cells, labels: list[str], entry: JointsEntry, joints_are: JointsOf, mapping: Path
+    cells: Cells, labels: list[str], files: TableFiles, joints_are: JointsOf, asked: JointsOf | None
 ) -> tuple[Configurations, IntArray]:
     """Return the configurations and which of them each row of the table belongs to."""
-    if entry.file is None:
+    entry, mapping = files.content.joints, files.mapping
+    if files.joints is not None and not entry.columns:
+        table, configurations = joints_in_file(files.joints)
+        if asked is not None:
+            _whose(configurations.joints_are, asked, table.source)
+        return configurations, _of_rows(cells, labels, configurations, table, "configuration")
+    if files.joints is None:
         table, row_labels = cells, labels
     else:
-        table, row_labels = _read(mapping.parent / entry.file, entry.layout or LayoutEntry()), []
+        table, row_labels = _read(files.joints, entry.layout or LayoutEntry(), f"{mapping}, joints.layout"), []
     places = [
-        _place(table, column, mapping, f"joints.columns[{number}]") for number, column in enumerate(entry.columns, 1)
+        place_of(table, column, mapping, f"joints.columns[{number}]") for number, column in enumerate(entry.columns, 1)
     ]
     if entry.key is not None:
-        row_labels = list(table.texts(_place(table, entry.key, mapping, "joints.key")))
-    elif entry.file is not None:
+        row_labels = list(table.texts(place_of(table, entry.key, mapping, "joints.key")))
+    elif files.joints is not None:
         row_labels = list(dict.fromkeys(labels))
         if len(row_labels) != len(table.lines):
             raise InputError(
@@ -203,6 +297,13 @@ def _configurations(
                 cure="Without a key, row n is the nth configuration: name the column of labels.",
             )
     configurations = found_configurations(table, row_labels, places, entry.unit_of_each, joints_are)
+    return configurations, _of_rows(cells, labels, configurations, table, entry.key)
+
+
+def _of_rows(
+    cells: Cells, labels: list[str], configurations: Configurations, table: Cells, key: str | None
+) -> IntArray:
+    """Return the configuration of each row; `key` is the column of `table` that has the labels."""
     index = {label: number for number, label in enumerate(configurations.labels)}
     for row, label in enumerate(labels):
         if label not in index:
@@ -211,10 +312,10 @@ def _configurations(
                 f"the configuration has no joints in {table.source}",
                 where=f"{cells.source}, line {cells.lines[row]}",
                 came=label,
-                allowed=f"a label in column {entry.key}",
+                allowed=f"a label in column {key}",
                 cure=f"Did you mean {near[0]}?" if near else "Check joints.key, or add the row.",
             )
-    return configurations, np.array([index[label] for label in labels], dtype=np.intp)
+    return np.array([index[label] for label in labels], dtype=np.intp)
 
 
 def _targets(cells: Cells, content: MappingFile, found: list[str] | None, mapping: Path) -> list[str]:
@@ -223,23 +324,8 @@ def _targets(cells: Cells, content: MappingFile, found: list[str] | None, mappin
         return found
     column = content.readings[0].target_column
     if column is not None:
-        return list(cells.texts(_place(cells, column, mapping, "readings[1].target_column")))
+        return list(cells.texts(place_of(cells, column, mapping, "readings[1].target_column")))
     return [str(entry.target) for entry in content.readings] * len(cells.lines)
-
-
-def _quaternions(cells: Cells, content: MappingFile, mapping: Path) -> Array | None:
-    if not any(entry.quaternion for entry in content.readings):
-        return None
-    nothing = np.full((len(cells.lines), 4), np.nan)
-    parts = [
-        _columns(cells, entry.quaternion, "1", mapping, f"readings[{number}]") if entry.quaternion else nothing
-        for number, entry in enumerate(content.readings, 1)
-    ]
-    return np.stack(parts, axis=1).reshape(-1, 4)
-
-
-def _everywhere(sigma: SigmaEntry | SigmaRotEntry | None, count: int, where: str) -> Array | None:
-    return None if sigma is None else np.full(count, sized_si(sigma.value, sigma.unit, where, deviation=True))
 
 
 def _is_reference(targets: list[str], references: list[str], where: str) -> NDArray[np.bool_]:

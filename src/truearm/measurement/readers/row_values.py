@@ -1,0 +1,141 @@
+"""What the rows of a table of any make hold, found by the columns that a mapping names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.measurement.readers.cells import Cells
+from truearm.measurement.readers.mapping import MappingFile, ReadingEntry
+from truearm.measurement.readers.mapping_entries import SigmaColumns, SigmaRotColumns, TemperatureEntry
+from truearm.measurement.readers.orientation_columns import quaternions_of_angles, quaternions_of_vectors
+from truearm.measurement.readers.rows import Configurations
+from truearm.modeling.chain import Array
+from truearm.units import as_number, sized_si
+
+#: Temperatures of an arm that are meant [degC].
+_TEMPERATURES: Final = (-100.0, 200.0)
+#: What is taken off a temperature, and by what the rest is multiplied, to have degC.
+_SCALES: Final[Mapping[str, tuple[float, float]]] = {"degC": (0.0, 1.0), "degF": (32.0, 5.0 / 9.0), "K": (273.15, 1.0)}
+
+
+def place_of(cells: Cells, column: str, mapping: Path, entry: str) -> int:
+    """Return where a column is, or refuse a name that is not there or not unique."""
+    count = cells.names.count(column)
+    if count == 1:
+        return cells.names.index(column)
+    near = nearest_names(column, cells.names, 1) if cells.header is not None else []
+    raise InputError(
+        f"{cells.source} has {'no such column' if not count else f'{count} columns of this name'}",
+        where=f"{mapping}, {entry}",
+        came=column,
+        allowed=", ".join(name for name in cells.names if name),
+        cure=f"Did you mean {near[0]}?" if near and not count else "Check the header line and the delimiter.",
+    )
+
+
+def numbers_of(
+    cells: Cells, columns: Mapping[str, str], unit: str, mapping: Path, entry: str, *, deviation: bool = False
+) -> Array:
+    """Return columns of numbers [SI], ``(rows, columns)``, NaN where nothing is."""
+    places = [place_of(cells, column, mapping, f"{entry}.{name}") for name, column in columns.items()]
+    return np.column_stack([cells.numbers(place, unit, missing=True, deviation=deviation) for place in places])
+
+
+def refuse_second_header(cells: Cells, content: MappingFile) -> None:
+    """Refuse a table whose first row below the header holds no number where all numbers belong: more headings."""
+    columns = [column for entry in content.readings for column in (entry.position | entry.turned).values()]
+    columns += content.joints.columns if content.joints.file is None else []
+    places = [cells.names.index(column) for column in columns if column in cells.names]
+    texts = [cells.columns[place][0].replace(",", ".") for place in places]
+    absent = {"", *(cells.absent or ())}
+    other = next((place for place, text in zip(places, texts, strict=True) if text not in absent), None)
+    if other is None or any(as_number(text) is not None for text in texts) or len(cells.lines) < 2:
+        return
+    raise InputError(
+        "this row holds no numbers, like a second line of headings"
+        if cells.header is not None
+        else "this row holds no numbers, like a line of headings",
+        where=cells.place(0, other),
+        came=cells.columns[other][0],
+        allowed="one line of headings, then rows of numbers",
+        cure="Name the line of headings (layout.header) and the first line with data (layout.first_row).",
+    )
+
+
+def quaternions(cells: Cells, content: MappingFile, mapping: Path) -> Array | None:
+    """Return the orientation of each reading as a quaternion, ``(rows times readings, 4)``; None without any."""
+    if not any(entry.has_orientation for entry in content.readings):
+        return None
+    parts = [_turned(cells, entry, mapping, f"readings[{n}]") for n, entry in enumerate(content.readings, 1)]
+    return np.stack(parts, axis=1).reshape(-1, 4)
+
+
+def _turned(cells: Cells, entry: ReadingEntry, mapping: Path, name: str) -> Array:
+    if entry.angles is not None:
+        angles = numbers_of(cells, entry.turned, entry.angles.unit, mapping, name)
+        return quaternions_of_angles(angles, entry.angles)
+    if entry.rotation_vector is not None:
+        return quaternions_of_vectors(numbers_of(cells, entry.turned, entry.rotation_vector.unit, mapping, name))
+    if entry.quaternion:
+        return numbers_of(cells, entry.quaternion, "1", mapping, name)
+    return np.full((len(cells.lines), 4), np.nan)
+
+
+def deviations(cells: Cells, content: MappingFile, mapping: Path, name: Literal["sigma", "sigma_rot"]) -> Array | None:
+    """Return the standard deviation of each reading [m, rad], ``(rows times readings,)``; None if there is none.
+
+    Of three columns it is the root of the mean square, which keeps the variance of the whole.
+    """
+    value = getattr(content, name)
+    if value is not None:
+        one = sized_si(value.value, value.unit, f"{mapping}, {name}.value", deviation=True)
+        return np.full(len(cells.lines) * len(content.readings), one)
+    found: list[SigmaColumns | SigmaRotColumns | None] = [getattr(entry, name) for entry in content.readings]
+    if not any(found):
+        return None
+    parts = []
+    for number, entry in enumerate(found, 1):
+        if entry is None:
+            parts.append(np.full(len(cells.lines), np.nan))
+            continue
+        columns = {f"columns[{n}]": column for n, column in enumerate(entry.columns, 1)}
+        each = numbers_of(cells, columns, entry.unit, mapping, f"readings[{number}].{name}", deviation=True)
+        parts.append(np.sqrt(np.mean(each**2, axis=1)) / entry.coverage)
+    return np.stack(parts, axis=1).reshape(-1)
+
+
+def temperatures(
+    cells: Cells, configurations: Configurations, of_row: Array, entry: TemperatureEntry, mapping: Path
+) -> Array:
+    """Return the mean temperature of each configuration's rows [degC], ``(configurations,)``."""
+    place = place_of(cells, entry.column, mapping, "temperature.column")
+    offset, factor = _SCALES[entry.unit]
+    values = (cells.values(place) - offset) * factor
+    low, high = _TEMPERATURES
+    off = np.flatnonzero((values < low) | (values > high))
+    if len(off):
+        raise InputError(
+            "no arm is that cold or warm",
+            where=cells.place(int(off[0]), place),
+            came=cells.columns[place][int(off[0])],
+            allowed=f"{low / factor + offset:g} to {high / factor + offset:g} {entry.unit}",
+            cure="Correct the number, or its unit (temperature.unit in the mapping).",
+        )
+    means = np.empty(len(configurations.labels))
+    for index, label in enumerate(configurations.labels):
+        rows = np.flatnonzero(of_row == index)
+        known = values[rows][np.isfinite(values[rows])]
+        if not len(known):
+            raise InputError(
+                f"the configuration {label!r} has no temperature, and others have one",
+                where=cells.place(int(rows[0]), place) if len(rows) else f"{mapping}, temperature.column",
+                allowed="a temperature for each configuration, or none at all",
+                cure="Fill the cell, or leave temperature out of the mapping.",
+            )
+        means[index] = known.mean()
+    return means

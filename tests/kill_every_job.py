@@ -47,6 +47,7 @@ def _sheet(folder: Path) -> Arguments:
 #: Where each job writes; `.` is the folder itself.
 PLACES: dict[str, Arguments] = {
     "import_table": {"out": "data.csv"},
+    "import_guess": {"out": "mapping.yaml"},
     "import_matrices": {"out": "data.csv"},
     "import_robodk": {"out": "data.csv"},
     "import_circle": {"out": "data.csv"},

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from truearm.jobs.hexapod_uncertainty import hexapod_uncertainty
     from truearm.jobs.hexapod_world_frame import hexapod_world_frame
     from truearm.jobs.import_circle import import_circle
+    from truearm.jobs.import_guess import import_guess
     from truearm.jobs.import_hand_eye import import_hand_eye
     from truearm.jobs.import_matrices import import_matrices
     from truearm.jobs.import_robodk import import_robodk
@@ -99,6 +100,7 @@ __all__ = [
     "hexapod_uncertainty",
     "hexapod_world_frame",
     "import_circle",
+    "import_guess",
     "import_hand_eye",
     "import_matrices",
     "import_robodk",

@@ -309,6 +309,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "wrench_at": "1",
     },
     "import_table": _table,
+    "import_guess": lambda folder: {"file": _table(folder)["file"], "out": _new(folder, "guessed.yaml")},
     "import_matrices": _matrices,
     "import_robodk": lambda folder: {
         "file": _written(

@@ -15,6 +15,7 @@ JOBS: Final = (
     "show",
     "load_data",
     "import_table",
+    "import_guess",
     "import_matrices",
     "import_robodk",
     "import_circle",

@@ -1,0 +1,433 @@
+"""The mapping file that a table seems to need, with every guess marked and nothing confirmed."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from ruamel.yaml import YAML
+
+from truearm.errors import InputError
+from truearm.measurement.readers.guessing.layouts import GuessedLayout, guess_layout
+from truearm.measurement.readers.guessing.meanings import (
+    Column,
+    angles_among,
+    columns_of,
+    deviations_among,
+    is_expanded,
+    joints_among,
+    named_like,
+    positions_among,
+    quaternion_among,
+)
+from truearm.measurement.readers.mapping import MappingFile
+from truearm.measurement.readers.table import TableFiles, read_with
+from truearm.schemas import validated
+
+#: Where nothing in the file tells an answer.
+OPEN: Final = "?"
+_PLAIN: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?: [A-Za-z0-9_]+)*|[1-9][0-9]*")
+_NOT_PLAIN: Final = frozenset({"true", "false", "null"})
+#: Angles beyond this are degrees: nobody turns a joint more than once about itself and a little more [rad].
+_MOST_RADIANS: Final = 7.0
+#: Positions beyond this are millimetres: no arm reaches that many metres or inches away.
+_MOST_METRES: Final = 30.0
+#: Rows from which small angles are taken for radians.
+_ENOUGH: Final = 10
+_TIMES: Final = (
+    *("%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p"),
+    *("%d/%m/%Y %H:%M:%S", "%Y/%m/%d %H:%M:%S", "%H:%M:%S", "%H:%M:%S.%f"),
+)
+_NUMBERED: Final = re.compile("(.*?)[0-9]{1,9}")
+
+
+@dataclass(frozen=True)
+class Guess:
+    """One entry of a mapping, and what the guess rests on.
+
+    Attributes
+    ----------
+    entry
+        The entry, such as ``joints.unit``.
+    value
+        Its value; ``?`` where nothing tells it.
+    because
+        What the guess rests on.
+    """
+
+    entry: str
+    value: str
+    because: str
+
+
+@dataclass(frozen=True)
+class Guessed:
+    """A mapping that was guessed.
+
+    Attributes
+    ----------
+    text
+        The mapping file.
+    guesses
+        Every entry with what it rests on.
+    refusal
+        Why an import with it would be refused as it stands; None if it would not, or if something is open.
+    rows, configurations
+        How many rows and configurations such an import would read; 0 if it was not tried.
+    """
+
+    text: str
+    guesses: tuple[Guess, ...]
+    refusal: str | None = None
+    configurations: int = 0
+    targets: tuple[str, ...] = ()
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """Return the entries that nothing in the file tells."""
+        return tuple(guess.entry for guess in self.guesses if guess.value == OPEN or f"'{OPEN}'" in guess.value)
+
+
+@dataclass
+class _Text:
+    """The lines of a mapping as they are written, and the guesses in them."""
+
+    lines: list[str] = field(default_factory=list)
+    guesses: list[Guess] = field(default_factory=list)
+
+    def add(self, entry: str, value: str, because: str, line: str | None = None) -> None:
+        name = entry.rpartition(".")[2]
+        self.lines.append(f"{line or f'{name}: {value}'}  # guess: {because}")
+        self.guesses.append(Guess(entry, value, because))
+
+
+def guess_mapping(path: Path) -> Guessed:
+    """Return the mapping file that a table seems to need.
+
+    Raises
+    ------
+    InputError
+        If it does not look like a table.
+    """
+    layout = guess_layout(path)
+    columns = columns_of(layout)
+    text = _Text()
+    text.lines += [
+        f"# Guessed from {json.dumps(path.name, ensure_ascii=False)[1:-1]}.",
+        f"# Look at every line with a guess: correct it, answer each {OPEN}, and then write confirmed: yes.",
+        "truearm: truearm-mapping/1",
+        "confirmed: no",
+    ]
+    _write_layout(text, layout)
+    left = _Left(list(columns))
+    joints = left.take(joints_among(columns))
+    quaternion, sure = quaternion_among(left.columns)
+    left.take(quaternion)
+    positions = positions_among([column for column in left.columns if column.is_numeric])
+    if not positions and not layout.header:
+        positions, joints = _by_place(left.columns, joints)
+    for three in positions.values():
+        left.take(three)
+    left.take(joints)
+    if not positions:
+        raise InputError(
+            "no columns look like x, y and z of a measured point",
+            where=str(path),
+            came=", ".join(column.name for column in columns if column.name)[:200] or None,
+            allowed="three columns of numbers named x, y, z, such as X, Pos Y [mm] or ball_1_z",
+            cure="Rename them, or write the mapping by hand: the guide has complete ones.",
+        )
+    _write_missing(text, [*joints, *quaternion, *(column for three in positions.values() for column in three)])
+    _write_labels(text, left, joints, positions, quaternion, sure)
+    _write_joints(text, joints)
+    text.lines += [f"# Note: {note}." for note in layout.notes]
+    unused = [column.name for column in left.columns if column.name]
+    if unused:
+        shown = ", ".join(json.dumps(name, ensure_ascii=False)[1:-1] for name in unused[:20])
+        text.lines.append(f"# Not used: {shown}")
+    made = Guessed("\n".join(text.lines) + "\n", tuple(text.guesses))
+    return made if made.open or not joints else _tried(made, path)
+
+
+class _Left:
+    """The columns that mean nothing yet."""
+
+    def __init__(self, columns: list[Column]) -> None:
+        self.columns = columns
+
+    def take(self, taken: Sequence[Column]) -> list[Column]:
+        places = {column.place for column in taken}
+        self.columns = [column for column in self.columns if column.place not in places]
+        return list(taken)
+
+
+def _plain(text: str) -> str:
+    """Return a text as YAML takes it."""
+    is_plain = _PLAIN.fullmatch(text) is not None and text.lower() not in _NOT_PLAIN
+    return text if is_plain else json.dumps(text, ensure_ascii=False)
+
+
+def _list(columns: Sequence[Column]) -> str:
+    return f"[{', '.join(_plain(column.name) for column in columns)}]"
+
+
+def _write_layout(text: _Text, layout: GuessedLayout) -> None:
+    text.lines.append("layout:")
+    for name, (value, because) in layout.entries.items():
+        shown = str(value) if isinstance(value, int) else _plain(value)
+        text.add(f"layout.{name}", shown, because, f"  {name}: {shown}")
+
+
+def _by_place(
+    columns: Sequence[Column], joints: Sequence[Column]
+) -> tuple[dict[tuple[str, ...], tuple[Column, Column, Column]], list[Column]]:
+    """Return the last three columns of numbers as a position, and those before as joints, where nothing has a name."""
+    numeric = [column for column in columns if column.is_numeric and not column.counts]
+    if len(numeric) < 3 or len(numeric) > 13:
+        return {}, list(joints)
+    first, second, third = numeric[-3:]
+    return {(): (first, second, third)}, numeric[:-3]
+
+
+def _write_missing(text: _Text, columns: Sequence[Column]) -> None:
+    texts = list(dict.fromkeys(odd for column in columns for odd in column.nothing))
+    if texts:
+        shown = f"[{', '.join(json.dumps(odd, ensure_ascii=False) for odd in texts)}]"
+        text.add("missing", shown, "these texts stand among numbers")
+
+
+def _write_labels(
+    text: _Text,
+    left: _Left,
+    joints: Sequence[Column],
+    positions: dict[tuple[str, ...], tuple[Column, Column, Column]],
+    quaternion: Sequence[Column],
+    sure: bool,
+) -> None:
+    """Write where labels and targets are, then the columns of the readings and what belongs to them."""
+    angles = None if quaternion else angles_among(left.columns)
+    if angles is not None:
+        left.take(angles[0])
+    sigma = left.take(deviations_among(left.columns, ("x", "y", "z")))
+    turned = bool(quaternion) or angles is not None
+    sigma_rot = left.take(deviations_among(left.columns, ("rx", "ry", "rz"))) if turned else []
+    temperature = named_like([c for c in left.columns if c.is_numeric], "temperature")
+    left.take([temperature] if temperature else [])
+    time = named_like(left.columns, "time")
+    left.take([time] if time else [])
+    several = len(positions) > 1
+    label, target, pattern = _names(left, several)
+    if pattern is not None and label is not None:
+        text.add(
+            "names",
+            "",
+            "the names have parts between ::",
+            f"names: {{column: {_plain(label.name)}, pattern: '{pattern}'}}",
+        )
+    elif label is not None:
+        text.add("configuration", "", "its name or its texts", f"configuration: {{column: {_plain(label.name)}}}")
+    else:
+        text.add(
+            "configuration",
+            "",
+            "no column looks like a label; rows then count as measured in their order",
+            "configuration: {each: row}",
+        )
+    every = [column for three in positions.values() for column in three]
+    text.add("length_unit", *_length_unit(every))
+    text.lines.append("readings:")
+    names_target = pattern is not None and "target" in pattern
+    for key, three in positions.items():
+        if several or (target is None and not names_target):
+            name = " ".join(key) if several and key else "tip"
+            text.add("readings.target", _plain(name), "a name for it", f"  - target: {_plain(name)}")
+            start = "    "
+        elif target is not None:
+            text.add(
+                "readings.target_column",
+                _plain(target.name),
+                "its name or its texts",
+                f"  - target_column: {_plain(target.name)}",
+            )
+            start = "    "
+        else:
+            start = "  - "
+        for axis, column in zip("xyz", three, strict=True):
+            text.add(
+                f"readings.{axis}",
+                _plain(column.name),
+                "its name" if column.words else "its place",
+                f"{start}{axis}: {_plain(column.name)}",
+            )
+            start = "    "
+        if several:
+            continue
+        _write_orientation(text, quaternion, sure, angles)
+        for name, found, unit in (
+            ("sigma", sigma, _unit_of(sigma) or _length_unit(every)[0]),
+            ("sigma_rot", sigma_rot, _unit_of(sigma_rot) or _angle_unit(angles[0] if angles else ())[0]),
+        ):
+            if found:
+                coverage = ", coverage: 2" if is_expanded(found) else ""
+                value = f"{{columns: {_list(found)}, unit: {_quoted(unit)}{coverage}}}"
+                because = "their names; standard deviations, or expanded uncertainties by a coverage of 2"
+                text.add(f"readings.{name}", value, because, f"    {name}: {value}")
+    if several and (quaternion or angles or sigma):
+        text.lines.append(
+            "# Note: columns of orientations or deviations are there too; which target they are of is not clear."
+        )
+    if temperature is not None:
+        unit = temperature.unit if temperature.unit in ("degC", "degF", "K") else OPEN
+        value = f"{{column: {_plain(temperature.name)}, unit: {_quoted(unit)}}}"
+        text.add("temperature", value, "its name")
+    _write_order(text, label, time, pattern)
+
+
+def _quoted(unit: str) -> str:
+    return f"'{OPEN}'" if unit == OPEN else unit
+
+
+def _write_orientation(
+    text: _Text, quaternion: Sequence[Column], sure: bool, angles: tuple[Sequence[Column], str, str, str] | None
+) -> None:
+    if quaternion:
+        because = "their names" if sure else "the sum of their squares is 1; whether w is first is not said"
+        for name, column in zip(("qw", "qx", "qy", "qz"), quaternion, strict=True):
+            text.add(f"readings.{name}", _plain(column.name), because, f"    {name}: {_plain(column.name)}")
+    if angles is not None:
+        three, about, axes, who = angles
+        unit, why = _angle_unit(three)
+        value = f"{{columns: {_list(three)}, about: {_quoted(about)}, axes: {_quoted(axes)}, unit: {_quoted(unit)}}}"
+        text.add(
+            "readings.angles",
+            value,
+            f"{who}; {why}; a rotation vector is rotation_vector: {{columns, unit}}",
+            f"    angles: {value}",
+        )
+
+
+def _names(left: _Left, several: bool) -> tuple[Column | None, Column | None, str | None]:
+    """Return the columns of the configuration and of the target, and a pattern if one column holds both."""
+    for column in left.columns:
+        parts = {text.count("::") for text in column.texts}
+        if parts in ({1}, {2}):
+            left.take([column])
+            lead = "[^:]*::" if parts == {2} else ""
+            return column, None, rf"{lead}(?P<configuration>[^:]+)::(?P<target>[^:]+)"
+    texts = [column for column in left.columns if column.given and len(column.given) == len(column.texts)]
+    target = None if several else named_like(texts, "target")
+    left.take([target] if target else [])
+    rest = [column for column in texts if column is not target]
+    words = [column for column in rest if not column.is_numeric]
+    label = named_like(words, "label") or named_like(rest, "label") or next(iter(words), None)
+    label = label or next((column for column in rest if column.counts), None)
+    left.take([label] if label else [])
+    if label is not None and target is None and not several and label.distinct < len(label.texts):
+        others = [column for column in words if column is not label]
+        target = next((c for c in others if len(set(zip(label.texts, c.texts, strict=True))) == len(c.texts)), None)
+        left.take([target] if target else [])
+        if target is not None and target.distinct > label.distinct:
+            label, target = target, label
+    return label, target, None
+
+
+def _write_joints(text: _Text, joints: Sequence[Column]) -> None:
+    if not joints:
+        value = "{file: joints.csv}"
+        text.add(
+            "joints", value, "no columns are called like joints; a second file has configuration, joint_1 [deg] .."
+        )
+        return
+    text.lines.append("joints:")
+    because = "their names" if joints[0].words else "their place"
+    text.add("joints.columns", _list(joints), because, f"  columns: {_list(joints)}")
+    units = [column.unit for column in joints]
+    if all(unit in ("deg", "rad", "mm", "m", "um", "in") for unit in units) and len(set(units)) > 1:
+        text.add("joints.units", f"[{', '.join(units)}]", "the headings", f"  units: [{', '.join(units)}]")
+        return
+    unit, why = _angle_unit(joints)
+    text.add("joints.unit", unit, why, f"  unit: {_quoted(unit)}")
+
+
+def _unit_of(columns: Sequence[Column]) -> str | None:
+    units = {column.unit for column in columns}
+    return units.pop() or None if len(units) == 1 else None
+
+
+def _angle_unit(columns: Sequence[Column]) -> tuple[str, str]:
+    """Return the unit of angles and what it rests on."""
+    unit = _unit_of(columns)
+    if unit is not None:
+        return unit, "the headings"
+    if not columns:
+        return OPEN, "nothing tells the unit"
+    most = max((float(np.abs(column.values).max()) for column in columns if len(column.values)), default=0.0)
+    if most > _MOST_RADIANS:
+        return "deg", f"{most:g} is too much for radians"
+    if len(columns[0].values) >= _ENOUGH:
+        return "rad", f"no angle is beyond {most:.3g}"
+    return OPEN, f"deg or rad: no angle is beyond {most:.3g}"
+
+
+def _length_unit(columns: Sequence[Column]) -> tuple[str, str]:
+    """Return the unit of positions and what it rests on."""
+    unit = _unit_of(columns)
+    if unit is not None:
+        return unit, "the headings"
+    most = max((float(np.abs(column.values).max()) for column in columns if len(column.values)), default=0.0)
+    if most > _MOST_METRES:
+        return "mm", f"{most:g} is too much for metres; it may be in"
+    return f"'{OPEN}'", f"m, mm or in: no coordinate is beyond {most:.3g}"
+
+
+def _write_order(text: _Text, label: Column | None, time: Column | None, pattern: str | None) -> None:
+    """Write what tells the order of measurement, if anything seems to."""
+    if time is not None:
+        if time.is_numeric:
+            text.add("order", f"{{column: {_plain(time.name)}}}", "its name")
+            return
+        formats = _formats(time.given)
+        if formats:
+            shown = "iso" if formats[0] == "iso" else f"'{formats[0]}'"
+            value = f"{{column: {_plain(time.name)}, time: {shown}}}"
+            because = "its name and its texts"
+            if len(formats) > 1:
+                because = f"its texts; {formats[1]} would read them too"
+            text.add("order", value, because)
+            return
+    if label is not None and pattern is None and not label.is_numeric:
+        starts = {match[1] if (match := _NUMBERED.fullmatch(name)) else None for name in set(label.texts)}
+        if len(starts) == 1 and None not in starts:
+            text.add("order", "{by: labels}", "the labels are numbered; remove it if they were not measured so")
+
+
+def _formats(texts: Sequence[str]) -> list[str]:
+    """Return the formats that read all of these times."""
+    found = ["iso"] if all(_reads(datetime.fromisoformat, text) for text in texts) else []
+    return found + [
+        way for way in _TIMES if all(_reads(lambda text, way=way: datetime.strptime(text, way), text) for text in texts)
+    ]
+
+
+def _reads(parse: Callable[[str], datetime], text: str) -> bool:
+    try:
+        parse(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _tried(made: Guessed, path: Path) -> Guessed:
+    """Try an import with a guessed mapping, in memory."""
+    content = validated(YAML(typ="safe", pure=True).load(made.text), MappingFile, "the guessed mapping")
+    try:
+        data = read_with(TableFiles(path, Path("the guessed mapping"), content, None))
+    except InputError as error:
+        return replace(made, refusal=str(error))
+    return replace(made, configurations=data.configurations, targets=data.targets)

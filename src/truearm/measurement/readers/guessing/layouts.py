@@ -1,0 +1,258 @@
+"""How a table seems to be laid out: delimiter, decimal sign, encoding, comments, header."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+from truearm.errors import InputError
+from truearm.files import read_bytes
+from truearm.limits import refuse_beyond
+from truearm.measurement.readers.cells import Cells, Layout, lines_of, split_line
+from truearm.measurement.readers.sheets import is_workbook, read_sheet, sheet_names
+from truearm.units import as_number
+
+#: Lines that are looked at.
+_LOOKED_AT: Final = 400
+#: Lines of titles that may stand above the headings of a sheet.
+_TITLES: Final = 8
+_DELIMITERS: Final = {"semicolon": ";", "tab": "\t", "comma": ",", "whitespace": None}
+_COMMENTS: Final = ("//", "#", "%", "!", "*")
+#: Units that stand in a line of their own, or behind a name.
+UNITS: Final = {
+    **{name: name for name in ("mm", "m", "um", "in", "deg", "rad", "mrad", "degC", "degF", "K")},
+    **{"µm": "um", "μm": "um", "inch": "in", "°": "deg", "degree": "deg", "degrees": "deg", "grad": "deg"},
+    **{"radian": "rad", "radians": "rad", "°c": "degC", "°C": "degC", "degc": "degC", "°F": "degF"},
+    **{"metre": "m", "meter": "m", "millimetre": "mm", "millimeter": "mm"},
+}
+
+Rows = list[tuple[int, list[str]]]
+
+
+@dataclass(frozen=True)
+class GuessedLayout:
+    """How a table seems to be laid out.
+
+    Attributes
+    ----------
+    entries
+        Entries of the mapping's layout, with what the guess rests on.
+    decimal
+        The decimal sign.
+    names
+        Name of each column, its number if there is no header.
+    units
+        Unit of each column by a line of units, empty where there is none.
+    columns
+        The cells of the first rows, column by column.
+    header
+        Whether there is a header.
+    notes
+        What else was seen.
+    """
+
+    entries: dict[str, tuple[str | int, str]]
+    decimal: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    columns: tuple[tuple[str, ...], ...]
+    header: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Lines cut into cells in one way, and how many numbers that gives in lines of one width."""
+
+    delimiter: str
+    decimal: str
+    rows: Rows
+    width: int
+    numbers: int
+
+
+def guess_layout(path: Path) -> GuessedLayout:
+    """Return how a table seems to be laid out.
+
+    Raises
+    ------
+    InputError
+        If no way to cut it into cells gives rows of numbers.
+    """
+    if is_workbook(path):
+        return _of_workbook(path)
+    text, encoding = _decoded(path)
+    refuse_beyond("rows", text.count("\n"), where=str(path))
+    lines = [(n, line.rstrip("\r\n")) for n, line in enumerate(islice(lines_of(text), _LOOKED_AT), 1) if line.strip()]
+    comment = _comment(lines)
+    best = max(
+        (
+            _split(lines, comment, delimiter, decimal)
+            for delimiter in _DELIMITERS
+            for decimal in (".", ",")
+            if (delimiter, decimal) != ("comma", ",")
+        ),
+        key=lambda split: split.numbers,
+    )
+    if best.numbers == 0:
+        raise InputError(
+            "this does not look like a table: no way to cut its lines gives rows of numbers",
+            where=str(path),
+            allowed="lines of numbers between commas, semicolons, tabs or blanks, or an Excel workbook",
+        )
+    entries: dict[str, tuple[str | int, str]] = {
+        "delimiter": (best.delimiter, f"it gives the most numbers, {best.numbers} in lines of {best.width} cells"),
+        "decimal": ("comma" if best.decimal == "," else "point", "numbers are written so"),
+    }
+    if encoding != "utf-8":
+        entries["encoding"] = (encoding, "it is no UTF-8 text")
+    if comment is not None:
+        entries["comment"] = (comment, "lines begin with it")
+    return _with_header(best, entries, path)
+
+
+def _decoded(path: Path) -> tuple[str, str]:
+    content = read_bytes(path)
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        ways = ["utf-16"]
+    else:
+        ways = ["utf-8-sig", "cp1252", "latin-1"]
+    for way in ways:
+        try:
+            text = content.decode(way)
+        except UnicodeDecodeError:
+            continue
+        if not text.strip():
+            raise InputError("the file is empty", where=str(path), cure="Check that it was exported whole.")
+        return text, way.removesuffix("-sig")
+    raise InputError("this is no text", where=str(path), allowed="UTF-8, UTF-16 or Windows (cp1252) text")
+
+
+def _comment(lines: Rows | list[tuple[int, str]]) -> str | None:
+    """Return the sign with which some of the lines begin, but not all."""
+    for sign in _COMMENTS:
+        marked = sum(str(line).lstrip().startswith(sign) for _, line in lines)
+        if 0 < marked < len(lines):
+            return sign
+    return None
+
+
+def _split(lines: Sequence[tuple[int, str]], comment: str | None, delimiter: str, decimal: str) -> _Split:
+    sign = _DELIMITERS[delimiter]
+    rows: Rows = []
+    for number, line in lines:
+        bare = line.lstrip()
+        is_comment = comment is not None and bare.startswith(comment)
+        cut = bare[len(comment or "") :] if is_comment else line
+        if sign is None:
+            cells = split_line(cut)
+        else:
+            try:
+                cells = [cell.strip() for cell in next(csv.reader([cut], delimiter=sign, skipinitialspace=True), [])]
+            except csv.Error:
+                continue
+        rows.append((-number if is_comment else number, cells))
+    widths = Counter(len(cells) for number, cells in rows if number > 0 and _numbers(cells, decimal) >= 2)
+    width, _ = max(widths.items(), key=lambda item: item[0] * item[1], default=(0, 0))
+    found = sum(_numbers(cells, decimal) for number, cells in rows if number > 0 and len(cells) == width)
+    return _Split(delimiter, decimal, rows, width, found)
+
+
+def _numbers(cells: Sequence[str], decimal: str) -> int:
+    return sum(number_of(cell, decimal) is not None for cell in cells)
+
+
+def number_of(text: str, decimal: str) -> float | None:
+    """Return the number that a text is with this decimal sign, None if it is none."""
+    if decimal == ",":
+        return None if "." in text else as_number(text.replace(",", "."))
+    return as_number(text)
+
+
+def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path: Path) -> GuessedLayout:
+    """Find the first line with data, and the names and units above it."""
+    counts = sorted(_numbers(cells, split.decimal) for n, cells in split.rows if n > 0 and len(cells) == split.width)
+    enough = max(2, counts[len(counts) // 2] / 2)
+    place = next(
+        i
+        for i, (n, cells) in enumerate(split.rows)
+        if n > 0 and len(cells) == split.width and _numbers(cells, split.decimal) >= enough
+    )
+    above = [
+        (abs(n), cells)
+        for n, cells in split.rows[:place]
+        if len(cells) == split.width and _numbers(cells, split.decimal) == 0
+    ]
+    units = ("",) * split.width
+    if above and _is_units(above[-1][1]):
+        units = tuple(UNITS.get(_bare(cell), "") for cell in above.pop()[1])
+    data = [cells for n, cells in split.rows[place:] if n > 0 and len(cells) == split.width]
+    columns = tuple(zip(*data, strict=True))
+    first = split.rows[place][0]
+    made = GuessedLayout(entries, split.decimal, (), units, columns, header=bool(above))
+    if not above:
+        entries["header"] = ("none", "no line of names stands above the numbers")
+        if first > 1:
+            entries["first_row"] = (first, "the first line of numbers")
+        return replace(made, names=tuple(str(n) for n in range(1, split.width + 1)))
+    line, names = above[-1]
+    entries["header"] = (line, "the last line of names above the numbers")
+    if first != line + 1:
+        entries["first_row"] = (first, "the first line of numbers")
+    notes = (f"line {above[-2][0]} looks like a second line of headings",) if len(above) > 1 else ()
+    return replace(made, names=tuple(names), notes=notes)
+
+
+def _bare(text: str) -> str:
+    return text.strip(" []()").strip()
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    given = [_bare(cell) for cell in cells if _bare(cell) not in ("", "-", "1")]
+    return bool(given) and all(cell in UNITS for cell in given)
+
+
+def _of_workbook(path: Path) -> GuessedLayout:
+    """Return the layout of the sheet that has the most numbers."""
+    best: tuple[_Split, str] | None = None
+    names = sheet_names(path)
+    for name in names:
+        cells = _cells_below_titles(path, name)
+        if cells is None:
+            continue
+        rows: Rows = [
+            (number, [column[row] for column in cells.columns]) for row, number in enumerate(cells.lines[:_LOOKED_AT])
+        ]
+        split = _measured(rows)
+        if best is None or split.numbers > best[0].numbers:
+            best = split, name
+    if best is None or best[0].numbers == 0:
+        read_sheet(path, names[0], Layout(header=None), str(path))
+        raise InputError(
+            "no sheet looks like a table of numbers", where=str(path), allowed="a sheet with names above columns"
+        )
+    entries: dict[str, tuple[str | int, str]] = {}
+    if len(names) > 1:
+        entries["sheet"] = (best[1], f"it has the most numbers of {len(names)} sheets")
+    return _with_header(best[0], entries, path)
+
+
+def _cells_below_titles(path: Path, name: str) -> Cells | None:
+    """Return the cells of a sheet, those below titles whose cells are merged; None if it cannot be read."""
+    for first in range(1, _TITLES + 1):
+        try:
+            return read_sheet(path, name, Layout(header=None, first_row=first), str(path))
+        except InputError:
+            continue
+    return None
+
+
+def _measured(rows: Rows) -> _Split:
+    """Return rows of cells of a sheet, as a text that was cut; empty cells at the end are cells too."""
+    width = max((len(cells) for _, cells in rows), default=0)
+    return _Split("", ".", rows, width, sum(_numbers(cells, ".") for _, cells in rows))

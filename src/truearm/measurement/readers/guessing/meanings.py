@@ -1,0 +1,236 @@
+"""What the columns of a table seem to hold, by their names and by what stands in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from truearm.measurement.readers.guessing.layouts import UNITS, GuessedLayout, number_of
+from truearm.modeling.chain import Array
+
+_IN_BRACKETS: Final = re.compile(r"(?P<name>.*?)\s*[\[({](?P<unit>[^\])}]*)[\])}]\s*")
+_AT_THE_END: Final = re.compile(r"(?P<name>.*[^\s_/,])[\s_/,]+(?P<unit>[^\s_/,]+)\s*")
+_TOKEN: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_]+")
+#: Words before the number of a joint.
+_JOINT: Final = frozenset({"joint", "joints", "axis", "ax", "achse", "gelenk", "j", "a", "q", "theta", "rax"})
+_UR: Final = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
+_YASKAWA: Final = tuple("slurbt")
+_DEVIATION: Final = frozenset({"std", "stdev", "stddev", "sigma", "s", "sd", "u", "unc", "uncertainty", "σ"})
+#: Words of expanded uncertainties.
+_EXPANDED: Final = frozenset({"k2", "u95", "95", "expanded", "2sigma"})
+_NOT_MEASURED: Final = frozenset(
+    {"nominal", "nom", "soll", "theoretical", "theo", "cad", "design", "cmd", "command", "commanded", "programmed"}
+    | {"error", "err", "delta", "diff", "difference", "dev", "deviation", "residual", "rms", "tol", "tolerance"}
+)
+_TOOL: Final = frozenset({"tcp", "tool", "flange", "robot"})
+_LABEL: Final = frozenset(
+    {"configuration", "config", "pose", "poses", "position", "pos", "point", "punkt", "label", "name", "id", "stelle"}
+    | {"station", "group", "no", "nr", "number", "index", "pt", "measurement", "messung", "pkt"}
+)
+_TARGET: Final = frozenset(
+    {"target", "ball", "smr", "reflector", "marker", "prism", "nest", "kugel", "feature", "body"}
+)
+_TIME: Final = frozenset({"time", "timestamp", "stamp", "date", "datum", "zeit", "uhrzeit", "datetime"})
+_TEMPERATURE: Final = frozenset({"temp", "temperature", "temperatur"})
+#: Texts that mean that nothing was measured.
+_NOTHING: Final = re.compile(
+    r"n\.?/?a\.?|nan|none|null|nil|-+|\?+|\*+|missing|failed|fail|lost|invalid|#n/a|#div/0!|no data|nodata|occluded",
+    re.IGNORECASE,
+)
+#: Angles about three axes by the names of their columns: axes, whether they turn along, and who writes so.
+_ANGLES: Final = {
+    ("a", "b", "c"): ("zyx", "moving", "KUKA's A, B, C"),
+    ("w", "p", "r"): ("xyz", "fixed", "FANUC's W, P, R"),
+    ("roll", "pitch", "yaw"): ("xyz", "fixed", "roll, pitch and yaw as ROS and most programs mean them"),
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its place, name, unit in the heading, words of the name, and what stands in it."""
+
+    place: int
+    name: str
+    unit: str
+    words: tuple[str, ...]
+    texts: tuple[str, ...]
+    decimal: str
+
+    @cached_property
+    def given(self) -> list[str]:
+        """Return the cells that are not empty."""
+        return [text for text in self.texts if text]
+
+    @cached_property
+    def values(self) -> Array:
+        """Return the numbers that stand in it."""
+        found = (number_of(text, self.decimal) for text in self.given)
+        return np.array([value for value in found if value is not None])
+
+    @cached_property
+    def nothing(self) -> list[str]:
+        """Return the texts among its numbers that seem to mean that nothing was measured."""
+        odd = dict.fromkeys(text for text in self.given if number_of(text, self.decimal) is None)
+        return [text for text in odd if _NOTHING.fullmatch(text)]
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether it holds numbers, and beside them only what seems to mean nothing."""
+        odd = sum(number_of(text, self.decimal) is None for text in self.given)
+        return len(self.values) > 0 and odd == sum(text in self.nothing for text in self.given)
+
+    @property
+    def counts(self) -> bool:
+        """Whether it numbers the rows: 1, 2, 3."""
+        whole = len(self.values) == len(self.texts) > 1 and all(text.isdigit() for text in self.texts)
+        return whole and bool((np.diff(self.values) == 1).all())
+
+    @property
+    def distinct(self) -> int:
+        """How many different cells there are."""
+        return len(set(self.texts))
+
+
+Triple = tuple[Column, Column, Column]
+
+
+def columns_of(layout: GuessedLayout) -> list[Column]:
+    """Return the columns of a table."""
+    made = []
+    for place, (name, texts) in enumerate(zip(layout.names, layout.columns, strict=True)):
+        bare, unit = _name_and_unit(name) if layout.header else (name, "")
+        words = tuple(word.lower() for word in _TOKEN.findall(bare)) if layout.header else ()
+        made.append(Column(place, name, unit or layout.units[place], words, texts, layout.decimal))
+    return made
+
+
+def _name_and_unit(heading: str) -> tuple[str, str]:
+    for pattern in (_IN_BRACKETS, _AT_THE_END):
+        match = pattern.fullmatch(heading)
+        if match is not None and (unit := UNITS.get(match["unit"].strip())):
+            return match["name"], unit
+    return heading, ""
+
+
+def joints_among(columns: Sequence[Column]) -> list[Column]:
+    """Return the columns of the joints in their order, none if no names say so."""
+    groups: dict[tuple[str, ...], dict[int, Column]] = {}
+    for column in columns:
+        *before, number = column.words or ("",)
+        if not before or not number.isdigit() or before[-1] not in _JOINT or _NOT_MEASURED & set(before):
+            continue
+        groups.setdefault(tuple(before), {}).setdefault(int(number), column)
+    runs = [_run(found) for found in groups.values()]
+    for words in (_UR, _YASKAWA):
+        named = {"".join(column.words): column for column in columns}
+        runs.append([named[word] for word in words] if all(word in named for word in words) else [])
+    return max(runs, key=len, default=[])
+
+
+def _run(found: dict[int, Column]) -> list[Column]:
+    """Return columns whose numbers follow each other from 0 or 1."""
+    first = 0 if 0 in found else 1
+    run = []
+    while first in found:
+        run.append(found[first])
+        first += 1
+    return run
+
+
+def triples_among(columns: Iterable[Column], last: Sequence[str]) -> dict[tuple[str, ...], Triple]:
+    """Return three columns that are named alike but for a word, by the other words; deviations are left out."""
+    groups: dict[tuple[str, ...], dict[str, Column]] = {}
+    for column in columns:
+        words = column.words
+        for at in dict.fromkeys((len(words) - 1, 0)):
+            if words and words[at] in last and (key := (*words[:at], *words[at + 1 :])) is not None:
+                groups.setdefault(key, {}).setdefault(words[at], column)
+                break
+    return {
+        key: (found[last[0]], found[last[1]], found[last[2]])
+        for key, found in groups.items()
+        if len(found) == 3 and not _NOT_MEASURED & set(key)
+    }
+
+
+def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
+    """Return the columns x, y, z of each target by the other words of their names."""
+    found = triples_among(columns, ("x", "y", "z"))
+    found = {key: three for key, three in found.items() if not _DEVIATION & set(key)}
+    measured = {key: three for key, three in found.items() if not _TOOL & set(key)}
+    return measured or found
+
+
+def quaternion_among(columns: Sequence[Column]) -> tuple[list[Column], bool]:
+    """Return the columns w, x, y, z of a quaternion, none if there is none, and whether their names say which is which.
+
+    Four columns are one only if the sum of their squares is 1 in every row.
+    """
+    named = {"".join(column.words): column for column in columns}
+    for names, sure in (
+        (("qw", "qx", "qy", "qz"), True),
+        (("q0", "qx", "qy", "qz"), True),
+        (("rotw", "rotx", "roty", "rotz"), True),
+        (("q0", "q1", "q2", "q3"), False),
+        (("q1", "q2", "q3", "q4"), False),
+    ):
+        for start in ("", "quat", "orientation", "rotation", "pose"):
+            four = [named[start + name] for name in names if start + name in named]
+            if len(four) == 4 and _is_quaternion(four):
+                return four, sure
+    return [], True
+
+
+def _is_quaternion(four: Sequence[Column]) -> bool:
+    if len({len(column.values) for column in four}) > 1 or not len(four[0].values):
+        return False
+    length = np.sqrt(sum(column.values**2 for column in four))
+    return bool(np.abs(length - 1.0).max() < 1e-2)
+
+
+def angles_among(columns: Sequence[Column]) -> tuple[Triple, str, str, str] | None:
+    """Return three columns of angles, the axes, whether they turn along, and who writes so; ? where nothing tells."""
+    for names, (about, axes, who) in _ANGLES.items():
+        for three in triples_among(columns, names).values():
+            if all(column.is_numeric for column in three):
+                return three, about, axes, who
+    for key, three in triples_among(columns, ("rx", "ry", "rz")).items():
+        if not _DEVIATION & set(key):
+            return three, "?", "?", "names such as Rx do not say it"
+    return None
+
+
+def deviations_among(columns: Sequence[Column], of: Sequence[str]) -> list[Column]:
+    """Return the columns with the deviations of x, y, z, or those of rx, ry, rz: one, three or none."""
+    for key, three in triples_among(columns, of).items():
+        if _DEVIATION & set(key):
+            return [*three]
+    for sign in ("u", "s"):
+        named = {"".join(column.words): column for column in columns}
+        if all(sign + axis in named for axis in of):
+            return [named[sign + axis] for axis in of]
+    if tuple(of) != ("x", "y", "z"):
+        return []
+    plain = [
+        column
+        for column in columns
+        if _DEVIATION & set(column.words) and not {"rot", "angle", "x", "y", "z"} & set(column.words)
+    ]
+    return plain[:1]
+
+
+def is_expanded(columns: Sequence[Column]) -> bool:
+    """Return whether names say that deviations are expanded uncertainties."""
+    return any(_EXPANDED & {*column.words, *map("".join, pairwise(column.words))} for column in columns)
+
+
+def named_like(columns: Sequence[Column], kind: str) -> Column | None:
+    """Return the first column that is called like a label, a target, a time or a temperature."""
+    words = {"label": _LABEL, "target": _TARGET, "time": _TIME, "temperature": _TEMPERATURE}[kind]
+    return next((column for column in columns if words & set(column.words)), None)

@@ -40,6 +40,7 @@ OUTPUTS = ("out", "steps", "file", "folder")
 #: Of these names those that a job reads.
 FILES = (
     ("import_table", "file"),
+    ("import_guess", "file"),
     ("import_robodk", "file"),
     ("import_ur_kinematics", "file"),
     ("path", "file"),
@@ -71,6 +72,14 @@ def _performance_plan(folder: Path) -> Path:
     return _written(folder / PLAN, plan_text(plan))
 
 
+#: A mapping that takes the joints from a second file.
+BESIDE_MAPPING = """\
+truearm: truearm-mapping/1
+length_unit: mm
+configuration: {each: row}
+joints: {file: others.csv}
+readings: [{target: tip, x: x, y: y, z: z}]
+"""
 _UNITS = "units: {length: mm, angle: deg}\n"
 
 
@@ -144,6 +153,10 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "export": lambda folder: {"robot": _robot(folder)},
     "compensate": lambda folder: {
         "tools": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
+    },
+    "import_table": lambda folder: {
+        "joints": _written(folder / "joints.csv", "configuration,joint_1 [deg],joint_2 [deg]\n1,10,20\n2,15,25\n"),
+        "mapping": _written(folder / "beside.yaml", BESIDE_MAPPING),
     },
     "import_ur_kinematics": lambda folder: {
         "robot": _written(folder / "ur10.yaml", robot_text(truearm.load_robot("ur10")))

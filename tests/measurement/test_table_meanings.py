@@ -21,11 +21,11 @@ ROWS = "pose,q1,q2,ball,X,Y,Z,a,b,c\np,1,2,t,1,2,3,{}\n"
 def turned(folder: Path, numbers: str, entry: str) -> np.ndarray:
     data = read(folder, ROWS.format(numbers), MAP.replace("z: Z", f"z: Z, {entry}"))
     assert data.quaternion is not None
-    return data.quaternion[0]
+    return np.asarray(data.quaternion[0])
 
 
 def about(axis: str, degrees: float) -> np.ndarray:
-    return rotation_from_vector(np.radians(degrees) * np.eye(3)["xyz".index(axis)][None])[0]
+    return np.asarray(rotation_from_vector(np.radians(degrees) * np.eye(3)["xyz".index(axis)][None])[0])
 
 
 @pytest.mark.parametrize("order", [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c])
@@ -117,7 +117,7 @@ def read_csv_again(folder: Path, text: str) -> list[float]:
     (folder / "again.csv").write_text(text)
     data = read_csv(folder / "again.csv")
     assert data.number is not None
-    return data.number.tolist()
+    return [float(number) for number in data.number]
 
 
 def test_the_order_is_told_by_labels_rows_numbers_and_times(tmp_path: Path) -> None:

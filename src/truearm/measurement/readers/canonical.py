@@ -340,13 +340,8 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     writer.writerow(heading)
     writer.writerows(row for found in rows for row in found)
     for reading in range(0 if setup is None else len(setup.target)):
-        row = [
-            "",
-            *([] if order is None else [""]),
-            *("" for _ in units),
-            *reading_cells(setup, "fixture", reading),
-            *("" for _ in circumstances),
-        ]  # type: ignore[arg-type]
+        ends = [""] * (len(units) + (order is not None)), [""] * len(circumstances)
+        row = ["", *ends[0], *reading_cells(setup, "fixture", reading), *ends[1]]  # type: ignore[arg-type]
         writer.writerow(row)
     return stream.getvalue()
 

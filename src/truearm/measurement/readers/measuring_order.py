@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import IntArray
@@ -190,7 +191,7 @@ def _spans(values: Array, of_row: IntArray, count: int) -> tuple[Array, Array, I
     return first, last, row_of_first
 
 
-def _with_unmeasured(sequence: IntArray, labels: Sequence[str], measured: Array, where: str) -> IntArray:
+def _with_unmeasured(sequence: IntArray, labels: Sequence[str], measured: NDArray[np.bool_], where: str) -> IntArray:
     """Return the order in which the configurations are listed, if those that were measured came in it."""
     if (np.diff(sequence) < 0).any():
         label = labels[int(np.flatnonzero(~measured)[0])]

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from truearm.errors import InputError, nearest_names
+from truearm.measurement.dataset import IntArray
 from truearm.measurement.readers.cells import Cells
 from truearm.measurement.readers.mapping import MappingFile, ReadingEntry
 from truearm.measurement.readers.mapping_entries import SigmaColumns, SigmaRotColumns, TemperatureEntry
@@ -110,7 +111,7 @@ def deviations(cells: Cells, content: MappingFile, mapping: Path, name: Literal[
 
 
 def temperatures(
-    cells: Cells, configurations: Configurations, of_row: Array, entry: TemperatureEntry, mapping: Path
+    cells: Cells, configurations: Configurations, of_row: IntArray, entry: TemperatureEntry, mapping: Path
 ) -> Array:
     """Return the mean temperature of each configuration's rows [degC], ``(configurations,)``."""
     place = place_of(cells, entry.column, mapping, "temperature.column")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -409,15 +409,12 @@ def _write_order(text: _Text, label: Column | None, time: Column | None, pattern
 
 def _formats(texts: Sequence[str]) -> list[str]:
     """Return the formats that read all of these times."""
-    found = ["iso"] if all(_reads(datetime.fromisoformat, text) for text in texts) else []
-    return found + [
-        way for way in _TIMES if all(_reads(lambda text, way=way: datetime.strptime(text, way), text) for text in texts)
-    ]
+    return [way for way in ("iso", *_TIMES) if all(_reads(text, way) for text in texts)]
 
 
-def _reads(parse: Callable[[str], datetime], text: str) -> bool:
+def _reads(text: str, way: str) -> bool:
     try:
-        parse(text)
+        datetime.fromisoformat(text) if way == "iso" else datetime.strptime(text, way)
     except ValueError:
         return False
     return True

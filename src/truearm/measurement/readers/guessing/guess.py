@@ -188,7 +188,9 @@ def _by_place(
     columns: Sequence[Column], joints: Sequence[Column]
 ) -> tuple[dict[tuple[str, ...], tuple[Column, Column, Column]], list[Column]]:
     """Return the last three columns of numbers as a position, and those before as joints, where nothing has a name."""
-    numeric = [column for column in columns if column.is_numeric and not column.counts]
+    numeric = [column for column in columns if column.is_numeric]
+    if numeric and numeric[0].counts:
+        del numeric[0]
     if len(numeric) < 3 or len(numeric) > 13:
         return {}, list(joints)
     first, second, third = numeric[-3:]

@@ -35,7 +35,7 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
     text = guessed(tmp_path, NEWCOMER, encoding="cp1252")
     mapping = tmp_path / "map.yaml"
     mapping.write_text(text)
-    with pytest.raises(InputError, match="confirmed: this mapping was guessed|joints.unit: this value is not known"):
+    with pytest.raises(InputError, match=r"joints.unit: this value is not known; got .\?.; allowed: deg, rad"):
         truearm.import_table(tmp_path / "table.csv", mapping)
     mapping.write_text(text.replace("unit: '?'", "unit: rad"))
     with pytest.raises(InputError, match="confirmed: this mapping was guessed, and nobody has confirmed it"):
@@ -48,7 +48,6 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
         "P002,2,-0.6109,0.2094,0.096,tip,,,,22.6\n"
         "P003,3,0.75,0.5,0.25,tip,1702.5519,-640.2207,790.6644,22.7\n"
     )
-    assert csv_text(data, angle_unit="rad") == wanted.replace(",order", "").replace("[rad],j", "[rad],j") or True
     assert csv_text(data, angle_unit="rad") == wanted
 
 
@@ -56,7 +55,8 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
     ("table", "lines"),
     [
         (  # points of SpatialAnalyzer
-            "// mm\nA::P1::s1, 1841.2, 112.8, 655.1\nA::P1::s2, 1839.0, 96.1, 602.3\nA::P2::s1, 1702.5, -640.2, 790.6\n",
+            "// mm\nA::P1::s1, 1841.2, 112.8, 655.1\nA::P1::s2, 1839.0, 96.1, 602.3\n"
+            "A::P2::s1, 1702.5, -640.2, 790.6\n",
             [
                 'comment: "//"',
                 "header: none",
@@ -70,7 +70,8 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
             ["delimiter: whitespace", "configuration: {column: 1}", "target_column: 2", "x: 3", "order: {by: labels}"],
         ),
         (  # a wide table with units in a line of their own
-            "Pose;A1;A2;L x;L y;L z;R x;R y;R z\n;deg;deg;mm;mm;mm;mm;mm;mm\na;10,5;2;1841,2;5;6;7;8;9\nb;1;2;4;5;6;7;8;9\n",
+            "Pose;A1;A2;L x;L y;L z;R x;R y;R z\n;deg;deg;mm;mm;mm;mm;mm;mm\n"
+            "a;10,5;2;1841,2;5;6;7;8;9\nb;1;2;4;5;6;7;8;9\n",
             ["decimal: comma", "first_row: 3", "target: l", "target: r", "length_unit: mm", "unit: deg"],
         ),
         (  # a quaternion with w first, KUKA's joints, times, expanded uncertainties
@@ -81,7 +82,7 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
                 "qx: qx",
                 "order: {column: time, time: iso}",
                 'columns: ["U95 [mm]"], unit: mm, coverage: 2',
-                "x: x/m",
+                'x: "x/m"',
             ],
         ),
         (  # roll, pitch, yaw and an unknown order of days and months
@@ -102,7 +103,8 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
             ["configuration: {column: 1}", "columns: [2, 3]", "x: 4"],
         ),
         (  # nominal and measured
-            "id\tJ1\tJ2\tnominal x\tnominal y\tnominal z\tmeasured x\tmeasured y\tmeasured z\na\t90\t2\t800\t2\t3\t801\t2\t3\nb\t9\t2\t800\t2\t3\t801\t2\t3\n",
+            "id\tJ1\tJ2\tnominal x\tnominal y\tnominal z\t"
+            "measured x\tmeasured y\tmeasured z\na\t90\t2\t800\t2\t3\t801\t2\t3\nb\t9\t2\t800\t2\t3\t801\t2\t3\n",
             ["delimiter: tab", "x: measured x", "# Not used: nominal x, nominal y, nominal z"],
         ),
     ],
@@ -119,7 +121,7 @@ def test_what_nothing_tells_is_asked(tmp_path: Path) -> None:
     made = truearm.import_guess(tmp_path / "table.csv", out=tmp_path / "map.yaml")
     assert made.guessed.open == ("length_unit", "readings.angles", "joints.unit")
     assert made.lines() == [
-        f"Guessed 14 entries: {tmp_path / 'map.yaml'}",
+        f"Guessed 12 entries: {tmp_path / 'map.yaml'}",
         "Nothing in the file tells length_unit, readings.angles, joints.unit: answer each '?'.",
         "Nothing is imported before every guess is confirmed: look at each, then write confirmed: yes.",
     ]

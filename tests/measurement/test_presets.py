@@ -45,10 +45,13 @@ def imported(cell: Path, file: str, preset: str) -> str:
 
 
 def test_spatial_analyzer_cell_by_cell(cell: Path) -> None:
-    assert imported(cell, "points.txt", "spatial-analyzer") == (
+    text = imported(cell, "points.txt", "spatial-analyzer")
+    sigma = text.splitlines()[2].rpartition(",")[2]
+    assert float(sigma) == pytest.approx(6e-4**0.5)
+    assert text == (
         "configuration,order,axis_1 [deg],axis_2 [deg],target,x [mm],y [mm],z [mm],sigma [mm]\n"
         "P001,1,10.0,-20.5,smr_1,1841.2213,112.8402,655.1041,0.02\n"
-        f"P001,1,10.0,-20.5,smr_2,1839.0071,96.1175,602.3398,{6e-4**0.5!r}\n"
+        f"P001,1,10.0,-20.5,smr_2,1839.0071,96.1175,602.3398,{sigma}\n"
         "P002,2,-35.0,12.0,smr_1,,,,\n"
         "P002,2,-35.0,12.0,smr_2,,,,\n"
         "P003,3,5.0,7.0,smr_1,1702.5519,-640.2207,790.6644,0.02\n"
@@ -58,7 +61,8 @@ def test_spatial_analyzer_cell_by_cell(cell: Path) -> None:
 def test_t_mac_cell_by_cell(cell: Path) -> None:
     text = imported(cell, "poses.csv", "t-mac").splitlines()
     assert text[0] == (
-        "configuration,order,axis_1 [deg],axis_2 [deg],target,x [mm],y [mm],z [mm],qw,qx,qy,qz,sigma [mm],sigma_rot [mrad]"
+        "configuration,order,axis_1 [deg],axis_2 [deg],target,x [mm],y [mm],z [mm],qw,qx,qy,qz,sigma [mm],"
+        "sigma_rot [mrad]"
     )
     first = text[1].split(",")
     assert first[:8] == ["P001", "1", "10.0", "-20.5", "t-mac", "1841.2213", "112.8402", "655.1041"]

@@ -110,6 +110,16 @@ def deviations(cells: Cells, content: MappingFile, mapping: Path, name: Literal[
     return np.stack(parts, axis=1).reshape(-1)
 
 
+def called_in(content: MappingFile) -> dict[str, str]:
+    """Return what the table calls the columns of deviations and quaternions, for messages."""
+    names: dict[str, list[str]] = {"sigma": [], "sigma_rot": [], "quaternion": []}
+    for entry in content.readings:
+        names["quaternion"] += entry.quaternion.values()
+        for name, column in entry.deviations.items():
+            names[name.partition(".")[0]].append(column)
+    return {name: " ".join(dict.fromkeys(columns)) for name, columns in names.items() if columns}
+
+
 def temperatures(
     cells: Cells, configurations: Configurations, of_row: IntArray, entry: TemperatureEntry, mapping: Path
 ) -> Array:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from truearm.modeling.postures import approach_of
 
 #: How far the norm of a quaternion may be from 1; files round quaternions to four digits or more.
 QUATERNION_TOLERANCE = 1e-3
+#: Names of the columns of a quaternion, for messages.
+_QUATERNION = "qw qx qy qz"
 #: What the first configuration of a campaign is numbered, unless it is 0. A file may hold a later part.
 _FIRST = 1
 
@@ -130,6 +132,8 @@ class Readings:
         From, or over, the fixture [m], ``(readings,)``, NaN where missing; None if the file has none.
     visit
         Which visit of its configuration each was taken on, ``(readings,)``; None if the file does not say.
+    called
+        What the file calls its columns ``sigma``, ``sigma_rot`` and ``quaternion``, where that is something else.
     """
 
     source: str
@@ -145,6 +149,7 @@ class Readings:
     distance: Array | None = None
     height: Array | None = None
     visit: IntArray | None = None
+    called: Mapping[str, str] = field(default_factory=dict)
 
 
 def dataset_of(readings: Readings, configurations: Configurations, order: IntArray | None = None) -> Dataset:
@@ -168,7 +173,8 @@ def dataset_of(readings: Readings, configurations: Configurations, order: IntArr
     position = np.where(np.isnan(readings.position).any(axis=1, keepdims=True), np.nan, readings.position)
     quaternion = None
     if readings.quaternion is not None:
-        quaternion = unit_quaternions(readings.quaternion, readings.source, readings.lines)
+        names = readings.called.get("quaternion", _QUATERNION)
+        quaternion = unit_quaternions(readings.quaternion, readings.source, readings.lines, names)
     references = None
     if readings.reference.any():
         references = _part(readings, configurations, readings.reference, position, quaternion)
@@ -251,7 +257,7 @@ def _declared(
     if len(lacking):
         raise InputError(
             f"this reading has no {column}, and others have one",
-            where=f"{readings.source}, line {readings.lines[lacking[0]]}, column {column}",
+            where=f"{readings.source}, line {readings.lines[lacking[0]]}, column {readings.called.get(column, column)}",
             allowed=f"{column} for all readings, or for none",
             cure="Fill the column, or leave it out.",
         )
@@ -271,7 +277,7 @@ def _refuse_both_roles(readings: Readings) -> None:
             )
 
 
-def unit_quaternions(q: Array, source: str, lines: Sequence[int]) -> Array:
+def unit_quaternions(q: Array, source: str, lines: Sequence[int], names: str = _QUATERNION) -> Array:
     """Return quaternions ``(rows, 4)`` of length 1, or refuse one that is further from it than rounding.
 
     One that is already there to rounding stays as it is, so that reading what was written changes nothing.
@@ -281,7 +287,7 @@ def unit_quaternions(q: Array, source: str, lines: Sequence[int]) -> Array:
     if len(bad):
         raise InputError(
             "the quaternion (qw, qx, qy, qz) does not have length 1",
-            where=f"{source}, line {lines[bad[0]]}, columns qw qx qy qz",
+            where=f"{source}, line {lines[bad[0]]}, columns {names}",
             came=f"length {norm[bad[0]]:.6g}",
             allowed=f"1 within {QUATERNION_TOLERANCE:g}",
             cure="Check the order of the columns, and that all digits were exported.",

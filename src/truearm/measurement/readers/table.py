@@ -20,6 +20,7 @@ from truearm.measurement.readers.mapping_entries import LayoutEntry
 from truearm.measurement.readers.measuring_order import measuring_order, refuse_returns
 from truearm.measurement.readers.presets import PRESETS, is_preset, mapping_path
 from truearm.measurement.readers.row_values import (
+    called_in,
     deviations,
     numbers_of,
     place_of,
@@ -164,6 +165,7 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
         quaternion=None if quaternion is None else padded(quaternion),
         sigma=None if sigma is None else padded(sigma),
         sigma_rot=None if sigma_rot is None else padded(sigma_rot),
+        called=called_in(content),
     )
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
     if content.temperature is None:

@@ -81,9 +81,9 @@ class Column:
 
     @property
     def is_numeric(self) -> bool:
-        """Whether it holds numbers, and beside them only what seems to mean nothing."""
-        odd = sum(number_of(text, self.decimal) is None for text in self.given)
-        return len(self.values) > 0 and odd == sum(text in self.nothing for text in self.given)
+        """Whether at least half of what stands in it are numbers, beside what seems to mean nothing."""
+        meant = [text for text in self.given if text not in self.nothing]
+        return len(self.values) > 0 and 2 * len(self.values) >= len(meant)
 
     @property
     def counts(self) -> bool:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import re
+import zipfile
 from collections.abc import Callable
 from copy import deepcopy
 from functools import cache
@@ -298,17 +300,37 @@ def _damages(name: str) -> tuple[Damage, ...]:
     return _ANY
 
 
+def _workbook(rng: Random, content: bytes) -> bytes:
+    """Change cells, attributes and elements of a part of a workbook."""
+    with zipfile.ZipFile(io.BytesIO(content)) as parts:
+        held = {name: parts.read(name) for name in parts.namelist()}
+    sheets = [name for name in held if "worksheets/" in name or "sharedStrings" in name]
+    name = str(one_of(rng, sheets if rng.random() < 0.8 else sorted(held)))
+    text = held[name].decode("utf-8", "surrogateescape")
+    damage = one_of(rng, (_number, _number, _word, _xml, _xml, _bytes))
+    held[name] = str(damage(rng, text)).encode("utf-8", "replace")
+    if rng.random() < 0.1:
+        del held[str(one_of(rng, sorted(held)))]
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as parts:
+        for part, data in held.items():
+            parts.writestr(part, data)
+    return made.getvalue()
+
+
 def damaged(rng: Random, name: str, content: bytes) -> bytes:
     """Return a file with a few damages of its kind."""
+    if name.endswith(".xlsx") and rng.random() < 0.8:
+        return _workbook(rng, content)
     if rng.random() < 0.01:
         return bytes(rng.integers(0, 256, int(rng.integers(0, 2000)), dtype=np.uint8))
-    text = content.decode("latin-1" if name.endswith(".png") else "utf-8", "surrogateescape")
-    damages = (_bytes,) if name.endswith(".png") else _damages(name)
+    text = content.decode("latin-1" if name.endswith((".png", ".xlsx")) else "utf-8", "surrogateescape")
+    damages = (_bytes,) if name.endswith((".png", ".xlsx")) else _damages(name)
     while True:
         text = str(one_of(rng, damages)(rng, text))[:2_000_000]
         if rng.random() < 0.6:
             break
-    if name.endswith(".png"):
+    if name.endswith((".png", ".xlsx")):
         return text.encode("latin-1", "replace")
     if rng.random() < 0.03:
         return text.encode(str(one_of(rng, ("utf-16", "latin-1", "cp1252", "utf-8-sig"))), "replace")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from ruamel.yaml import YAML
 
 from truearm.compensation.cell import read_frames, read_tools, read_wrenches
 from truearm.compensation.program_files import program_files, read_programs, restored
@@ -24,8 +25,10 @@ from truearm.measurement.hexapod.sheets_together import together
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
+from truearm.measurement.readers.guessing.guess import guess_mapping
 from truearm.measurement.readers.hand_eye import read_hand_eye
 from truearm.measurement.readers.inclinations import inclinations_text, read_inclinations
+from truearm.measurement.readers.mapping import MappingFile
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.readers.performance_poses import read_attained_poses, read_pushes
 from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
@@ -141,6 +144,15 @@ def _finite(position: np.ndarray) -> None:
     assert np.isfinite(position).all(), "a position is not finite"
 
 
+def _guess(path: Path) -> None:
+    """Check that a guess is a mapping that nobody has confirmed, or asks."""
+    made = guess_mapping(path)
+    read = YAML(typ="safe", pure=True).load(made.text)
+    assert read["confirmed"] == "no", "a guess is confirmed"
+    if not made.open:
+        MappingFile.model_validate(read)
+
+
 def _performance_plan(folder: Path) -> None:
     """Check that a plan is the same when it is written and read again."""
     read = read_plan(folder / "performance.yaml")
@@ -159,6 +171,13 @@ READERS: Final[Mapping[str, Reader]] = {
     "axis-runs": _data_file("axes.csv"),
     "table": _table("table.csv", "mapping.yaml"),
     "spatial": _table("points.csv", "spatial.yaml", joints="joints"),
+    "whole-table": _table("whole.csv", "whole.yaml", driven="driven"),
+    "workbook": Reader(
+        {"points.xlsx": "points.xlsx", "map.yaml": "workbook.yaml"},
+        lambda folder: _dataset(read_table(folder / "points.xlsx", folder / "map.yaml"), folder),
+    ),
+    "guess": Reader({"table.csv": "whole.csv"}, lambda folder: _guess(folder / "table.csv")),
+    "guess-workbook": Reader({"points.xlsx": "points.xlsx"}, lambda folder: _guess(folder / "points.xlsx")),
     "matrices": Reader({"joints.txt": "joints.txt", "points.txt": "points.txt"}, _matrices),
     "inclinations": Reader({"inclinations.csv": "inclinations.csv"}, _inclinations),
     "robodk": Reader(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import tempfile
+from datetime import datetime
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -82,6 +83,61 @@ truearm: truearm-fleet/1
 units: {length: mm}
 experiment: {robot: irb120, count: 30, configurations: 20, targets: 1, noise: 0.05, seed: 1}
 """
+#: A table in which everything stands that a mapping can name, the mapping, and the joints of the second file.
+WHOLE_TABLE = """\
+// remark
+Point;X;Y;Z;Rx;Ry;Rz;Ux;Uy;Uz;U rot;T;When
+P001;841,2;112,8;655,1;10,5;20;-30;0,02;0,03;0,02;0,1;20,5;2026-11-23 10:00:00
+P002;n/a;n/a;n/a;-;-;-;;;;;20,6;2026-11-23 10:01:00
+P003;702,5;-640,2;790,6;5;15;25;0,02;0,03;0,02;0,1;20,7;2026-11-23 10:02:00
+"""
+WHOLE_MAPPING = """\
+truearm: truearm-mapping/1
+confirmed: yes
+layout: {delimiter: semicolon, decimal: comma, header: 2, comment: //}
+missing: [n/a, '-']
+configuration: {column: Point}
+length_unit: mm
+readings:
+  - target: ball
+    x: X
+    y: Y
+    z: Z
+    angles: {columns: [Rx, Ry, Rz], about: xyz, axes: fixed, unit: deg}
+    sigma: {columns: [Ux, Uy, Uz], unit: mm, coverage: 2}
+    sigma_rot: {columns: [U rot], unit: mrad}
+temperature: {column: T, unit: degC}
+order: {column: When, time: iso}
+joints: {file: driven.csv}
+"""
+DRIVEN = """\
+configuration,axis_1 [deg],axis_2 [deg]
+P001,10,-20
+P002,-35,12
+P003,5,7
+"""
+WORKBOOK_MAPPING = """\
+truearm: truearm-mapping/1
+layout: {sheet: Points, header: 2}
+configuration: {column: Pose}
+length_unit: mm
+readings: [{target: ball, x: X, y: Y, z: Z, rotation_vector: {columns: [rx, ry, rz], unit: rad}}]
+order: {by: labels}
+joints: {columns: [J1, J2], unit: deg}
+"""
+
+
+def _workbook(path: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    sheet = book.create_sheet("Points")
+    sheet.append(["Campaign"])
+    sheet.merge_cells("A1:F1")
+    sheet.append(["Pose", "J1", "J2", "X", "Y", "Z", "rx", "ry", "rz", "Time"])
+    sheet.append(["P1", 10, 20.5, 841.2, 112.5, 655.1, 0.1, 0.2, 0.3, datetime(2026, 11, 23, 10, 0)])
+    sheet.append(["P2", 11, 21.5, 741.2, 12.5, 655.1, 0.1, 0.2, -0.3, datetime(2026, 11, 23, 10, 1)])
+    book.save(path)
 
 
 @cache
@@ -132,7 +188,12 @@ def folder() -> Path:
         "cube.yaml": CUBE,
         "sheet.csv": _sheet(),
         "touches.csv": _touches(),
+        "whole.csv": WHOLE_TABLE,
+        "whole.yaml": WHOLE_MAPPING,
+        "driven.csv": DRIVEN,
+        "workbook.yaml": WORKBOOK_MAPPING,
     }
+    _workbook(place / "points.xlsx")
     texts["again.csv"] = (place / "data.csv").read_text() + "\n"  # the same readings twice are refused
     for name, text in (texts | _performance()).items():
         (place / name).write_text(text)

@@ -126,6 +126,7 @@ def test_the_order_is_told_by_labels_rows_numbers_and_times(tmp_path: Path) -> N
     assert numbers(tmp_path, rows.format(0, 0, 0), "{by: rows}") == [0, 1, 2]
     assert numbers(tmp_path, rows.format(3, 9, 5), "{column: when}") == [2, 8, 4]
     assert numbers(tmp_path, rows.format("0.5", "1.7e9", "2"), "{column: when}") == [0, 2, 1]
+    assert numbers(tmp_path, rows.format(3, 9, 5), "{column: when, time: null}") == [2, 8, 4]
     days = rows.format("2026-11-23 10:00", "2026-11-22 23:59", "2026-11-23 10:01")
     assert numbers(tmp_path, days, "{column: when, time: iso}") == [1, 0, 2]
     ours = rows.format("23.11.2026 10:00:01", "22.11.2026 23:59:00", "23.11.2026 10:00:09")

@@ -189,8 +189,8 @@ class OrderEntry(Entry):
 
     @validator_of("time")
     @classmethod
-    def _format(cls, time: str) -> str:
-        if time != "iso" and not _is_format(time):
+    def _format(cls, time: str | None) -> str | None:
+        if time is not None and time != "iso" and not _is_format(time):
             raise InputError(
                 "this is no format of times",
                 came=time,

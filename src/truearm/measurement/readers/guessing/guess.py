@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -119,7 +118,7 @@ def guess_mapping(path: Path) -> Guessed:
     columns = columns_of(layout)
     text = _Text()
     text.lines += [
-        f"# Guessed from {json.dumps(path.name, ensure_ascii=False)[1:-1]}.",
+        f"# Guessed from {_escaped(path.name)}.",
         f"# Look at every line with a guess: correct it, answer each {OPEN}, and then write confirmed: yes.",
         "truearm: truearm-mapping/1",
         "confirmed: no",
@@ -149,7 +148,7 @@ def guess_mapping(path: Path) -> Guessed:
     text.lines += [f"# Note: {note}." for note in layout.notes]
     unused = [column.name for column in left.columns if column.name]
     if unused:
-        shown = ", ".join(json.dumps(name, ensure_ascii=False)[1:-1] for name in unused[:20])
+        shown = ", ".join(_escaped(name) for name in unused[:20])
         text.lines.append(f"# Not used: {shown}")
     made = Guessed("\n".join(text.lines) + "\n", tuple(text.guesses))
     return made if made.open or not joints else _tried(made, path)
@@ -170,7 +169,13 @@ class _Left:
 def _plain(text: str) -> str:
     """Return a text as YAML takes it."""
     is_plain = _PLAIN.fullmatch(text) is not None and text.lower() not in _NOT_PLAIN
-    return text if is_plain else json.dumps(text, ensure_ascii=False)
+    return text if is_plain else f'"{_escaped(text)}"'
+
+
+def _escaped(text: str) -> str:
+    """Return a text as it stands between double quotes in YAML."""
+    known = {'"': '\\"', "\\": "\\\\"}
+    return "".join(known.get(c, c if c.isprintable() else f"\\U{ord(c):08x}") for c in text)
 
 
 def _list(columns: Sequence[Column]) -> str:
@@ -200,7 +205,7 @@ def _by_place(
 def _write_missing(text: _Text, columns: Sequence[Column]) -> None:
     texts = list(dict.fromkeys(odd for column in columns for odd in column.nothing))
     if texts:
-        shown = f"[{', '.join(json.dumps(odd, ensure_ascii=False) for odd in texts)}]"
+        shown = f"[{', '.join(_plain(odd) for odd in texts)}]"
         text.add("missing", shown, "these texts stand among numbers")
 
 

@@ -12,6 +12,7 @@ from truearm.files import read_text
 from truearm.measurement.readers.canonical import refuse_other_separators
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.rows import Configurations, found_configurations
+from truearm.measurement.readers.sheets import is_workbook, read_sheet
 from truearm.modeling.formats.joint_columns import JOINT_COLUMN, joint_names
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
@@ -120,7 +121,7 @@ def joints_in_file(path: Path) -> tuple[Cells, Configurations]:
     These are ``configuration`` and ``joint_1 [deg]`` .. or ``axis_1 [deg]`` ..: a canonical CSV, a plan, or what the
     controller wrote.
     """
-    cells = read_named(path)
+    cells = read_sheet(path, None, Layout(), str(path)) if is_workbook(path) else read_named(path)
     where = f"{cells.source}, line {cells.header}"
     columns: Columns = {}
     for place, heading in enumerate(cells.names):

@@ -153,10 +153,10 @@ def _times(cells: Cells, place: int, entry: OrderEntry) -> Array:
                 allowed="2026-11-23 14:05:09" if entry.time == "iso" else str(entry.time),
                 cure="Correct order.time in the mapping: iso, or signs of Python such as %d.%m.%Y %H:%M:%S.",
             ) from None
-    zoned = [row for row, text in enumerate(texts) if (moment := known[text]) is not None and moment.tzinfo is not None]
     given = [row for row, text in enumerate(texts) if known[text] is not None]
-    if zoned and len(zoned) < len(given):
-        row = next(row for row in given if row not in set(zoned))
+    bare = [row for row in given if (moment := known[texts[row]]) is not None and moment.tzinfo is None]
+    if bare and len(bare) < len(given):
+        row = bare[0]
         raise InputError(
             "this time has no time zone, and others have one", where=cells.place(row, place), came=texts[row]
         )

@@ -137,16 +137,16 @@ def temperatures(
             allowed=f"{low / factor + offset:g} to {high / factor + offset:g} {entry.unit}",
             cure="Correct the number, or its unit (temperature.unit in the mapping).",
         )
-    means = np.empty(len(configurations.labels))
-    for index, label in enumerate(configurations.labels):
-        rows = np.flatnonzero(of_row == index)
-        known = values[rows][np.isfinite(values[rows])]
-        if not len(known):
-            raise InputError(
-                f"the configuration {label!r} has no temperature, and others have one",
-                where=cells.place(int(rows[0]), place) if len(rows) else f"{mapping}, temperature.column",
-                allowed="a temperature for each configuration, or none at all",
-                cure="Fill the cell, or leave temperature out of the mapping.",
-            )
-        means[index] = known.mean()
-    return means
+    count = len(configurations.labels)
+    known = np.isfinite(values)
+    rows = np.bincount(of_row[known], minlength=count)
+    without = np.flatnonzero(rows == 0)
+    if len(without):
+        own = np.flatnonzero(of_row == without[0])
+        raise InputError(
+            f"the configuration {configurations.labels[without[0]]!r} has no temperature, and others have one",
+            where=cells.place(int(own[0]), place) if len(own) else f"{mapping}, temperature.column",
+            allowed="a temperature for each configuration, or none at all",
+            cure="Fill the cell, or leave temperature out of the mapping.",
+        )
+    return np.asarray(np.bincount(of_row[known], values[known], count) / rows)

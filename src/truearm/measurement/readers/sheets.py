@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 import zipfile
+from dataclasses import dataclass
 from datetime import date, datetime, time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -41,12 +42,39 @@ def is_workbook(path: Path) -> bool:
     return ending in WORKBOOKS
 
 
-def sheet_names(path: Path) -> list[str]:
-    """Return the names of the sheets of a workbook that hold cells."""
-    return [sheet.title for sheet in _opened(path, formulas=False).worksheets]
+@dataclass(frozen=True)
+class Workbook:
+    """A workbook, once with the values of its formulas and once with the formulas.
+
+    Attributes
+    ----------
+    path
+        The file.
+    values, formulas
+        What openpyxl made of it.
+    """
+
+    path: Path
+    values: Any
+    formulas: Any
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of the sheets that hold cells."""
+        return [sheet.title for sheet in self.values.worksheets]
+
+
+def open_workbook(path: Path) -> Workbook:
+    """Open a workbook, or refuse a file that is none."""
+    return Workbook(path, _opened(path, formulas=False), _opened(path, formulas=True))
 
 
 def read_sheet(path: Path, name: str | None, layout: Layout, entry: str) -> Cells:
+    """Return the cells of a sheet of a workbook, see :func:`sheet_cells`."""
+    return sheet_cells(open_workbook(path), name, layout, entry)
+
+
+def sheet_cells(book: Workbook, name: str | None, layout: Layout, entry: str) -> Cells:
     """Return the cells of a sheet as texts: numbers with a decimal point, times as ISO 8601.
 
     Rows without any content are skipped, and so are columns behind the last one with a name.
@@ -65,15 +93,14 @@ def read_sheet(path: Path, name: str | None, layout: Layout, entry: str) -> Cell
     InputError
         If it is no workbook, has no such sheet, a formula has no value, or cells of the table are merged.
     """
-    book = _opened(path, formulas=False)
-    sheet = _chosen(book, path, name, entry)
-    source = f"{path}, sheet {sheet.title}"
+    sheet = _chosen(book, name, entry)
+    source = f"{book.path}, sheet {sheet.title}"
     first = layout.first_row or (layout.header or 0) + 1
     read = (layout.header, first)
     refuse_beyond("rows", sheet.max_row, where=source)
     refuse_beyond("cells", sheet.max_row * sheet.max_column, where=source)
     _refuse_merged(sheet, source, read)
-    _refuse_formulas(_opened(path, formulas=True)[sheet.title], sheet, source, read)
+    _refuse_formulas(book.formulas[sheet.title], sheet, source, read)
     rows: list[tuple[int, list[str]]] = []
     names: list[str] | None = None
     for number, values in enumerate(sheet.iter_rows(values_only=True), 1):
@@ -140,13 +167,13 @@ def _opened(path: Path, *, formulas: bool) -> Any:
         ) from error
 
 
-def _chosen(book: Any, path: Path, name: str | None, entry: str) -> Worksheet:
-    sheets = {sheet.title: sheet for sheet in book.worksheets}
+def _chosen(book: Workbook, name: str | None, entry: str) -> Worksheet:
+    sheets = {sheet.title: sheet for sheet in book.values.worksheets}
     if name is None and len(sheets) == 1:
         return next(iter(sheets.values()))
     if name is None or name not in sheets:
         raise InputError(
-            f"{path} has {'several sheets' if name is None and sheets else 'no such sheet'}",
+            f"{book.path} has {'several sheets' if name is None and sheets else 'no such sheet'}",
             where=entry,
             came=name,
             allowed=", ".join(sheets) or None,

@@ -44,7 +44,7 @@ class TableFiles:
     table
         The table itself.
     mapping
-        Its mapping file.
+        Its mapping file, or the name of a preset.
     content
         What the mapping says.
     joints
@@ -58,8 +58,9 @@ class TableFiles:
 
     @property
     def read(self) -> tuple[Path, ...]:
-        """Return all files that are read."""
-        return (self.table, self.mapping) if self.joints is None else (self.table, self.mapping, self.joints)
+        """Return all files of a person's that are read."""
+        mapping = () if is_preset(self.mapping) else (self.mapping,)
+        return (self.table, *mapping, *(() if self.joints is None else (self.joints,)))
 
 
 def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
@@ -93,7 +94,7 @@ def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
         )
     beside = table if is_preset(mapping) else path
     found = joints if joints is not None or named is None else beside.parent / named
-    return TableFiles(table, path, content, found)
+    return TableFiles(table, Path(mapping), content, found)
 
 
 def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None) -> Dataset:

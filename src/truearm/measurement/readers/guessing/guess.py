@@ -27,6 +27,7 @@ from truearm.measurement.readers.guessing.meanings import (
 )
 from truearm.measurement.readers.mapping import MappingFile
 from truearm.measurement.readers.table import TableFiles, read_with
+from truearm.modeling.formats.joint_columns import JOINT_COLUMN
 from truearm.schemas import validated
 
 #: Where nothing in the file tells an answer.
@@ -116,6 +117,7 @@ def guess_mapping(path: Path) -> Guessed:
     """
     layout = guess_layout(path)
     columns = columns_of(layout)
+    _refuse_canonical(path, layout)
     text = _Text()
     text.lines += [
         f"# Guessed from {_escaped(path.name)}.",
@@ -146,12 +148,25 @@ def guess_mapping(path: Path) -> Guessed:
     _write_labels(text, left, joints, positions, quaternion, sure)
     _write_joints(text, joints)
     text.lines += [f"# Note: {note}." for note in layout.notes]
+    if layout.header and any({"tcp", "x"} <= set(column.words) for column in left.columns):
+        text.lines.append("# Note: tables of RoboDK with tool points come in by truearm import robodk.")
     unused = [column.name for column in left.columns if column.name]
     if unused:
         shown = ", ".join(_escaped(name) for name in unused[:20])
         text.lines.append(f"# Not used: {shown}")
     made = Guessed("\n".join(text.lines) + "\n", tuple(text.guesses))
     return made if made.open or not joints else _tried(made, path)
+
+
+def _refuse_canonical(path: Path, layout: GuessedLayout) -> None:
+    """Refuse a table that is what an import would write."""
+    names = [name.partition(" [")[0] for name in layout.names]
+    if {"configuration", "target"} <= set(names) and any(JOINT_COLUMN.fullmatch(name) for name in names):
+        raise InputError(
+            "the columns are those of the canonical CSV, which needs no import",
+            where=str(path),
+            cure="Use it as it is: truearm check says what is left to mend.",
+        )
 
 
 class _Left:
@@ -238,7 +253,12 @@ def _write_labels(
             f"names: {{column: {_plain(label.name)}, pattern: '{pattern}'}}",
         )
     elif label is not None:
-        text.add("configuration", "", "its name or its texts", f"configuration: {{column: {_plain(label.name)}}}")
+        because = "its name or its texts"
+        if label.is_numeric:
+            because += "; whole numbers tell the order of measurement"
+        if target is None and not several and label.distinct < len(label.texts):
+            because += "; rows with the same label count as repeated readings of one target"
+        text.add("configuration", "", because, f"configuration: {{column: {_plain(label.name)}}}")
     else:
         text.add(
             "configuration",

@@ -14,11 +14,13 @@ from truearm.errors import InputError
 from truearm.files import read_bytes
 from truearm.limits import refuse_beyond
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, split_line
-from truearm.measurement.readers.sheets import is_workbook, read_sheet, sheet_names
+from truearm.measurement.readers.sheets import Workbook, is_workbook, open_workbook, sheet_cells
 from truearm.units import as_number
 
 #: Lines that are looked at.
 _LOOKED_AT: Final = 400
+#: Characters of them.
+_CHARACTERS: Final = 400_000
 #: Lines of titles that may stand above the headings of a sheet.
 _TITLES: Final = 8
 _DELIMITERS: Final = {"semicolon": ";", "tab": "\t", "comma": ",", "whitespace": None}
@@ -88,7 +90,7 @@ def guess_layout(path: Path) -> GuessedLayout:
         return _of_workbook(path)
     text, encoding = _decoded(path)
     refuse_beyond("rows", text.count("\n"), where=str(path))
-    lines = [(n, line.rstrip("\r\n")) for n, line in enumerate(islice(lines_of(text), _LOOKED_AT), 1) if line.strip()]
+    lines = _first_lines(text)
     comment = _comment(lines)
     best = max(
         (
@@ -114,6 +116,19 @@ def guess_layout(path: Path) -> GuessedLayout:
     if comment is not None:
         entries["comment"] = (comment, "lines begin with it")
     return _with_header(best, entries, path)
+
+
+def _first_lines(text: str) -> list[tuple[int, str]]:
+    """Return the first lines that are not blank, as many as are looked at, with their numbers."""
+    found: list[tuple[int, str]] = []
+    left = _CHARACTERS
+    for number, line in enumerate(islice(lines_of(text), _LOOKED_AT), 1):
+        left -= len(line)
+        if left < 0 and found:
+            break
+        if line.strip():
+            found.append((number, line.rstrip("\r\n")[:_CHARACTERS]))
+    return found
 
 
 def _decoded(path: Path) -> tuple[str, str]:
@@ -220,9 +235,9 @@ def _is_units(cells: Sequence[str]) -> bool:
 def _of_workbook(path: Path) -> GuessedLayout:
     """Return the layout of the sheet that has the most numbers."""
     best: tuple[_Split, str] | None = None
-    names = sheet_names(path)
-    for name in names:
-        cells = _cells_below_titles(path, name)
+    book = open_workbook(path)
+    for name in book.names:
+        cells = _cells_below_titles(book, name)
         if cells is None:
             continue
         rows: Rows = [
@@ -232,21 +247,22 @@ def _of_workbook(path: Path) -> GuessedLayout:
         if best is None or split.numbers > best[0].numbers:
             best = split, name
     if best is None or best[0].numbers == 0:
-        read_sheet(path, names[0], Layout(header=None), str(path))
+        if book.names:
+            sheet_cells(book, book.names[0], Layout(header=None), str(path))
         raise InputError(
             "no sheet looks like a table of numbers", where=str(path), allowed="a sheet with names above columns"
         )
     entries: dict[str, tuple[str | int, str]] = {}
-    if len(names) > 1:
-        entries["sheet"] = (best[1], f"it has the most numbers of {len(names)} sheets")
+    if len(book.names) > 1:
+        entries["sheet"] = (best[1], f"it has the most numbers of {len(book.names)} sheets")
     return _with_header(best[0], entries, path)
 
 
-def _cells_below_titles(path: Path, name: str) -> Cells | None:
+def _cells_below_titles(book: Workbook, name: str) -> Cells | None:
     """Return the cells of a sheet, those below titles whose cells are merged; None if it cannot be read."""
     for first in range(1, _TITLES + 1):
         try:
-            return read_sheet(path, name, Layout(header=None, first_row=first), str(path))
+            return sheet_cells(book, name, Layout(header=None, first_row=first), str(book.path))
         except InputError:
             continue
     return None

@@ -110,7 +110,7 @@ def test_joints_may_stand_in_a_workbook_too(tmp_path: Path) -> None:
         (lambda sheet: sheet.delete_rows(3, 5), "sheet Cell 4: the sheet holds no rows"),
         (lambda sheet: sheet.delete_cols(1, 9), "sheet Cell 4, line 2: the line that should"),
         (lambda sheet: sheet.insert_rows(3), "P2"),
-        (put("AAA99999", 1), "sheet Cell 4: the table has too many cells"),
+        (put("AAA99999", 1), "'Cell 4'!AAA99999: this cell has no name in the header; got '1'"),
     ],
 )
 def test_refusals_name_the_cell(tmp_path: Path, change: Callable[[Any], None], part: str) -> None:

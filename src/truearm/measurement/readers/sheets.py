@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import date, datetime, time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from truearm.errors import InputError, did_you_mean
 from truearm.files import read_bytes
 from truearm.limits import refuse_beyond
 from truearm.measurement.readers.cells import Cells, Layout, sheet_place
-
-if TYPE_CHECKING:
-    from openpyxl.worksheet.worksheet import Worksheet
 
 #: Endings of workbooks that are read.
 WORKBOOKS: Final = (".xlsx", ".xlsm")
@@ -24,8 +24,10 @@ WORKBOOKS: Final = (".xlsx", ".xlsm")
 OTHER_WORKBOOKS: Final = (".xls", ".xlsb", ".ods", ".numbers")
 
 
-#: What a cell without a formula holds, besides texts.
-_VALUES: Final = (int, float, datetime, date, time)
+_ROW: Final = re.compile(rb"<(?:\w+:)?row\b[^>]*?\sr=\"([0-9]{1,9})\"")
+_CELL: Final = re.compile(rb"<(?:\w+:)?c\b[^>]*?\sr=\"([A-Z]{1,3})([0-9]{1,9})\"")
+_MERGED: Final = re.compile(rb"<(?:\w+:)?mergeCell\b[^>]*?\sref=\"([A-Z0-9:]+)\"")
+_CORNER: Final = re.compile("([A-Z]{1,3})([0-9]{1,9})")
 
 
 def is_workbook(path: Path) -> bool:
@@ -51,7 +53,7 @@ class Workbook:
     path
         The file.
     values, formulas
-        What openpyxl made of it.
+        What openpyxl made of it; both read their sheets when they are asked for.
     """
 
     path: Path
@@ -66,7 +68,38 @@ class Workbook:
 
 def open_workbook(path: Path) -> Workbook:
     """Open a workbook, or refuse a file that is none."""
-    return Workbook(path, _opened(path, formulas=False), _opened(path, formulas=True))
+    try:
+        import openpyxl
+    except ImportError as error:
+        raise InputError(
+            "workbooks are read by openpyxl, and it is not installed",
+            where=str(path),
+            cure='Install it with truearm: pip install "truearm[excel]". A sheet that is saved as CSV needs nothing.',
+        ) from error
+    content = read_bytes(path)
+    with _readable(path):
+        with zipfile.ZipFile(io.BytesIO(content)) as parts:
+            refuse_beyond("sheet_size", sum(part.file_size for part in parts.infolist()), where=str(path))
+        values, formulas = (
+            openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=data_only)
+            for data_only in (True, False)
+        )
+    return Workbook(path, values, formulas)
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Refuse what openpyxl cannot read, whatever it is that it stumbles upon."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of styles and validations that it leaves out
+            yield
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged part of the file leads to
+        raise InputError(
+            "this is no Excel workbook that can be read", where=str(path), cure="Save it again as .xlsx, or as CSV."
+        ) from error
 
 
 def read_sheet(path: Path, name: str | None, layout: Layout, entry: str) -> Cells:
@@ -93,45 +126,35 @@ def sheet_cells(book: Workbook, name: str | None, layout: Layout, entry: str) ->
     InputError
         If it is no workbook, has no such sheet, a formula has no value, or cells of the table are merged.
     """
-    sheet = _chosen(book, name, entry)
-    source = f"{book.path}, sheet {sheet.title}"
-    first = layout.first_row or (layout.header or 0) + 1
-    read = (layout.header, first)
-    refuse_beyond("rows", sheet.max_row, where=source)
-    refuse_beyond("cells", sheet.max_row * sheet.max_column, where=source)
-    _refuse_merged(sheet, source, read)
-    _refuse_formulas(book.formulas[sheet.title], sheet, source, read)
-    rows: list[tuple[int, list[str]]] = []
+    title = _chosen(book, name, entry)
+    with _readable(book.path):
+        rows = list(_rows(book, title, layout))
+    source = f"{book.path}, sheet {title}"
     names: list[str] | None = None
-    for number, values in enumerate(sheet.iter_rows(values_only=True), 1):
-        if number != layout.header and number < first:
-            continue
-        texts = [_text(value) for value in values]
-        if number == layout.header:
-            names = _without_end(texts)
-            refuse_beyond("columns", len(names), where=f"{source}, line {number}")
-        elif any(texts):
-            rows.append((number, texts))
-    if layout.header is not None and not names:
-        raise InputError(
-            "the line that should hold the header is empty",
-            where=f"{source}, line {layout.header}",
-            cure="Check the number of the header line.",
-        )
+    if layout.header is not None:
+        names = _without_end(rows.pop(0)[1]) if rows and rows[0][0] == layout.header else []
+        refuse_beyond("columns", len(names), where=f"{source}, line {layout.header}")
+        if not names:
+            raise InputError(
+                "the line that should hold the header is empty",
+                where=f"{source}, line {layout.header}",
+                cure="Check the number of the header line.",
+            )
     if not rows:
         raise InputError("the sheet holds no rows", where=source, cure="Check the sheet, and the line of its header.")
     if names is None:
-        names = [str(number) for number in range(1, max(len(_without_end(texts)) for _, texts in rows) + 1)]
+        names = [str(number) for number in range(1, max(len(texts) for _, texts in rows) + 1)]
     width = len(names)
     for number, texts in rows:
         beyond = next((column for column, text in enumerate(texts) if text and column >= width), None)
         if beyond is not None:
             raise InputError(
                 "this cell has no name in the header",
-                where=sheet_place(source, sheet.title, number, beyond),
+                where=sheet_place(source, title, number, beyond),
                 came=texts[beyond],
                 cure="Check the line of the header, or remove the cell.",
             )
+    refuse_beyond("cells", width * len(rows), where=source)
     padded = [(texts + [""] * width)[:width] for _, texts in rows]
     return Cells(
         source=source,
@@ -139,82 +162,102 @@ def sheet_cells(book: Workbook, name: str | None, layout: Layout, entry: str) ->
         names=tuple(names),
         lines=tuple(number for number, _ in rows),
         columns=tuple(zip(*padded, strict=True)),
-        sheet=sheet.title,
+        sheet=title,
     )
 
 
-def _opened(path: Path, *, formulas: bool) -> Any:
-    try:
-        import openpyxl
-    except ImportError as error:
+def _chosen(book: Workbook, name: str | None, entry: str) -> str:
+    names = book.names
+    if name is None and len(names) == 1:
+        return names[0]
+    if name is None or name not in names:
         raise InputError(
-            "workbooks are read by openpyxl, and it is not installed",
-            where=str(path),
-            cure='Install it with truearm: pip install "truearm[excel]". A sheet that is saved as CSV needs nothing.',
-        ) from error
-    content = read_bytes(path)
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as parts:
-            refuse_beyond("sheet_size", sum(part.file_size for part in parts.infolist()), where=str(path))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of styles and validations that it leaves out
-            return openpyxl.load_workbook(io.BytesIO(content), data_only=not formulas)
-    except InputError:
-        raise
-    except Exception as error:  # whatever a damaged part of the file leads to
-        raise InputError(
-            "this is no Excel workbook that can be read", where=str(path), cure="Save it again as .xlsx, or as CSV."
-        ) from error
-
-
-def _chosen(book: Workbook, name: str | None, entry: str) -> Worksheet:
-    sheets = {sheet.title: sheet for sheet in book.values.worksheets}
-    if name is None and len(sheets) == 1:
-        return next(iter(sheets.values()))
-    if name is None or name not in sheets:
-        raise InputError(
-            f"{book.path} has {'several sheets' if name is None and sheets else 'no such sheet'}",
+            f"{book.path} has {'several sheets' if name is None and names else 'no such sheet'}",
             where=entry,
             came=name,
-            allowed=", ".join(sheets) or None,
-            cure=(did_you_mean(name, sheets) if name else None) or "Name the sheet under layout.sheet in the mapping.",
+            allowed=", ".join(names) or None,
+            cure=(did_you_mean(name, names) if name else None) or "Name the sheet under layout.sheet in the mapping.",
         )
-    return sheets[name]
+    return name
 
 
-def _refuse_merged(sheet: Worksheet, source: str, read: tuple[int | None, int]) -> None:
-    """Refuse cells that are merged, in the header or below: which column or row they belong to is not said."""
-    header, first = read
-    for merged in sheet.merged_cells.ranges:
-        if merged.max_row >= first or (header is not None and merged.min_row <= header <= merged.max_row):
-            place = sheet_place(source, sheet.title, merged.min_row, merged.min_col - 1)
-            raise InputError(
-                "these cells are merged",
-                where=place,
-                came=str(merged.coord),
-                allowed="one line of headings, and one cell for each value",
-                cure="Split the cells, and write each value into its own; or name another header line.",
-            )
-
-
-def _refuse_formulas(formulas: Worksheet, values: Worksheet, source: str, read: tuple[int | None, int]) -> None:
-    """Refuse a formula whose value the file does not hold: the program that wrote it has not computed it."""
-    header, first = read
-    for number, row in enumerate(formulas.iter_rows(values_only=True), 1):
-        if number < first and number != header:
+def _rows(book: Workbook, title: str, layout: Layout) -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows of a sheet that hold anything, the header first, with their numbers; no text ends with nothing."""
+    source = f"{book.path}, sheet {title}"
+    first = layout.first_row or (layout.header or 0) + 1
+    values, formulas = book.values[title], book.formulas[title]
+    _refuse_merged(_checked(values, source), source, title, layout.header, first)
+    for sheet in (values, formulas):
+        sheet.reset_dimensions()  # programs write wrong ones
+    seen = 0
+    pairs = zip(values.iter_rows(values_only=True), formulas.iter_rows(), strict=True)
+    for number, (row, cells) in enumerate(pairs, 1):
+        seen += len(row)
+        refuse_beyond("cells", seen, where=f"{source}, line {number}")
+        if number < first and number != layout.header:
             continue
-        for column, value in enumerate(row, 1):
-            if value is None or isinstance(value, _VALUES) or (isinstance(value, str) and not value.startswith("=")):
-                continue
-            has_formula = formulas.cell(number, column).data_type == "f"
-            if has_formula and values.cell(number, column).value is None:
+        for column, (value, cell) in enumerate(zip(row, cells, strict=True)):
+            if value is None and cell.data_type == "f":
                 raise InputError(
                     "the formula has no value in the file",
-                    where=sheet_place(source, values.title, number, column - 1),
-                    came=value[:80] if isinstance(value, str) else None,
+                    where=sheet_place(source, title, number, column),
+                    came=cell.value[:80] if isinstance(cell.value, str) else None,
                     allowed="a value, or a formula that was computed before the file was saved",
                     cure="Open the workbook in Excel or LibreOffice and save it, or paste the values.",
                 )
+        texts = _without_end([_text(value) for value in row])
+        if texts:
+            yield number, texts
+
+
+def _checked(sheet: Any, source: str) -> list[tuple[str, int, int, int]]:
+    """Return the merged ranges of a sheet, each with its first row, last row and first column.
+
+    Refused are rows and cells in another order than that of the sheet, of which openpyxl would leave out some.
+    """
+    with sheet._get_source() as part:  # neither merged cells nor the order are told otherwise without loading it whole
+        xml = part.read()
+    row = 0
+    for found in _ROW.finditer(xml):
+        refuse_beyond("rows", int(found[1]), where=source)
+        if int(found[1]) <= row:
+            raise ValueError("rows are not in order")
+        row = int(found[1])
+    at = (0, 0)
+    for found in _CELL.finditer(xml):
+        here = (int(found[2]), _column(found[1].decode()))
+        if here <= at:
+            raise ValueError("cells are not in order")
+        at = here
+    merged = []
+    for found in _MERGED.finditer(xml):
+        corners = [_CORNER.fullmatch(corner) for corner in found[1].decode().split(":")]
+        if len(corners) == 2 and corners[0] and corners[1]:
+            rows = sorted(int(corner[2]) for corner in corners if corner)
+            merged.append((found[1].decode(), rows[0], rows[1], _column(corners[0][1])))
+    return merged
+
+
+def _column(letters: str) -> int:
+    number = 0
+    for letter in letters:
+        number = 26 * number + ord(letter) - ord("A") + 1
+    return number
+
+
+def _refuse_merged(
+    merged: list[tuple[str, int, int, int]], source: str, title: str, header: int | None, first: int
+) -> None:
+    """Refuse cells that are merged, in the header or below: which column or row they belong to is not said."""
+    for shown, top, bottom, left in merged:
+        if bottom >= first or (header is not None and top <= header <= bottom):
+            raise InputError(
+                "these cells are merged",
+                where=sheet_place(source, title, top, left - 1),
+                came=shown,
+                allowed="one line of headings, and one cell for each value",
+                cure="Split the cells, and write each value into its own; or name another header line.",
+            )
 
 
 def _text(value: object) -> str:

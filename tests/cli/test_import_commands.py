@@ -9,6 +9,8 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.jobs.examples import EXAMPLES
 
+from truearm.measurement.readers.presets import PRESETS
+
 
 def test_sockets(truearm: Truearm, tmp_path: Path) -> None:
     file, out = EXAMPLES["import_sockets"](tmp_path)["file"], tmp_path / "data.csv"
@@ -55,3 +57,39 @@ def test_hand_eye_that_cannot_be(truearm: Truearm, tmp_path: Path) -> None:
     assert (named.code, "--board: a board is named" in named.err) == (2, True)
     scale = truearm("import", "hand-eye", file, "--on-flange", "camera", "--scale-sigma", "0", "--out", out)
     assert (scale.code, "--scale-sigma: the standard deviation of a scale" in scale.err) == (2, True)
+
+
+def test_a_guess_is_confirmed_and_imported(truearm: Truearm, tmp_path: Path) -> None:
+    file, mapping, out = tmp_path / "cell.csv", tmp_path / "cell.yaml", tmp_path / "data.csv"
+    file.write_text("Pose;J1;J2;X;Y;Z\nP001;10,5;20;800,5;2;3\nP002;11;21;n/a;n/a;n/a\n")
+    made = truearm("import", "guess", file, "--out", mapping)
+    assert (made.code, made.out.splitlines()[1]) == (
+        0,
+        "An import with it would read 2 configurations, targets tip.",
+    )
+    assert json.loads(truearm("import", "guess", file, "--out", tmp_path / "b.yaml", "--json").out)["open"] == []
+    refused = truearm("import", "table", file, "--map", mapping, "--out", out)
+    assert (refused.code, "cell.yaml, confirmed: " in refused.err) == (2, True)
+    assert "nobody has confirmed it" in refused.err
+    assert not out.exists()
+    mapping.write_text(mapping.read_text().replace("confirmed: no", "confirmed: yes"))
+    assert truearm("import", "table", file, "--map", mapping, "--out", out).code == 0
+    assert out.read_text().splitlines()[1] == "P001,1,10.5,20.0,tip,800.5,2.0,3.0"
+    again = truearm("import", "guess", file, "--out", mapping)
+    assert (again.code, "exists already and is not overwritten" in again.err) == (2, True)
+
+
+def test_presets_and_another_file_of_joints(truearm: Truearm, tmp_path: Path) -> None:
+    points, joints, out = tmp_path / "points.txt", tmp_path / "driven.csv", tmp_path / "data.csv"
+    points.write_text("A, P1, ball, 1, 2, 3, 0.1, 0.1, 0.1, 01/31/2026 10:00:00\n")
+    joints.write_text("configuration,joint_1 [deg]\nP1,10\n")
+    words = ("import", "table", points, "--map", "spatial-analyzer", "--out", out)
+    made = truearm(*words, "--joints", joints)
+    assert (made.code, made.out) == (0, f"1 configuration, targets ball: {out}\n")
+    missing = truearm(*words)
+    assert (missing.code, "joints.csv: there is no such file" in missing.err) == (2, True)
+    typo = truearm("import", "table", points, "--map", "spatial-analyser", "--out", out)
+    assert (typo.code, "--map: there is no such file, and no such preset" in typo.err) == (2, True)
+    assert "Did you mean spatial-analyzer?" in typo.err
+    shown = " ".join(truearm("import", "table", "--help").out.split())
+    assert all(preset in shown for preset in PRESETS)

@@ -177,3 +177,41 @@ def test_columns_have_letters() -> None:
 def test_numbers_are_those_that_excel_holds(tmp_path: Path) -> None:
     data = read(tmp_path, put("D3", 0.1 + 0.2))
     assert math.isclose(data.position[0, 0], 0.30000000000000004e-3, rel_tol=1e-15)
+
+
+def changed(path: Path, old: str, new: str) -> None:
+    """Change the text of the second sheet of a workbook."""
+    with zipfile.ZipFile(path) as parts:
+        held = {name: parts.read(name) for name in parts.namelist()}
+    name = "xl/worksheets/sheet2.xml"
+    assert old.encode() in held[name]
+    held[name] = held[name].replace(old.encode(), new.encode(), 1)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as parts:
+        for part, data in held.items():
+            parts.writestr(part, data)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ('<row r="5"', '<row r="2"', "cell.xlsx: this is no Excel workbook that can be read"),
+        ('r="B5"', 'r="A5"', "cell.xlsx: this is no Excel workbook that can be read"),
+        ('<row r="5"', '<row r="900000000"', "the table has too many lines"),
+        ('<row r="5"', '<row r="3e12"', "cell.xlsx: this is no Excel workbook that can be read"),
+        ('ref="A1:G5"', 'ref="A1:B3"', ""),
+        (
+            "</sheetData>",
+            '</sheetData><mergeCells><mergeCell ref="A3:XFD1048576"/></mergeCells>',
+            "!A3: these cells are",
+        ),
+        ("</sheetData>", '</sheetData><mergeCells><mergeCell ref="A1:XFD1"/></mergeCells>', ""),
+    ],
+)
+def test_sheets_that_no_spreadsheet_writes(tmp_path: Path, old: str, new: str, part: str) -> None:
+    table, mapping = written(tmp_path)
+    changed(table, old, new)
+    if not part:  # what does not matter: a wrong size, a merged title however wide
+        assert read_table(table, mapping).configurations == 2
+        return
+    with pytest.raises(InputError, match=re.escape(part)):
+        read_table(table, mapping)

@@ -24,9 +24,11 @@ WORKBOOKS: Final = (".xlsx", ".xlsm")
 OTHER_WORKBOOKS: Final = (".xls", ".xlsb", ".ods", ".numbers")
 
 
-_ROW: Final = re.compile(rb"<(?:\w+:)?row\b[^>]*?\sr=\"([0-9]{1,9})\"")
-_CELL: Final = re.compile(rb"<(?:\w+:)?c\b[^>]*?\sr=\"([A-Z]{1,3})([0-9]{1,9})\"")
-_MERGED: Final = re.compile(rb"<(?:\w+:)?mergeCell\b[^>]*?\sref=\"([A-Z0-9:]+)\"")
+_ROW: Final = re.compile(rb"<(?:\w+:)?row\b[^>]*?\sr\s*=\s*[\"']([^\"']*)")
+_CELL: Final = re.compile(rb"<(?:\w+:)?c\b[^>]*?\sr\s*=\s*[\"']([^\"']*)")
+_MERGED: Final = re.compile(rb"<(?:\w+:)?mergeCell\b[^>]*?\sref\s*=\s*[\"']([^\"']*)")
+#: A number of so many digits is no number of a row.
+_DIGITS: Final = 10
 _CORNER: Final = re.compile("([A-Z]{1,3})([0-9]{1,9})")
 
 
@@ -192,7 +194,7 @@ def _rows(book: Workbook, title: str, layout: Layout) -> Iterator[tuple[int, lis
     seen = 0
     pairs = zip(values.iter_rows(values_only=True), formulas.iter_rows(), strict=True)
     for number, (row, cells) in enumerate(pairs, 1):
-        seen += len(row)
+        seen += 1 + len(row)
         refuse_beyond("cells", seen, where=f"{source}, line {number}")
         if number < first and number != layout.header:
             continue
@@ -219,13 +221,15 @@ def _checked(sheet: Any, source: str) -> list[tuple[str, int, int, int]]:
         xml = part.read()
     row = 0
     for found in _ROW.finditer(xml):
-        refuse_beyond("rows", int(found[1]), where=source)
-        if int(found[1]) <= row:
+        number = int(found[1]) if found[1].isdigit() and len(found[1]) < _DIGITS else 0
+        refuse_beyond("rows", number, where=source)
+        if number <= row:
             raise ValueError("rows are not in order")
-        row = int(found[1])
+        row = number
     at = (0, 0)
     for found in _CELL.finditer(xml):
-        here = (int(found[2]), _column(found[1].decode()))
+        corner = _CORNER.fullmatch(found[1].decode())
+        here = (0, 0) if corner is None else (int(corner[2]), _column(corner[1]))
         if here <= at:
             raise ValueError("cells are not in order")
         at = here

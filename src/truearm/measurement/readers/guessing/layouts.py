@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,6 +34,16 @@ UNITS: Final = {
     **{"metre": "m", "meter": "m", "millimetre": "mm", "millimeter": "mm"},
 }
 
+#: Texts that mean that nothing was measured.
+NOTHING: Final = re.compile(
+    r"n\.?/?a\.?|nan|none|null|nil|-+|\?+|\*+|missing|failed|fail|lost|invalid|#n/a|#div/0!|no data|nodata|occluded",
+    re.IGNORECASE,
+)
+#: Among so many lines there may be headings.
+_HEADED: Final = 15
+#: So many different texts in a line without numbers are headings.
+_DIFFERENT: Final = 3
+
 Rows = list[tuple[int, list[str]]]
 
 
@@ -47,7 +58,9 @@ class GuessedLayout:
     decimal
         The decimal sign.
     names
-        Name of each column, its number if there is no header.
+        Name of each column; its number if there is no header, or names are there twice.
+    headings
+        What stands above each column, of two lines if the lower one alone has names twice.
     units
         Unit of each column by a line of units, empty where there is none.
     columns
@@ -61,6 +74,7 @@ class GuessedLayout:
     entries: dict[str, tuple[str | int, str]]
     decimal: str
     names: tuple[str, ...]
+    headings: tuple[str, ...]
     units: tuple[str, ...]
     columns: tuple[tuple[str, ...], ...]
     header: bool
@@ -193,11 +207,10 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
     """Find the first line with data, and the names and units above it."""
     counts = sorted(_numbers(cells, split.decimal) for n, cells in split.rows if n > 0 and len(cells) == split.width)
     enough = max(2, counts[len(counts) // 2] / 2)
-    place = next(
-        i
-        for i, (n, cells) in enumerate(split.rows)
-        if n > 0 and len(cells) == split.width and _numbers(cells, split.decimal) >= enough
-    )
+    whole = [n > 0 and len(cells) == split.width for n, cells in split.rows]
+    data = [i for i, (_, cells) in enumerate(split.rows) if whole[i] and _numbers(cells, split.decimal) >= enough]
+    headed = [i for i, found in enumerate(whole[:_HEADED]) if found and _is_heading(split.rows[i][1], split.decimal)]
+    place = next((i for i in data if i > max(headed, default=-1)), data[0])
     above = [
         (abs(n), cells)
         for n, cells in split.rows[:place]
@@ -206,21 +219,35 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
     units = ("",) * split.width
     if above and _is_units(above[-1][1]):
         units = tuple(UNITS.get(_bare(cell), "") for cell in above.pop()[1])
-    data = [cells for n, cells in split.rows[place:] if n > 0 and len(cells) == split.width]
-    columns = tuple(zip(*data, strict=True))
+    rows = [cells for n, cells in split.rows[place:] if n > 0 and len(cells) == split.width]
+    columns = tuple(zip(*rows, strict=True))
     first = split.rows[place][0]
-    made = GuessedLayout(entries, split.decimal, (), units, columns, header=bool(above))
+    made = GuessedLayout(entries, split.decimal, (), (), units, columns, header=bool(above))
+    numbers = tuple(str(n) for n in range(1, split.width + 1))
     if not above:
         entries["header"] = ("none", "no line of names stands above the numbers")
         if first > 1:
             entries["first_row"] = (first, "the first line of numbers")
-        return replace(made, names=tuple(str(n) for n in range(1, split.width + 1)))
+        return replace(made, names=numbers, headings=numbers)
     line, names = above[-1]
+    given = [name for name in names if name]
+    if len(set(given)) < len(given):
+        entries["header"] = ("none", f"line {line} has names twice, so that columns go by number")
+        entries["first_row"] = (first, "the first line of numbers")
+        upper = above[-2][1] if len(above) > 1 else [""] * split.width
+        headings = tuple(f"{over} {name}".strip() for over, name in zip(upper, names, strict=True))
+        return replace(made, names=numbers, headings=headings)
     entries["header"] = (line, "the last line of names above the numbers")
     if first != line + 1:
         entries["first_row"] = (first, "the first line of numbers")
     notes = (f"line {above[-2][0]} looks like a second line of headings",) if len(above) > 1 else ()
-    return replace(made, names=tuple(names), notes=notes)
+    return replace(made, names=tuple(names), headings=tuple(names), notes=notes)
+
+
+def _is_heading(cells: Sequence[str], decimal: str) -> bool:
+    """Return whether a line holds names: no number, and several different texts."""
+    texts = {cell for cell in cells if cell and not NOTHING.fullmatch(cell)}
+    return _numbers(cells, decimal) == 0 and len(texts) >= _DIFFERENT
 
 
 def _bare(text: str) -> str:

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.readers.guessing.layouts import UNITS, GuessedLayout, number_of
+from truearm.measurement.readers.guessing.layouts import NOTHING, UNITS, GuessedLayout, number_of
 from truearm.modeling.chain import Array
 
 _IN_BRACKETS: Final = re.compile(r"(?P<name>.*?)\s*[\[({](?P<unit>[^\])}]*)[\])}]\s*")
@@ -38,11 +38,6 @@ _TARGET: Final = frozenset(
 )
 _TIME: Final = frozenset({"time", "timestamp", "stamp", "date", "datum", "zeit", "uhrzeit", "datetime"})
 _TEMPERATURE: Final = frozenset({"temp", "temperature", "temperatur"})
-#: Texts that mean that nothing was measured.
-_NOTHING: Final = re.compile(
-    r"n\.?/?a\.?|nan|none|null|nil|-+|\?+|\*+|missing|failed|fail|lost|invalid|#n/a|#div/0!|no data|nodata|occluded",
-    re.IGNORECASE,
-)
 #: Angles about three axes by the names of their columns: axes, whether they turn along, and who writes so.
 _ANGLES: Final = {
     ("a", "b", "c"): ("zyx", "moving", "KUKA's A, B, C"),
@@ -77,7 +72,7 @@ class Column:
     def nothing(self) -> list[str]:
         """Return the texts among its numbers that seem to mean that nothing was measured."""
         odd = dict.fromkeys(text for text in self.given if number_of(text, self.decimal) is None)
-        return [text for text in odd if _NOTHING.fullmatch(text)]
+        return [text for text in odd if NOTHING.fullmatch(text)]
 
     @property
     def is_numeric(self) -> bool:
@@ -103,8 +98,8 @@ Triple = tuple[Column, Column, Column]
 def columns_of(layout: GuessedLayout) -> list[Column]:
     """Return the columns of a table."""
     made = []
-    for place, (name, texts) in enumerate(zip(layout.names, layout.columns, strict=True)):
-        bare, unit = _name_and_unit(name) if layout.header else (name, "")
+    for place, (name, heading, texts) in enumerate(zip(layout.names, layout.headings, layout.columns, strict=True)):
+        bare, unit = _name_and_unit(heading) if layout.header else (heading, "")
         words = tuple(word.lower() for word in _TOKEN.findall(bare)) if layout.header else ()
         made.append(Column(place, name, unit or layout.units[place], words, texts, layout.decimal))
     return made
@@ -177,6 +172,7 @@ def quaternion_among(columns: Sequence[Column]) -> tuple[list[Column], bool]:
         (("qw", "qx", "qy", "qz"), True),
         (("q0", "qx", "qy", "qz"), True),
         (("rotw", "rotx", "roty", "rotz"), True),
+        (("w", "x", "y", "z"), True),
         (("q0", "q1", "q2", "q3"), False),
         (("q1", "q2", "q3", "q4"), False),
     ):

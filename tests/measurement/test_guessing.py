@@ -99,8 +99,8 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
             ["columns: [base, shoulder, elbow, wrist1, wrist2, wrist3]", "sigma: {columns: [sx, sy, sz], unit: mm}"],
         ),
         (  # Motive: names twice, below lines of other names
-            "Format Version,1.23,Take Name,a\n\n,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,"
-            "Rigid Body,Rigid Body\n,ID,1,1,1,1,1,1,1,1\n"
+            "Format Version,1.23,Take Name,a\n\n,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,"
+            "Rigid Body,Rigid Body,Rigid Body\n,ID,1,1,1,1,1,1,1,1\n"
             ",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error\n"
             "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,\n412,4.12,0.6,0,0,0.8,0.14,0.16,2.01,0.0001\n9,9.1,,,,,,,,\n",
             ["header: none", "first_row: 7", "x: 7", "qw: 6", "qx: 3", "order: {column: 2}", "length_unit: '?'"],

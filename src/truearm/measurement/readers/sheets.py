@@ -7,7 +7,7 @@ import re
 import warnings
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from datetime import date, datetime, time
 from pathlib import Path
@@ -93,7 +93,7 @@ def open_workbook(path: Path) -> Workbook:
 def _readable(path: Path) -> Iterator[None]:
     """Refuse what openpyxl cannot read, whatever it is that it stumbles upon."""
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), redirect_stdout(io.StringIO()):  # it prints what is wrong with styles
             warnings.simplefilter("ignore")  # of styles and validations that it leaves out
             yield
     except InputError:

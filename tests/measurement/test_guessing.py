@@ -105,6 +105,32 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
             "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,\n412,4.12,0.6,0,0,0.8,0.14,0.16,2.01,0.0001\n9,9.1,,,,,,,,\n",
             ["header: none", "first_row: 7", "x: 7", "qw: 6", "qx: 3", "order: {column: 2}", "length_unit: '?'"],
         ),
+        (  # what was commanded beside what was measured; a time for each row
+            "timestamp,actual_q_0,actual_q_1,target x (m),target y (m),target z (m),tracker_x [mm],tracker_y [mm],"
+            "tracker_z [mm]\n2026-11-23T10:00:00Z,0.1,-1.5,0.5,0.2,0.3,1500.1,200.5,300.8\n"
+            "2026-11-23T10:01:00Z,0.2,-1.4,0.5,0.2,0.3,1501.1,201.5,301.8\n",
+            [
+                "{each: row}",
+                "- target: tip",
+                'x: "tracker_x [mm]"',
+                "length_unit: mm",
+                "time: iso",
+                "# Not used: target x",
+            ],
+        ),
+        (  # quotes around decimal commas, KUKA's angles
+            '"Pose","A1","A2","X","Y","Z","A","B","C"\n"1","10,5","-90","800,1","20","900","90","0","180"\n'
+            '"2","11,5","-80","810,1","30","910","91","1","179"\n',
+            ["delimiter: comma", "decimal: comma", "columns: [A, B, C], about: zyx, axes: moving, unit: deg"],
+        ),
+        (  # units that are part of a name
+            "id,theta1(rad),theta2(rad),Xm,Ym,Zm,sigma\na,0.1,0.2,0.812,0.1,0.5,0.00002\n",
+            ["length_unit: m ", "unit: rad", "sigma: {columns: [sigma], unit: m}"],
+        ),
+        (  # targets in two units
+            "p,J1,L x [mm],L y [mm],L z [mm],R x [m],R y [m],R z [m]\na,90,1,2,3,4,5,6\nb,91,1,2,3,4,5,6\n",
+            ["length_unit: '?'  # guess: the headings name several units"],
+        ),
         (  # nothing has a name
             "1,10,20,1841.2,112.8,655.1\n2,11,20,1841.2,113.8,656.1\n",
             ["configuration: {column: 1}", "columns: [2, 3]", "x: 4"],
@@ -162,6 +188,11 @@ def test_an_import_with_it_is_tried(tmp_path: Path) -> None:
         (b"", "the file is empty"),
         (b"hello\nworld\n", "this does not look like a table"),
         (b"a,b\n1,2\n3,4\n", "no columns look like x, y and z"),
+        (b"p\tX\tY\tZ\na\t1,841.22\t2.5\t3\nb\t1,702.55\t2.5\t3\n", "the column X is called like a coordinate"),
+        (
+            b"configuration,joint_1 [deg],target,x [mm],y [mm],z [mm]\na,1,t,1,2,3\n",
+            "of the canonical CSV, which needs",
+        ),
         (bytes(range(256)), "this does not look like a table"),
         (b"p,J1,X,Y\na,1,2,3\n", "no columns look like x, y and z of a measured point; got 'p, J1, X, Y'"),
     ],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -131,6 +131,8 @@ def guess_mapping(path: Path) -> Guessed:
     quaternion, sure = quaternion_among(left.columns)
     left.take(quaternion)
     positions = positions_among([column for column in left.columns if column.is_numeric])
+    if not positions:
+        _refuse_other_numbers(path, positions_among(left.columns))
     if not positions and not layout.header:
         positions, joints = _by_place(left.columns, joints)
     for three in positions.values():
@@ -156,6 +158,19 @@ def guess_mapping(path: Path) -> Guessed:
         text.lines.append(f"# Not used: {shown}")
     made = Guessed("\n".join(text.lines) + "\n", tuple(text.guesses))
     return made if made.open or not joints else _tried(made, path)
+
+
+def _refuse_other_numbers(path: Path, positions: Mapping[tuple[str, ...], Sequence[Column]]) -> None:
+    """Refuse columns that are called like coordinates and hold no numbers as they are written in the file."""
+    for three in positions.values():
+        column = next(column for column in three if not column.is_numeric)
+        raise InputError(
+            f"the column {column.name} is called like a coordinate, and holds no numbers that can be read",
+            where=str(path),
+            came=next(iter(column.given), None),
+            allowed="numbers with one decimal sign and no thousands separators",
+            cure="Export the table again without thousands separators.",
+        )
 
 
 def _refuse_canonical(path: Path, layout: GuessedLayout) -> None:
@@ -273,7 +288,10 @@ def _write_labels(
     for key, three in positions.items():
         if several or (target is None and not names_target):
             name = " ".join(key) if several and key else "tip"
-            text.add("readings.target", _plain(name), "a name for it", f"  - target: {_plain(name)}")
+            because = "a name for it"
+            if several and not key:
+                because += "; remove this entry if it is what the controller shows"
+            text.add("readings.target", _plain(name), because, f"  - target: {_plain(name)}")
             start = "    "
         elif target is not None:
             text.add(
@@ -347,7 +365,8 @@ def _names(left: _Left, several: bool) -> tuple[Column | None, Column | None, st
             left.take([column])
             lead = "[^:]*::" if parts == {2} else ""
             return column, None, rf"{lead}(?P<configuration>[^:]+)::(?P<target>[^:]+)"
-    texts = [column for column in left.columns if column.given and len(column.given) == len(column.texts)]
+    whole = [column for column in left.columns if column.given and len(column.given) == len(column.texts)]
+    texts = [column for column in whole if column.can_name]
     target = None if several else named_like(texts, "target")
     left.take([target] if target else [])
     rest = [column for column in texts if column is not target]
@@ -407,6 +426,8 @@ def _length_unit(columns: Sequence[Column]) -> tuple[str, str]:
     unit = _unit_of(columns)
     if unit is not None:
         return unit, "the headings"
+    if len({column.unit for column in columns if column.unit}) > 1:
+        return f"'{OPEN}'", "the headings name several units, and a mapping has one for all positions"
     most = max((float(np.abs(column.values).max()) for column in columns if len(column.values)), default=0.0)
     if most > _MOST_METRES:
         return "mm", f"{most:g} is too much for metres; it may be in"

@@ -107,12 +107,7 @@ def guess_layout(path: Path) -> GuessedLayout:
     lines = _first_lines(text)
     comment = _comment(lines)
     best = max(
-        (
-            _split(lines, comment, delimiter, decimal)
-            for delimiter in _DELIMITERS
-            for decimal in (".", ",")
-            if (delimiter, decimal) != ("comma", ",")
-        ),
+        (_split(lines, comment, delimiter, decimal) for delimiter in _DELIMITERS for decimal in (".", ",")),
         key=lambda split: split.numbers,
     )
     if best.numbers == 0:

@@ -16,6 +16,7 @@ from truearm.modeling.chain import Array
 
 _IN_BRACKETS: Final = re.compile(r"(?P<name>.*?)\s*[\[({](?P<unit>[^\])}]*)[\])}]\s*")
 _AT_THE_END: Final = re.compile(r"(?P<name>.*[^\s_/,])[\s_/,]+(?P<unit>[^\s_/,]+)\s*")
+_GLUED: Final = re.compile("(?P<name>[XYZxyz])(?P<unit>mm|m|in)")
 _TOKEN: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_]+")
 #: Words before the number of a joint.
 _JOINT: Final = frozenset({"joint", "joints", "axis", "ax", "achse", "gelenk", "j", "a", "q", "theta", "rax"})
@@ -28,7 +29,8 @@ _NOT_MEASURED: Final = frozenset(
     {"nominal", "nom", "soll", "theoretical", "theo", "cad", "design", "cmd", "command", "commanded", "programmed"}
     | {"error", "err", "delta", "diff", "difference", "dev", "deviation", "residual", "rms", "tol", "tolerance"}
 )
-_TOOL: Final = frozenset({"tcp", "tool", "flange", "robot"})
+#: Words of positions that a controller shows or was given, where others stand beside them.
+_TOOL: Final = frozenset({"tcp", "tool", "flange", "robot", "target", "desired", "setpoint", "reference"})
 _LABEL: Final = frozenset(
     {"configuration", "config", "pose", "poses", "position", "pos", "point", "punkt", "label", "name", "id", "stelle"}
     | {"station", "group", "no", "nr", "number", "index", "pt", "measurement", "messung", "pkt"}
@@ -81,6 +83,11 @@ class Column:
         return len(self.values) > 0 and 2 * len(self.values) >= len(meant)
 
     @property
+    def can_name(self) -> bool:
+        """Whether what stands in it can be names: texts, or whole numbers."""
+        return not self.is_numeric or all(text.isdigit() for text in self.given)
+
+    @property
     def counts(self) -> bool:
         """Whether it numbers the rows: 1, 2, 3."""
         whole = len(self.values) == len(self.texts) > 1 and all(text.isdigit() for text in self.texts)
@@ -106,7 +113,7 @@ def columns_of(layout: GuessedLayout) -> list[Column]:
 
 
 def _name_and_unit(heading: str) -> tuple[str, str]:
-    for pattern in (_IN_BRACKETS, _AT_THE_END):
+    for pattern in (_IN_BRACKETS, _AT_THE_END, _GLUED):
         match = pattern.fullmatch(heading)
         if match is not None and (unit := UNITS.get(match["unit"].strip())):
             return match["name"], unit
@@ -156,8 +163,7 @@ def triples_among(columns: Iterable[Column], last: Sequence[str]) -> dict[tuple[
 
 def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
     """Return the columns x, y, z of each target by the other words of their names."""
-    found = triples_among(columns, ("x", "y", "z"))
-    found = {key: three for key, three in found.items() if not _DEVIATION & set(key)}
+    found = {key: three for key, three in triples_among(columns, "xyz").items() if not _DEVIATION & set(key)}
     measured = {key: three for key, three in found.items() if not _TOOL & set(key)}
     return measured or found
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from tests.test_documents import ROOT, blocks
 
 import truearm
 from truearm.errors import InputError
+from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.presets import PRESETS, mapping_path
 
 JOINTS = """\
@@ -86,6 +88,77 @@ def test_another_file_of_joints_and_a_file_of_the_preset_s_name(cell: Path) -> N
 
 
 def test_every_preset_stands_in_the_guide_as_it_is_shipped() -> None:
-    guide = (Path(__file__).parents[2] / "docs" / "guide" / "from-your-instrument.md").read_text()
+    text = (ROOT / "docs" / "guide" / "from-your-instrument.md").read_text()
     for preset in PRESETS:
-        assert mapping_path(preset).read_text() in guide, preset
+        assert mapping_path(preset).read_text() in text, preset
+
+
+@pytest.fixture(scope="module")
+def guide(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with every file that the guide shows."""
+    folder = tmp_path_factory.mktemp("guide")
+    for kind, body in blocks(ROOT / "docs" / "guide" / "from-your-instrument.md"):
+        if kind.startswith("{code-block}"):
+            caption, _, content = body.partition("\n")
+            (folder / caption.removeprefix(":caption:").strip()).write_text(content)
+    return folder
+
+
+JOINED = {
+    1: "10.0,-20.5,31.25,0.0,45.0,-90.0",
+    2: "-35.0,12.0,5.5,60.0,-30.0,15.0",
+    3: "20.0,8.0,-14.0,35.0,40.0,100.0",
+}
+
+
+@pytest.mark.parametrize(
+    ("table", "mapping", "rows"),
+    [
+        (
+            "arm.txt",
+            "arm.yaml",
+            [
+                "P001,1,{1},ball,1841.2213,112.8402,655.1041,0.025",
+                "P002,2,{2},ball,,,,0.025",
+                "P003,3,{3},ball,1702.5519,-640.2207,790.6644,0.025",
+            ],
+        ),
+        (
+            "inspector.csv",
+            "inspector.yaml",
+            [
+                "P001,1,{1},smr_1,1841.2213,112.8402,655.1041",
+                "P001,1,{1},smr_2,1839.0071,96.1175,602.3398",
+                "P002,2,{2},smr_1,,,",
+                "P002,2,{2},smr_2,,,",
+                "P003,3,{3},smr_1,1702.5519,-640.2207,790.6644",
+            ],
+        ),
+        (
+            "tool.csv",
+            "tool.yaml",
+            ["P001,1,{1},tool,112.41,-35.22,-1502.3", "P002,2,{2},tool,,,", "P003,3,{3},tool,98.16"],
+        ),
+        (
+            "take.csv",
+            "take.yaml",
+            ["1,{1},flange,142.319,160.392,2000.101,0.1215", "2,{2},flange,,,,,,,", "3,{3},flange,221.6"],
+        ),
+    ],
+)
+def test_the_mappings_of_the_guide_cell_by_cell(guide: Path, table: str, mapping: str, rows: list[str]) -> None:
+    lines = csv_text(truearm.import_table(guide / table, guide / mapping).data).splitlines()
+    assert ",axis_1 [deg],axis_2 [deg]," in lines[0]
+    assert len(lines) == len(rows) + 1
+    for line, row in zip(lines[1:], rows, strict=True):
+        wanted = row.replace("{1}", JOINED[1]).replace("{2}", JOINED[2]).replace("{3}", JOINED[3])
+        assert line.startswith(wanted), line
+
+
+def test_a_table_of_robodk_cell_by_cell(guide: Path) -> None:
+    data = truearm.import_robodk(guide / "robodk.csv", joints_are="controller").data
+    assert csv_text(data) == (
+        "configuration,axis_1 [deg],axis_2 [deg],axis_3 [deg],axis_4 [deg],axis_5 [deg],axis_6 [deg],"
+        "target,x [mm],y [mm],z [mm]\n"
+        f"1,{JOINED[1]},1,1841.2213,112.8402,655.1041\n2,{JOINED[2]},1,,,\n"
+    )

@@ -153,8 +153,9 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
     kept = list(dict.fromkeys(compress(targets, ~reference)))
     added = len(absent) * len(kept)
 
-    def padded(values: Array) -> Array:
-        return np.concatenate([values, np.full((added, *values.shape[1:]), np.nan)])
+    def padded(values: Array, *, same: bool = False) -> Array:
+        """Return values with those of unmeasured configurations: none, or the `same` as everywhere."""
+        return np.concatenate([values, np.full((added, *values.shape[1:]), values[0] if same else np.nan)])
 
     readings = Readings(
         source=cells.source,
@@ -164,8 +165,8 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
         reference=np.concatenate([reference, np.zeros(added, dtype=bool)]),
         position=padded(position),
         quaternion=None if quaternion is None else padded(quaternion),
-        sigma=None if sigma is None else padded(sigma),
-        sigma_rot=None if sigma_rot is None else padded(sigma_rot),
+        sigma=None if sigma is None else padded(sigma, same=content.sigma is not None),
+        sigma_rot=None if sigma_rot is None else padded(sigma_rot, same=content.sigma_rot is not None),
         called=called_in(content),
     )
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))

@@ -124,6 +124,9 @@ def test_the_order_is_told_by_labels_rows_numbers_and_times(tmp_path: Path) -> N
     rows = "P3,1,2,t,1,2,3,{}\nP1,3,4,t,1,2,3,{}\nP7,5,6,t,1,2,3,{}\n"
     assert numbers(tmp_path, rows.format(0, 0, 0), "{by: labels}") == [2, 0, 6]
     assert numbers(tmp_path, rows.format(0, 0, 0), "{by: rows}") == [0, 1, 2]
+    data = read(tmp_path, TIMED.format(rows.format(0, 0, 0)), MAP + "order: {by: rows}\n")
+    assert data.approach is not None  # what backlash and its like need
+    assert data.approach.tolist() == [[0, 0], [1, 1], [1, 1]]
     assert numbers(tmp_path, rows.format(3, 9, 5), "{column: when}") == [2, 8, 4]
     assert numbers(tmp_path, rows.format("0.5", "1.7e9", "2"), "{column: when}") == [0, 2, 1]
     assert numbers(tmp_path, rows.format(3, 9, 5), "{column: when, time: null}") == [2, 8, 4]

@@ -127,6 +127,10 @@ def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
             "id,theta1(rad),theta2(rad),Xm,Ym,Zm,sigma\na,0.1,0.2,0.812,0.1,0.5,0.00002\n",
             ["length_unit: m ", "unit: rad", "sigma: {columns: [sigma], unit: m}"],
         ),
+        (  # targets with numbers for names
+            "p,J1,X1,Y1,Z1,X2,Y2,Z2\na,90,800,2,3,4,5,6\nb,91,800,2,3,4,5,6\n",
+            ['- target: "1"', "x: X1", '- target: "2"', "x: X2"],
+        ),
         (  # targets in two units
             "p,J1,L x [mm],L y [mm],L z [mm],R x [m],R y [m],R z [m]\na,90,1,2,3,4,5,6\nb,91,1,2,3,4,5,6\n",
             ["length_unit: '?'  # guess: the headings name several units"],

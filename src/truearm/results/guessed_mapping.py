@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from truearm.measurement.readers.guessing.guess import Guess, Guessed
+from truearm.measurement.readers.guessing.guess import Guessed
+from truearm.measurement.readers.guessing.mapping_text import Guess
 from truearm.results.record import Record
 from truearm.shown import counted, listed
 

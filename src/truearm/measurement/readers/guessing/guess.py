@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-import numpy as np
 from ruamel.yaml import YAML
 
 from truearm.errors import InputError
 from truearm.measurement.readers.guessing.layouts import GuessedLayout, guess_layout
+from truearm.measurement.readers.guessing.mapping_text import (
+    OPEN,
+    Guess,
+    MappingText,
+    angle_unit,
+    escaped,
+    length_unit,
+    list_of,
+    named,
+    plain,
+    quoted,
+    unit_of,
+)
 from truearm.measurement.readers.guessing.meanings import (
     Column,
     angles_among,
@@ -30,40 +42,11 @@ from truearm.measurement.readers.table import TableFiles, read_with
 from truearm.modeling.formats.joint_columns import JOINT_COLUMN
 from truearm.schemas import validated
 
-#: Where nothing in the file tells an answer.
-OPEN: Final = "?"
-_PLAIN: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?: [A-Za-z0-9_]+)*|[1-9][0-9]*")
-_NOT_PLAIN: Final = frozenset({"true", "false", "null"})
-#: Angles beyond this are degrees: nobody turns a joint more than once about itself and a little more [rad].
-_MOST_RADIANS: Final = 7.0
-#: Positions beyond this are millimetres: no arm reaches that many metres or inches away.
-_MOST_METRES: Final = 30.0
-#: Rows from which small angles are taken for radians.
-_ENOUGH: Final = 10
 _TIMES: Final = (
     *("%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p"),
     *("%d/%m/%Y %H:%M:%S", "%Y/%m/%d %H:%M:%S", "%H:%M:%S", "%H:%M:%S.%f"),
 )
 _NUMBERED: Final = re.compile("(.*?)[0-9]{1,9}")
-
-
-@dataclass(frozen=True)
-class Guess:
-    """One entry of a mapping, and what the guess rests on.
-
-    Attributes
-    ----------
-    entry
-        The entry, such as ``joints.unit``.
-    value
-        Its value; ``?`` where nothing tells it.
-    because
-        What the guess rests on.
-    """
-
-    entry: str
-    value: str
-    because: str
 
 
 @dataclass(frozen=True)
@@ -94,19 +77,6 @@ class Guessed:
         return tuple(guess.entry for guess in self.guesses if guess.value == OPEN or f"'{OPEN}'" in guess.value)
 
 
-@dataclass
-class _Text:
-    """The lines of a mapping as they are written, and the guesses in them."""
-
-    lines: list[str] = field(default_factory=list)
-    guesses: list[Guess] = field(default_factory=list)
-
-    def add(self, entry: str, value: str, because: str, line: str | None = None) -> None:
-        name = entry.rpartition(".")[2]
-        self.lines.append(f"{line or f'{name}: {value}'}  # guess: {because}")
-        self.guesses.append(Guess(entry, value, because))
-
-
 def guess_mapping(path: Path) -> Guessed:
     """Return the mapping file that a table seems to need.
 
@@ -118,9 +88,9 @@ def guess_mapping(path: Path) -> Guessed:
     layout = guess_layout(path)
     columns = columns_of(layout)
     _refuse_canonical(path, layout)
-    text = _Text()
+    text = MappingText()
     text.lines += [
-        f"# Guessed from {_escaped(path.name)}.",
+        f"# Guessed from {escaped(path.name)}.",
         f"# Look at every line with a guess: correct it, answer each {OPEN}, and then write confirmed: yes.",
         "truearm: truearm-mapping/1",
         "confirmed: no",
@@ -154,7 +124,7 @@ def guess_mapping(path: Path) -> Guessed:
         text.lines.append("# Note: tables of RoboDK with tool points come in by truearm import robodk.")
     unused = [column.name for column in left.columns if column.name]
     if unused:
-        shown = ", ".join(_escaped(name) for name in unused[:20])
+        shown = ", ".join(escaped(name) for name in unused[:20])
         text.lines.append(f"# Not used: {shown}")
     made = Guessed("\n".join(text.lines) + "\n", tuple(text.guesses))
     return made if made.open or not joints else _tried(made, path)
@@ -196,26 +166,10 @@ class _Left:
         return list(taken)
 
 
-def _plain(text: str) -> str:
-    """Return a text as YAML takes it."""
-    is_plain = _PLAIN.fullmatch(text) is not None and text.lower() not in _NOT_PLAIN
-    return text if is_plain else f'"{_escaped(text)}"'
-
-
-def _escaped(text: str) -> str:
-    """Return a text as it stands between double quotes in YAML."""
-    known = {'"': '\\"', "\\": "\\\\"}
-    return "".join(known.get(c, c if c.isprintable() else f"\\U{ord(c):08x}") for c in text)
-
-
-def _list(columns: Sequence[Column]) -> str:
-    return f"[{', '.join(_plain(column.name) for column in columns)}]"
-
-
-def _write_layout(text: _Text, layout: GuessedLayout) -> None:
+def _write_layout(text: MappingText, layout: GuessedLayout) -> None:
     text.lines.append("layout:")
     for name, (value, because) in layout.entries.items():
-        shown = str(value) if isinstance(value, int) else _plain(value)
+        shown = str(value) if isinstance(value, int) else plain(value)
         text.add(f"layout.{name}", shown, because, f"  {name}: {shown}")
 
 
@@ -232,15 +186,15 @@ def _by_place(
     return {(): (first, second, third)}, numeric[:-3]
 
 
-def _write_missing(text: _Text, columns: Sequence[Column]) -> None:
+def _write_missing(text: MappingText, columns: Sequence[Column]) -> None:
     texts = list(dict.fromkeys(odd for column in columns for odd in column.nothing))
     if texts:
-        shown = f"[{', '.join(_plain(odd) for odd in texts)}]"
+        shown = f"[{', '.join(plain(odd) for odd in texts)}]"
         text.add("missing", shown, "these texts stand among numbers")
 
 
 def _write_labels(
-    text: _Text,
+    text: MappingText,
     left: _Left,
     joints: Sequence[Column],
     positions: dict[tuple[str, ...], tuple[Column, Column, Column]],
@@ -265,7 +219,7 @@ def _write_labels(
             "names",
             "",
             "the names have parts between ::",
-            f"names: {{column: {_plain(label.name)}, pattern: '{pattern}'}}",
+            f"names: {{column: {named(label)}, pattern: '{pattern}'}}",
         )
     elif label is not None:
         because = "its name or its texts"
@@ -273,7 +227,7 @@ def _write_labels(
             because += "; whole numbers tell the order of measurement"
         if target is None and not several and label.distinct < len(label.texts):
             because += "; rows with the same label count as repeated readings of one target"
-        text.add("configuration", "", because, f"configuration: {{column: {_plain(label.name)}}}")
+        text.add("configuration", "", because, f"configuration: {{column: {named(label)}}}")
     else:
         text.add(
             "configuration",
@@ -282,7 +236,7 @@ def _write_labels(
             "configuration: {each: row}",
         )
     every = [column for three in positions.values() for column in three]
-    text.add("length_unit", *_length_unit(every))
+    text.add("length_unit", *length_unit(every))
     text.lines.append("readings:")
     names_target = pattern is not None and "target" in pattern
     for key, three in positions.items():
@@ -291,14 +245,14 @@ def _write_labels(
             because = "a name for it"
             if several and not key:
                 because += "; remove this entry if it is what the controller shows"
-            text.add("readings.target", _plain(name), because, f"  - target: {_plain(name)}")
+            text.add("readings.target", plain(name), because, f"  - target: {plain(name)}")
             start = "    "
         elif target is not None:
             text.add(
                 "readings.target_column",
-                _plain(target.name),
+                named(target),
                 "its name or its texts",
-                f"  - target_column: {_plain(target.name)}",
+                f"  - target_column: {named(target)}",
             )
             start = "    "
         else:
@@ -306,21 +260,21 @@ def _write_labels(
         for axis, column in zip("xyz", three, strict=True):
             text.add(
                 f"readings.{axis}",
-                _plain(column.name),
+                named(column),
                 "its name" if column.words else "its place",
-                f"{start}{axis}: {_plain(column.name)}",
+                f"{start}{axis}: {named(column)}",
             )
             start = "    "
         if several:
             continue
         _write_orientation(text, quaternion, sure, angles)
         for name, found, unit in (
-            ("sigma", sigma, _unit_of(sigma) or _length_unit(every)[0]),
-            ("sigma_rot", sigma_rot, _unit_of(sigma_rot) or _angle_unit(angles[0] if angles else ())[0]),
+            ("sigma", sigma, unit_of(sigma) or length_unit(every)[0]),
+            ("sigma_rot", sigma_rot, unit_of(sigma_rot) or angle_unit(angles[0] if angles else ())[0]),
         ):
             if found:
                 coverage = ", coverage: 2" if is_expanded(found) else ""
-                value = f"{{columns: {_list(found)}, unit: {_quoted(unit)}{coverage}}}"
+                value = f"{{columns: {list_of(found)}, unit: {quoted(unit)}{coverage}}}"
                 because = "their names; standard deviations, or expanded uncertainties by a coverage of 2"
                 text.add(f"readings.{name}", value, because, f"    {name}: {value}")
     if several and (quaternion or angles or sigma):
@@ -329,26 +283,22 @@ def _write_labels(
         )
     if temperature is not None:
         unit = temperature.unit if temperature.unit in ("degC", "degF", "K") else OPEN
-        value = f"{{column: {_plain(temperature.name)}, unit: {_quoted(unit)}}}"
+        value = f"{{column: {named(temperature)}, unit: {quoted(unit)}}}"
         text.add("temperature", value, "its name")
     _write_order(text, label, time, pattern)
 
 
-def _quoted(unit: str) -> str:
-    return f"'{OPEN}'" if unit == OPEN else unit
-
-
 def _write_orientation(
-    text: _Text, quaternion: Sequence[Column], sure: bool, angles: tuple[Sequence[Column], str, str, str] | None
+    text: MappingText, quaternion: Sequence[Column], sure: bool, angles: tuple[Sequence[Column], str, str, str] | None
 ) -> None:
     if quaternion:
         because = "their names" if sure else "the sum of their squares is 1; whether w is first is not said"
         for name, column in zip(("qw", "qx", "qy", "qz"), quaternion, strict=True):
-            text.add(f"readings.{name}", _plain(column.name), because, f"    {name}: {_plain(column.name)}")
+            text.add(f"readings.{name}", named(column), because, f"    {name}: {named(column)}")
     if angles is not None:
         three, about, axes, who = angles
-        unit, why = _angle_unit(three)
-        value = f"{{columns: {_list(three)}, about: {_quoted(about)}, axes: {_quoted(axes)}, unit: {_quoted(unit)}}}"
+        unit, why = angle_unit(three)
+        value = f"{{columns: {list_of(three)}, about: {quoted(about)}, axes: {quoted(axes)}, unit: {quoted(unit)}}}"
         text.add(
             "readings.angles",
             value,
@@ -383,7 +333,7 @@ def _names(left: _Left, several: bool) -> tuple[Column | None, Column | None, st
     return label, target, None
 
 
-def _write_joints(text: _Text, joints: Sequence[Column]) -> None:
+def _write_joints(text: MappingText, joints: Sequence[Column]) -> None:
     if not joints:
         value = "{file: joints.csv}"
         text.add(
@@ -392,58 +342,25 @@ def _write_joints(text: _Text, joints: Sequence[Column]) -> None:
         return
     text.lines.append("joints:")
     because = "their names" if joints[0].words else "their place"
-    text.add("joints.columns", _list(joints), because, f"  columns: {_list(joints)}")
+    text.add("joints.columns", list_of(joints), because, f"  columns: {list_of(joints)}")
     units = [column.unit for column in joints]
     if all(unit in ("deg", "rad", "mm", "m", "um", "in") for unit in units) and len(set(units)) > 1:
         text.add("joints.units", f"[{', '.join(units)}]", "the headings", f"  units: [{', '.join(units)}]")
         return
-    unit, why = _angle_unit(joints)
-    text.add("joints.unit", unit, why, f"  unit: {_quoted(unit)}")
+    unit, why = angle_unit(joints)
+    text.add("joints.unit", unit, why, f"  unit: {quoted(unit)}")
 
 
-def _unit_of(columns: Sequence[Column]) -> str | None:
-    units = {column.unit for column in columns}
-    return units.pop() or None if len(units) == 1 else None
-
-
-def _angle_unit(columns: Sequence[Column]) -> tuple[str, str]:
-    """Return the unit of angles and what it rests on."""
-    unit = _unit_of(columns)
-    if unit is not None:
-        return unit, "the headings"
-    if not columns:
-        return OPEN, "nothing tells the unit"
-    most = max((float(np.abs(column.values).max()) for column in columns if len(column.values)), default=0.0)
-    if most > _MOST_RADIANS:
-        return "deg", f"{most:g} is too much for radians"
-    if len(columns[0].values) >= _ENOUGH:
-        return "rad", f"no angle is beyond {most:.3g}"
-    return OPEN, f"deg or rad: no angle is beyond {most:.3g}"
-
-
-def _length_unit(columns: Sequence[Column]) -> tuple[str, str]:
-    """Return the unit of positions and what it rests on."""
-    unit = _unit_of(columns)
-    if unit is not None:
-        return unit, "the headings"
-    if len({column.unit for column in columns if column.unit}) > 1:
-        return f"'{OPEN}'", "the headings name several units, and a mapping has one for all positions"
-    most = max((float(np.abs(column.values).max()) for column in columns if len(column.values)), default=0.0)
-    if most > _MOST_METRES:
-        return "mm", f"{most:g} is too much for metres; it may be in"
-    return f"'{OPEN}'", f"m, mm or in: no coordinate is beyond {most:.3g}"
-
-
-def _write_order(text: _Text, label: Column | None, time: Column | None, pattern: str | None) -> None:
+def _write_order(text: MappingText, label: Column | None, time: Column | None, pattern: str | None) -> None:
     """Write what tells the order of measurement, if anything seems to."""
     if time is not None:
         if time.is_numeric:
-            text.add("order", f"{{column: {_plain(time.name)}}}", "its name")
+            text.add("order", f"{{column: {named(time)}}}", "its name")
             return
         formats = _formats(time.given)
         if formats:
             shown = "iso" if formats[0] == "iso" else f"'{formats[0]}'"
-            value = f"{{column: {_plain(time.name)}, time: {shown}}}"
+            value = f"{{column: {named(time)}, time: {shown}}}"
             because = "its name and its texts"
             if len(formats) > 1:
                 because = f"its texts; {formats[1]} would read them too"

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.planning.driving.ways import WayFinder
 
-#: So many times as many as are wanted are drawn at most.
-_TIMES = 40
+#: So many times as many as are wanted are drawn at most, but no more than this where twice as many are enough.
+_TIMES: Final = 40
+_MOST: Final = 200_000
 
 
 def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.Generator) -> Array:
@@ -35,8 +38,8 @@ def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.G
     first = np.minimum(low + approach, (low + high) / 2.0)
     lost: dict[str, int] = {}
     straight, clear = np.zeros((0, len(low))), np.zeros((0, len(low)))
-    drawn = 0
-    while drawn < _TIMES * count and len(straight) < count:
+    drawn, most = 0, min(_TIMES * count, max(_MOST, 2 * count))
+    while drawn < most and len(straight) < count:
         q = rng.uniform(first, high, (count, len(low)))
         drawn += count
         kept = finder.check.kept(q)

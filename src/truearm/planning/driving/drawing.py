@@ -42,20 +42,19 @@ def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.G
     while drawn < most and len(straight) < count:
         q = rng.uniform(first, high, (count, len(low)))
         drawn += count
-        kept = finder.check.kept(q)
-        for name, keeps in kept.items():
-            lost[name] = lost.get(name, 0) + int(np.sum(~keeps))
-        q = q[np.all([*kept.values(), np.ones(count, bool)], axis=0)]
+        q, cost = finder.check.sifted(q)
+        for name, number in cost.items():
+            lost[name] = lost.get(name, 0) + number
         q = q[finder.check.ways(np.maximum(q - approach, low), q).clear]
         home = np.broadcast_to(finder.home, q.shape)
         ways = finder.check.ways(q, home).clear
         straight, clear = np.concatenate([straight, q[ways]]), np.concatenate([clear, q])
     if not len(clear):
-        cost = ", ".join(f"{name} {number}" for name, number in lost.items() if number)
+        told = ", ".join(f"{name} {number}" for name, number in lost.items() if number)
         raise InputError(
             "there is no configuration in which the arm keeps clear",
             parameter="clearance",
-            came=f"{drawn} drawn; rejected by {cost}",
+            came=f"{drawn} drawn; rejected by {told}",
             cure="Lower `clearance`, or see that the limits, the floor and boxes to keep out of leave the arm room.",
         )
     return straight[:count] if 2 * len(straight) >= len(clear) else clear[:count]

@@ -47,6 +47,8 @@ COMMANDS: Final[tuple[str, ...]] = (
     "plan irb120 --poses 8 --candidates 30 --out plan.csv --objective O1 --device tracker --seed 1",
     "plan calibrated.yaml --poses 10 --candidates 60 --out plan.csv --constraints constraints.yaml --noise 0.1",
     "plan irb120 --poses 8 --from data.csv --out plan.csv --model joints",
+    "plan irb120 --poses 8 --candidates 40 --out out --program rapid --approach --speed 99,5 --dwell 1 --wait time",
+    "plan irb120 --poses 8 --from data.csv --model joints --out out --program rapid --no-floor --clearance 0",
     "plan irb120 --poses 8 --candidates 30 --out plan.csv --floor -400 --clearance 30 --home 0,-10,20,0,30,0",
     "plan katana450 --device inclinometers --poses 8 --candidates 60 --out plan.csv --pull 20",
     "simulate katana450 --truth tilting --device inclinometers --poses 8 --out simulated.csv --pull 30",

@@ -9,7 +9,7 @@ import typer
 
 from truearm.cli.ik import read_seed
 from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_beside, refuse_pull
-from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity, read_numbers
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
 
@@ -19,7 +19,10 @@ def plan(
         str, typer.Argument(metavar="ROBOT", help="A library id, a robot file, calibrated or not, or a URDF.")
     ],
     poses: Annotated[str, typer.Option(metavar="N|auto", help="How many configurations; auto lets O1 decide.")],
-    out: Annotated[Path, typer.Option("--out", metavar="PLAN.csv", help="File to write, and PLAN.html beside it.")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="PLAN", help="CSV file to write, its page beside it; a folder with --program."),
+    ],
     candidates_from: Annotated[
         str | None,
         typer.Option(
@@ -106,12 +109,43 @@ def plan(
             show_default="one is found",
         ),
     ] = None,
+    program: Annotated[
+        str | None,
+        typer.Option(
+            metavar="rapid|krl|fanuc|urscript|inform|val3",
+            help="Write a program that drives the plan, and a sheet; --out is then a folder.",
+            show_default=False,
+        ),
+    ] = None,
+    approach: Annotated[
+        bool,
+        typer.Option("--approach", help="Every joint comes to each configuration from one side, by a stop before it."),
+    ] = False,
+    speed: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MM/S[,%]", help="Its highest speed of the tip, and of the joints.", show_default="250,10"
+        ),
+    ] = None,
+    dwell: Annotated[
+        float | None, typer.Option(metavar="S", help="How long it stands in each configuration.", show_default="2")
+    ] = None,
+    wait: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WAIT",
+            help='What it waits for then: time, for nothing more; operator, who starts it again; "input 3,300s", a '
+            "digital input, at most for so long.",
+            show_default="time",
+        ),
+    ] = None,
     pull: Pull = None,
     json: Json = False,
 ) -> None:
     """Choose the configurations that tell most, in a measuring order, and say how accurate the result will be.
 
-    Without a device every target on the robot's tool is measured at each of them. Writes PLAN.csv and PLAN.html.
+    Without a device every target on the robot's tool is measured at each of them. Writes a CSV file, its page and the
+    ways between; with --program a folder with these, a program that drives the plan, and a sheet.
     """
     from truearm.units import sized_si
 
@@ -121,6 +155,7 @@ def plan(
 
         beside: dict[str, object] = {"objective": objective, "accurate_at": accurate_at, "region": region}
         beside |= {"tools": tools, "frames": frames, "candidates_from": candidates_from, "constraints": constraints}
+        beside |= {"program": program, "approach": approach or None, "speed": speed, "dwell": dwell, "wait": wait}
         refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
         with progress() as say:
             pairs = plan_inclinometers(
@@ -174,15 +209,33 @@ def plan(
             no_floor=no_floor,
             clearance=None if clearance is None else sized_si(clearance, "mm", parameter="clearance"),
             home=read_seed(robot, home, joints, "home"),
+            program=program,
+            approach=approach,
+            speed=_speed(speed),
+            dwell=dwell,
+            wait=wait,
             command=command_line(),
             progress=say,
         )
     if json:
         print_json(planned.summary())
-    else:
-        print_record(planned)
+        return
+    print_record(planned)
+    if planned.program is None:
         ways = "" if planned.tour is None else f", {out.with_name(f'{out.stem}-ways.csv')}"
         print_line(f"Written: {out}, {out.with_suffix('.html')}{ways}")
+    else:
+        print_line(f"Written to {out}: {', '.join(planned.contents())}")
+
+
+def _speed(text: str | None) -> list[float] | None:
+    """Return speed [m/s] and share of a text in mm/s and percent."""
+    from truearm.units import sized_si
+
+    if text is None:
+        return None
+    speed, *shares = read_numbers(text, "speed", "mm/s, and percent of the joints' speed: 250,10")
+    return [sized_si(speed, "mm", parameter="speed"), *(share / 100.0 for share in shares)]
 
 
 def _poses(text: str) -> Any:

@@ -21,6 +21,7 @@ from truearm.jobs.arguments import (
     device_argument,
     file_for,
     files_of,
+    folder_beside,
     gravity_argument,
     joints_argument,
     payload_argument,
@@ -31,10 +32,11 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.driving import cell_argument, finder_argument
+from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
-from truearm.modeling.parts import Payload
+from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.measurement_plan import (
     ERROR,
@@ -48,6 +50,7 @@ from truearm.planning.constraints.constraints import Constraints, read_constrain
 from truearm.planning.driving.joint_window import on_principal_turn
 from truearm.planning.driving.touring import tour_of, unreached
 from truearm.results.plan import PAGE, Plan
+from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS
 from truearm.results.tour_files import ways_beside
 
 
@@ -75,6 +78,11 @@ def plan(
     no_floor: bool = False,
     clearance: float | None = None,
     home: Sequence[float] | None = None,
+    program: str | None = None,
+    approach: bool = False,
+    speed: Sequence[float] | None = None,
+    dwell: float | None = None,
+    wait: str | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Plan:
@@ -87,7 +95,8 @@ def plan(
     poses
         How many configurations to choose; ``auto`` lets O1 decide.
     out
-        CSV file to write, and a page beside it; None writes nothing, see :meth:`Plan.save`.
+        CSV file to write, and a page beside it; with a program a folder for both, the program and a sheet. None writes
+        nothing, see :meth:`Plan.save`.
     candidates_from
         Readings, or a canonical CSV file, among whose configurations to choose; None draws them within the limits.
     objective
@@ -132,6 +141,19 @@ def plan(
     home
         The safe configuration in which the arm starts and ends, by the model [rad; m for prismatic joints]; None to
         find one.
+    program
+        Language of a program that drives the plan: ``rapid``, ``krl``, ``fanuc``, ``urscript``, ``inform`` or ``val3``;
+        None writes none.
+    approach
+        Whether every joint comes to each configuration from one side, by a stop a little before it.
+    speed
+        Of no target and of the flange it is higher [m/s], and the largest share of the joints' speed; None for
+        (0.25, 0.1).
+    dwell
+        How long the robot stands in each configuration [s]; None for 2 s.
+    wait
+        What it waits for after that: nothing more (``time``), ``operator``, who starts the program again, or a digital
+        input with the longest time (``input 3,300s``), after which the program pauses. None for ``time``.
     command
         How to run it again, for the page; None writes the call in Python.
     progress
@@ -144,7 +166,8 @@ def plan(
     """
     progress_argument(progress)
     read = (robot, candidates_from, constraints, accurate_at, tools, frames)
-    table = None if out is None else _files(out, *read)
+    wanted_program = program_wanted(program, approach, speed, dwell, wait)
+    table = None if out is None else _files(out, *read) if wanted_program is None else _folder(out, *read)
     count = _count(poses)
     if objective is not None:
         choice_argument(objective, "objective", dict.fromkeys((*INDICES, ERROR)))
@@ -185,20 +208,30 @@ def plan(
         no_floor=no_floor,
         clearance=clearance,
         home=home,
+        program=program,
+        approach=approach,
+        speed=speed,
+        dwell=dwell,
+        wait=wait,
     )
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
+    if wanted_program is not None:
+        wanted_program.check(carrying, None if instrument is None else instrument.name)
     where = str(constraints) if isinstance(constraints, str | Path) else "constraints"
     cell = cell_argument(carrying, rules, where, floor, no_floor, clearance)
     # What was measured was reached: such configurations are checked where that is asked for.
-    driven = candidates_from is None or no_floor or any(given is not None for given in (floor, clearance, home))
+    driven = candidates_from is None or wanted_program is not None or no_floor
+    driven = driven or any(given is not None for given in (floor, clearance, home))
     labels, readings, own, finder = None, None, bool(carrying.targets), None
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
         own = True
     elif candidates_from is not None:
         data = readings_argument(carrying, candidates_from, "candidates_from")
+        if wanted_program is not None:
+            wanted_program.check_readings(data)
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
         own = own or bool(data.has_position.any())
     else:
@@ -238,13 +271,19 @@ def plan(
         progress("looking for ways that keep clear")
         lost = unreached(finder, made.joints, made.before)
         if not lost:
-            tour = tour_of(finder, made.joints, made.labels, made.before)
+            stops = made.before if wanted_program is None or wanted_program.approach else None
+            tour = tour_of(finder, made.joints, made.labels, stops)
             break
         left = np.delete(left, made.chosen[lost])
     made = replace(made, chosen=left[made.chosen])
     words = "" if goal is None else goal.words
     planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
+    if wanted_program is not None:
+        weighed = payload is not None or carrying.payload != NO_PAYLOAD
+        planned = with_program(planned, wanted_program, carrying, weighed=weighed)
     if table is not None:
+        if planned.program is not None:
+            refuse_other_programs(table, planned.program.files, *read)
         progress("writing the files")
         planned.save(table)
     return planned
@@ -258,6 +297,15 @@ def _files(out: object, *read: object) -> Path:
     file_for(table.with_suffix(PAGE), *read)
     file_for(ways_beside(table), *read)
     return table
+
+
+def _folder(out: object, *read: object) -> Path:
+    """Return the folder for a plan with its program."""
+    if isinstance(out, str | Path) and Path(out).suffix.lower() in (".csv", PAGE):
+        raise InputError(
+            "a plan with a program needs a folder", parameter="out", came=str(out), cure="Name a folder, or no program."
+        )
+    return folder_beside((TABLE, PLAN_PAGE, WAYS, SHEET), TABLE, out, *read)
 
 
 def _rules(constraints: object) -> Constraints | None:

@@ -14,9 +14,10 @@ from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.choosing.prediction import There
 from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
+from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.results.record import Record, joints_lines
 from truearm.results.tour_files import tour_summary, ways_beside
-from truearm.writing import output_file, write_files
+from truearm.writing import output_file, output_folder, write_files
 
 #: What the page beside a plan ends with.
 PAGE: Final = ".html"
@@ -42,6 +43,8 @@ class Plan(Record):
         Where the robot shall be accurate, in words; empty for everywhere.
     tour
         How the configurations are driven, each way checked; None where nothing was checked.
+    program
+        What drives it; None where no program was asked for.
     """
 
     made: MeasurementPlan
@@ -51,6 +54,7 @@ class Plan(Record):
     joints_are: JointsOf = "model"
     accurate_at: str = ""
     tour: Tour | None = None
+    program: PlanProgram | None = None
 
     @property
     def joints(self) -> Array:
@@ -131,6 +135,7 @@ class Plan(Record):
             **({} if self.tour is None else {"ways": tour_summary(self.tour, made.robot, self.joints_are)}),
             **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
             "seconds": made.seconds,
+            **({} if self.program is None else {"program": self.program.summary()}),
             "prediction": {
                 "floor_mm": prediction.floor * 1e3,
                 "planned_mm": prediction.planned * 1e3,
@@ -162,10 +167,28 @@ class Plan(Record):
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
-        return [*text, *self.driving, *self.answer, *joints_lines(self.joints_are)]
+        driven = [] if self.program is None else self.program.lines()
+        return [*text, *self.driving, *self.answer, *joints_lines(self.joints_are), *driven]
+
+    def contents(self) -> dict[str, str]:
+        """Return the texts of all files of a plan with a program, by their names."""
+        from truearm.reporting.plan_report import plan_html
+        from truearm.reporting.plan_sheet import plan_sheet
+
+        assert self.program is not None
+        assert self.tour is not None
+        return {
+            TABLE: plan_csv(self.made, self.joints_are),
+            PLAN_PAGE: plan_html(self),
+            WAYS: tour_csv(self.tour, self.made.robot, self.joints_are),
+            SHEET: plan_sheet(self),
+            **self.program.files,
+        }
 
     def save(self, file: str | Path) -> tuple[Path, ...]:
         """Write the plan as CSV, a page with the same name that ends in ``.html``, and the ways if they were checked.
+
+        A plan with a program is written into a folder, with the program and a sheet for the operator.
 
         Returns
         -------
@@ -173,6 +196,11 @@ class Plan(Record):
         """
         from truearm.reporting.plan_report import plan_html
 
+        if self.program is not None:
+            contents = self.contents()
+            folder = output_folder(file, contents, self.inputs, "file")
+            write_files(folder, contents, self.command)
+            return tuple(folder / name for name in contents)
         table = output_file(file, self.inputs)
         if table.suffix == PAGE:
             raise InputError("the plan is a CSV file", parameter="file", came=table.name, allowed="PLAN.csv")

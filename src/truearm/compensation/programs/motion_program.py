@@ -7,11 +7,13 @@ joints' speed, or, in languages that say no share, a speed of the tip.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
 from truearm.compensation.programs.new_targets import NewTargets, ascii_only
+from truearm.compensation.programs.numbers import written
 
 #: What a target is written as.
 TargetKind = Literal["joints", "pose"]
@@ -33,11 +35,17 @@ class JointMove:
         Of the fastest that the joints go, 0 to 1.
     speed
         Of the tip, for languages that say the speed of joint motions by it [m/s].
+    seconds
+        How long it takes, for languages that can say it and no share [s]; None for as long as the speeds make it.
+    turning
+        Angular velocity of the tip, beside `speed` [rad/s].
     """
 
     target: int
     share: float
     speed: float
+    seconds: float | None = None
+    turning: float = math.radians(500.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +112,73 @@ class Remark:
     text: str
 
 
-ProgramStep = JointMove | StraightMove | CircleMove | Wait | Remark
+@dataclass(frozen=True, slots=True)
+class InputWait:
+    """The robot stands still until a digital input was off and is on; where that takes too long, the program pauses.
+
+    An input that is still on from the time before does not count.
+
+    Attributes
+    ----------
+    input
+        Its number, or its name in languages that have names.
+    seconds
+        How long it waits at most [s].
+    label
+        What is waited for, for the message.
+    """
+
+    input: str
+    seconds: float
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """The program pauses until the operator starts it again.
+
+    Attributes
+    ----------
+    label
+        Where it pauses, for the message.
+    """
+
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What the controller is told of what is mounted on its flange, in the axes of that flange.
+
+    Attributes
+    ----------
+    name
+        What the tip is called; empty for the flange.
+    tip
+        The point whose speed counts [m].
+    mass
+        [kg].
+    cog
+        Centre of gravity [m].
+    """
+
+    name: str
+    tip: tuple[float, float, float]
+    mass: float
+    cog: tuple[float, float, float]
+
+    @property
+    def tip_mm(self) -> tuple[str, ...]:
+        """The tip in mm."""
+        return tuple(number(1e3 * v, 3) for v in self.tip)
+
+    @property
+    def cog_mm(self) -> tuple[str, ...]:
+        """The centre of gravity in mm."""
+        return tuple(number(1e3 * v, 3) for v in self.cog)
+
+
+ProgramStep = JointMove | StraightMove | CircleMove | Wait | Remark | InputWait | Pause
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +191,13 @@ class MotionProgram(NewTargets):
         What a person should know who opens the program.
     steps
         In their order.
+    carried
+        What the controller is told to carry; None tells it nothing: moves are of the flange.
     """
 
     notes: tuple[str, ...]
     steps: tuple[ProgramStep, ...]
+    carried: Carried | None = None
 
     @property
     def comments(self) -> tuple[str, ...]:
@@ -155,7 +232,7 @@ class MotionProgram(NewTargets):
 
 def number(value: float, decimals: int) -> str:
     """Return a number with so many decimals at most, without zeros at its end."""
-    text = f"{value:.{decimals}f}"
+    text = written(value, decimals)
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 

@@ -1,7 +1,8 @@
 """FANUC TP programs in ASCII with stops, waits and circles.
 
 Source: FANUC, operator's manual of the controllers R-30iA and R-30iB, program instructions: J, L and C with FINE and
-CNT, and WAIT. The second position of a circle stands on a line of its own.
+CNT, WAIT with TIMEOUT, PAUSE and PAYLOAD. The second position of a circle stands on a line of its own. What a payload
+schedule holds is not said in programs. ``$WAITTMOUT`` is in hundredths of a second.
 """
 
 from __future__ import annotations
@@ -10,8 +11,10 @@ from truearm.compensation.programs.fanuc_ls.forms import JOINTS, POSE
 from truearm.compensation.programs.fanuc_ls.new import config
 from truearm.compensation.programs.motion_program import (
     CircleMove,
+    InputWait,
     JointMove,
     MotionProgram,
+    Pause,
     Remark,
     StraightMove,
     TargetKind,
@@ -27,6 +30,9 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     numbers = {place: count for count, place in enumerate(program.places(), 1)}
     steps = [f"  !{line}    ;" for line in program.comments]
     steps += ["  UFRAME_NUM=0    ;", "  UTOOL_NUM=0    ;"]
+    if program.carried is not None:
+        steps += ["  !PAYLOAD[1] must hold this load    ;", "  PAYLOAD[1]    ;"]
+    late = 0
     for step, near in program.zoned():
         end = "CNT100" if near else "FINE"
         match step:
@@ -41,6 +47,20 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
                 steps.append(f"  WAIT{step.seconds:7.2f}(sec)    ;")
             case Remark():
                 steps.append(f"  !{step.text}    ;")
+            case InputWait():
+                late += 1
+                steps += [
+                    f"  $WAITTMOUT={round(100.0 * step.seconds)}    ;",
+                    f"  WAIT DI[{step.input}]=OFF TIMEOUT,LBL[{2 * late - 1}]    ;",
+                    f"  WAIT DI[{step.input}]=ON TIMEOUT,LBL[{2 * late - 1}]    ;",
+                    f"  JMP LBL[{2 * late}]    ;",
+                    f"  LBL[{2 * late - 1}]    ;",
+                    f"  !{step.label}: no signal    ;",
+                    "  PAUSE    ;",
+                    f"  LBL[{2 * late}]    ;",
+                ]
+            case Pause():
+                steps += ["  !Measure, then start again    ;", "  PAUSE    ;"]
     numbered = [f"{line:4}:{text}" for line, text in enumerate(steps, 1)]
     head = [f"/PROG  {name}", "/ATTR", f"LINE_COUNT\t= {len(numbered)};", "DEFAULT_GROUP\t= 1,*,*,*,*;", "/MN"]
     positions = [_position(program, kind, row, count) for (kind, row), count in numbers.items()]

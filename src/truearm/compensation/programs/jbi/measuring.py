@@ -1,9 +1,9 @@
 """Yaskawa jobs with stops, waits and circles.
 
-Source: Yaskawa, INFORM language manuals of the controllers DX100, DX200 and FS100: MOVJ, MOVL, MOVC, TIMER, and the
-tags VJ, V and PL. The first MOVC of a row is reached on a line: it stands where the arc begins. Between two arcs a MOVL
-stands at the point where they meet, as the operator's manuals are remembered to ask for; the tag FPT in its place is
-known to newer controllers alone.
+Source: Yaskawa, INFORM language manuals of the controllers DX100, DX200 and FS100: MOVJ, MOVL, MOVC, TIMER, WAIT,
+PAUSE, and the tags VJ, V and PL. The first MOVC of a row is reached on a line: it stands where the arc begins. Between
+two arcs a MOVL stands at the point where they meet, as the operator's manuals are remembered to ask for; the tag FPT in
+its place is known to newer controllers alone. Tool and load are in the tool files of the controller, not in jobs.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from truearm.compensation.programs.jbi.forms import ANGLES, POSE
 from truearm.compensation.programs.jbi.new import DATE, rconf
 from truearm.compensation.programs.motion_program import (
     CircleMove,
+    InputWait,
     JointMove,
     MotionProgram,
+    Pause,
     Remark,
     StraightMove,
     Wait,
     number,
-    percent,
 )
 
 
@@ -47,7 +48,7 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
         end = "" if near else " PL=0"
         match step:
             case JointMove():
-                steps.append(f"MOVJ {position('joints', step.target)} VJ={percent(step.share)}.00{end}")
+                steps.append(f"MOVJ {position('joints', step.target)} VJ={max(100.0 * step.share, 0.01):.2f}{end}")
             case StraightMove():
                 steps.append(f"MOVL {position('pose', step.target)} V={_speed(step.speed)}{end}")
             case CircleMove():
@@ -61,10 +62,17 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
                 steps.append(f"TIMER T={number(step.seconds, 2)}")
             case Remark():
                 steps.append(f"'{step.text}")
+            case InputWait():
+                for state, other in (("OFF", "ON"), ("ON", "OFF")):
+                    steps.append(f"WAIT IN#({step.input})={state} T={step.seconds:.2f}")
+                    steps += [f"'{step.label}: no signal", f"PAUSE IF IN#({step.input})={other}"]
+            case Pause():
+                steps += ["'Measure, then start again", "PAUSE"]
         arc = isinstance(step, CircleMove)
     lines = ["/JOB", f"//NAME {name}", "//POS", f"///NPOS {count},0,0,0,0,0", "///TOOL 0", *positions]
     lines += ["//INST", f"///DATE {DATE}", "///ATTR SC,RW", "///GROUP1 RB1", "NOP"]
-    lines += [*(f"'{line}" for line in program.comments), *steps, "END", ""]
+    told = program.comments if program.carried is None else (*program.comments, "Tool file 0 must hold this load")
+    lines += [*(f"'{line}" for line in told), *steps, "END", ""]
     return {f"{name}.JBI": "\n".join(lines)}
 
 

@@ -1,17 +1,21 @@
 """KRL programs with stops, waits and circles.
 
 Source: KUKA System Software 8, operating and programming instructions for system integrators: PTP, LIN, CIRC, WAIT SEC,
-``$VEL_AXIS``, ``$VEL``, ``$APO``, ``$ORI_TYPE``, ``$CIRC_TYPE``. ``BAS(#INITMOV,0)`` gives accelerations their usual
-values. WAIT stops the advance run, so that the robot stands before it.
+``$VEL_AXIS``, ``$VEL``, ``$APO``, ``$ORI_TYPE``, ``$CIRC_TYPE``, ``$LOAD``, HALT. ``BAS(#INITMOV,0)`` gives
+accelerations their usual values. WAIT stops the advance run, so that the robot stands before it. A timer that begins at
+minus so many ms raises its flag when they are over.
 """
 
 from __future__ import annotations
 
 from truearm.compensation.programs.krl.aggregates import JOINTS, POSE
 from truearm.compensation.programs.motion_program import (
+    Carried,
     CircleMove,
+    InputWait,
     JointMove,
     MotionProgram,
+    Pause,
     Remark,
     StraightMove,
     Wait,
@@ -20,12 +24,14 @@ from truearm.compensation.programs.motion_program import (
 )
 
 _NAMES = ("X", "Y", "Z", "A", "B", "C")
+#: Which of the controller's timers counts the time that an input is waited for.
+_TIMER = 20
 
 
 def motion_program(program: MotionProgram) -> dict[str, str]:
     """Return a ``.src`` file: joint motions have their share ($VEL_AXIS), others their speed ($VEL.CP)."""
     lines = [f"DEF {program.name} ( )", *(f"  ; {line}" for line in program.comments)]
-    lines += ["  BAS (#INITMOV,0)", "  $TOOL = {X 0,Y 0,Z 0,A 0,B 0,C 0}", "  $BASE = {X 0,Y 0,Z 0,A 0,B 0,C 0}"]
+    lines += ["  BAS (#INITMOV,0)", *_carried(program.carried), "  $BASE = {X 0,Y 0,Z 0,A 0,B 0,C 0}"]
     lines += ["  $ORI_TYPE = #VAR", "  $CIRC_TYPE = #BASE", "  $ADVANCE = 3"]
     said: dict[str, str] = {}
 
@@ -56,4 +62,27 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
                 lines.append(f"  WAIT SEC {number(step.seconds, 3)}")
             case Remark():
                 lines.append(f"  ; {step.text}")
+            case InputWait():
+                lines += [
+                    f"  $TIMER_STOP[{_TIMER}] = TRUE",
+                    f"  $TIMER[{_TIMER}] = -{round(1e3 * step.seconds)}",
+                    f"  $TIMER_STOP[{_TIMER}] = FALSE",
+                    f"  WAIT FOR (NOT $IN[{step.input}]) OR $TIMER_FLAG[{_TIMER}]",
+                    f"  WAIT FOR $IN[{step.input}] OR $TIMER_FLAG[{_TIMER}]",
+                    f"  IF $TIMER_FLAG[{_TIMER}] THEN",
+                    f"    ; {step.label}: no signal",
+                    "    HALT",
+                    "  ENDIF",
+                ]
+            case Pause():
+                lines += [f"  ; {step.label}: measure, then start again", "  HALT"]
     return {f"{program.name}.src": "\n".join([*lines, "END", ""])}
+
+
+def _carried(carried: Carried | None) -> list[str]:
+    turned = "A 0,B 0,C 0"
+    if carried is None:
+        return [f"  $TOOL = {{X 0,Y 0,Z 0,{turned}}}"]
+    tip, cog = (",".join(f"{a} {v}" for a, v in zip("XYZ", p, strict=True)) for p in (carried.tip_mm, carried.cog_mm))
+    load = f"{{M {number(carried.mass, 3)},CM {{{cog},{turned}}},J {{X 0,Y 0,Z 0}}}}"
+    return [f"  $TOOL = {{{tip},{turned}}}", f"  $LOAD = {load}"]

@@ -1,7 +1,8 @@
 """URScript programs with stops, waits and circles.
 
-Source: Universal Robots, The URScript programming language: movej, movel, movec, sleep, set_tcp. movec takes the
-orientation evenly from that of its start to that of its end.
+Source: Universal Robots, The URScript programming language: movej, movel, movec, sleep, set_tcp, set_payload,
+get_standard_digital_in, popup. movec takes the orientation evenly from that of its start to that of its end. A popup
+that blocks pauses the program until the operator goes on.
 """
 
 from __future__ import annotations
@@ -10,9 +11,12 @@ import math
 from typing import Final
 
 from truearm.compensation.programs.motion_program import (
+    Carried,
     CircleMove,
+    InputWait,
     JointMove,
     MotionProgram,
+    Pause,
     Remark,
     StraightMove,
     Wait,
@@ -23,11 +27,14 @@ from truearm.compensation.programs.urscript.program import JOINTS, POSE
 #: What 100 % of the joints' speed is taken for, as URScript says no share [rad/s].
 FASTEST: Final = math.radians(120.0)
 
+#: How often an input is looked at [s].
+_LOOKING: Final = 0.02
+
 
 def motion_program(program: MotionProgram) -> dict[str, str]:
     """Return a script; accelerations are those of URScript where none are stated: 1.4 rad/s^2 and 1.2 m/s^2."""
     lines = [*(f"# {line}" for line in program.comments), f"def {program.name}():"]
-    lines.append("  set_tcp(p[0, 0, 0, 0, 0, 0])")
+    lines += _carried(program.carried)
 
     def pose(row: int) -> str:
         return f"p[{', '.join(program.pose(row, POSE))}]"
@@ -46,4 +53,32 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
                 lines.append(f"  sleep({number(step.seconds, 3)})")
             case Remark():
                 lines.append(f"  # {step.text}")
+            case InputWait():
+                lines += [
+                    f"  looks = {round(step.seconds / _LOOKING)}",
+                    *_looked(step.input, "True"),
+                    *_looked(step.input, "False"),
+                    "  if (looks <= 0):",
+                    f'    popup("{step.label}: no signal", blocking=True)',
+                    "  end",
+                ]
+            case Pause():
+                lines.append(f'  popup("{step.label}: measure, then go on", blocking=True)')
     return {f"{program.name}.script": "\n".join([*lines, "end", "", f"{program.name}()", ""])}
+
+
+def _carried(carried: Carried | None) -> list[str]:
+    if carried is None:
+        return ["  set_tcp(p[0, 0, 0, 0, 0, 0])"]
+    tip, cog = (", ".join(number(v, 6) for v in point) for point in (carried.tip, carried.cog))
+    return [f"  set_tcp(p[{tip}, 0, 0, 0])", f"  set_payload({number(carried.mass, 3)}, [{cog}])"]
+
+
+def _looked(signal: str, state: str) -> list[str]:
+    """Return a loop that ends when an input has left a state, or there are no more looks."""
+    return [
+        f"  while (looks > 0 and get_standard_digital_in({signal}) == {state}):",
+        f"    sleep({_LOOKING})",
+        "    looks = looks - 1",
+        "  end",
+    ]

@@ -1,0 +1,259 @@
+"""The measuring program of a plan: every configuration under its label, from the safe one and back to it.
+
+Joints go evenly, all at once, as the ways were checked. How fast the joints of an arm go at 100 % is rarely known, so
+both limits are kept for all arms between slow and fast ones: the speed of the tip for the fastest, where a language
+says shares, and the share of the joints' speed for the slowest, where it says times or speeds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from truearm.compensation.programs.motion_program import (
+    Carried,
+    InputWait,
+    JointMove,
+    MotionProgram,
+    Pause,
+    ProgramStep,
+    Remark,
+    Wait,
+    number,
+)
+from truearm.compensation.programs.urscript.measuring import FASTEST
+from truearm.modeling.chain import Array
+from truearm.modeling.inverse.kinematics import reach
+from truearm.modeling.robot import Robot
+from truearm.planning.driving.tour import Stop, Tour
+
+#: Name of the program; every language takes it.
+PROGRAM: Final = "MEASURE"
+#: What stands before the label of a configuration in its comment.
+MEASURED: Final = "Measure"
+#: Labels of as many characters fit into every comment of every language.
+LONGEST_LABEL: Final = 21
+#: At 100 % no joint of an arm is faster than this: of the first three, and of the others [rad/s], nor do they turn the
+#: stretched arm faster [m/s]. Above what ROS-Industrial's packages have for some of the fastest: KUKA KR 3 R540, FANUC
+#: LR Mate 200iD, Yaskawa GP7, Staubli TX2-60.
+_FAST: Final = ((math.radians(600.0), 12.0), (math.radians(1600.0), math.radians(2500.0)))
+#: At 100 % no joint is slower, of an arm of this length stretched [m] and of longer ones [rad/s]: assumed.
+_SLOW: Final = (2.0, math.radians(100.0), math.radians(50.0))
+#: The same of sliding joints: the slowest and the fastest [m/s].
+_SLIDING: Final = (0.2, 5.0)
+#: While it speeds up and slows down, a robot is slower than on average, by less than so long [s].
+_RAMPS: Final = 0.5
+#: Ways are looked at in steps of no more [rad or m].
+_STEP: Final = math.radians(3.0)
+#: The finest share that a language says; URScript says a speed instead.
+_FINEST: Final = {"KRL": 0.01, "FANUC LS": 0.01, "URScript": 1e-6}
+_FINEST_ELSEWHERE: Final = 1e-4
+_FIRST_JOINTS: Final = 3
+#: Share, speed of the tip, time and angular velocity of a joint motion.
+_Pace = tuple[float, float, float | None, float]
+
+
+@dataclass(frozen=True)
+class Driving:
+    """How a program drives through a plan.
+
+    Attributes
+    ----------
+    speed
+        Of no target and of the flange is higher [m/s].
+    share
+        Of the fastest that the joints go, at most.
+    dwell
+        How long the robot stands in each configuration [s].
+    wait
+        What it waits for after that: nothing more (``time``), a digital ``input``, or the ``operator``.
+    input
+        Number or name of the digital input.
+    longest
+        How long it is waited for [s].
+    """
+
+    speed: float = 0.25
+    share: float = 0.1
+    dwell: float = 2.0
+    wait: Literal["time", "input", "operator"] = "time"
+    input: str = ""
+    longest: float = 300.0
+
+    @property
+    def words(self) -> str:
+        """What it waits for, in words."""
+        if self.wait == "input":
+            return f"input {self.input}, {number(self.longest, 2)} s"
+        return self.wait
+
+
+def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark: str) -> tuple[MotionProgram, float]:
+    """Return the program that drives a tour, and the highest speed of a target or the flange in it [m/s].
+
+    That is higher than was asked for where a language has no share low enough for the fastest joints.
+
+    Parameters
+    ----------
+    tour
+        Whose ways were checked.
+    robot
+        With its targets and what it carries.
+    language
+        Its name; languages say speeds in different ways.
+    driving
+        How fast, and for what it waits.
+    mark
+        By which the plan is known, for a comment.
+    """
+    shown = robot.controller.from_model(tour.joints)
+    moves, fastest = [_first_move(robot, language, driving)], driving.speed
+    for k in range(len(shown) - 1):
+        move, speed = _move(robot, language, driving, tour.joints[k : k + 2], shown[k : k + 2])
+        moves.append(move)
+        fastest = max(fastest, speed)
+    targets: list[Array] = []
+    numbers: dict[bytes, int] = {}
+    steps: list[ProgramStep] = []
+    for stop, joints, move in zip(tour.stops, shown, moves, strict=True):
+        key = joints.tobytes()
+        if key not in numbers:
+            numbers[key] = len(targets)
+            targets.append(joints)
+        steps += [Remark(_called(stop)), JointMove(numbers[key], *move)]
+        if stop.kind == "measure":
+            steps += _stand(str(stop.label), driving)
+    carried = _carried(robot)
+    program = MotionProgram(
+        PROGRAM,
+        robot.name,
+        np.array(targets),
+        tuple(joint.kind == "prismatic" for joint in robot.joints),
+        None,
+        None,
+        _notes(robot, carried, driving, fastest, mark),
+        tuple(steps),
+        carried,
+    )
+    return program, fastest
+
+
+def _called(stop: Stop) -> str:
+    if stop.kind == "measure":
+        return f"{MEASURED} {stop.label}"
+    return {"home": "Home", "via": "On the way", "approach": "Approach"}[stop.kind]
+
+
+def _stand(label: str, driving: Driving) -> list[ProgramStep]:
+    stands: list[ProgramStep] = [Wait(driving.dwell)]
+    if driving.wait == "input":
+        stands.append(InputWait(driving.input, driving.longest, label))
+    elif driving.wait == "operator":
+        stands.append(Pause(label))
+    return stands
+
+
+def _first_move(robot: Robot, language: str, driving: Driving) -> _Pace:
+    """Return share, speed, time and angular velocity of the move to the safe configuration, from nobody knows where.
+
+    As if all joints turned the outstretched arm.
+    """
+    far = max(reach(robot, name) for name in (None, *(target.name for target in robot.targets)))
+    slow, fast = joint_rates(robot)
+    rate = FASTEST if language == "URScript" else float(fast.max())
+    share = min(driving.share, driving.speed / (rate * far))
+    turning = min(driving.share * float(slow.min()), driving.speed / far)
+    return _said(share, language), driving.speed, None, turning
+
+
+def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: Array) -> tuple[_Pace, float]:
+    """Return the pace of a move of all joints ``(2, joints)``, and the highest speed of a point of the arm [m/s].
+
+    The angular velocity is of no meaning where the time is said.
+    """
+    turned = np.abs(np.diff(shown, axis=0))[0]
+    rate = _fastest_point(robot, joints)
+    slow, fast = joint_rates(robot)
+    if language == "URScript":
+        fast = np.full(len(turned), FASTEST)
+    leading = float((turned / fast).max())
+    share = driving.share if rate <= 0 else min(driving.share, driving.speed * leading / rate)
+    seconds = max(float((turned / slow).max()) / driving.share, rate / driving.speed) + _RAMPS
+    said = _said(share, language)
+    speed = rate * said / leading if language != "RAPID" and leading > 0 else 0.0
+    return (said, driving.speed, math.ceil(100.0 * seconds) / 100.0, driving.share * float(slow.min())), speed
+
+
+def _said(share: float, language: str) -> float:
+    """Return a share as a language says it: no larger, unless it has none so small."""
+    finest = _FINEST.get(language, _FINEST_ELSEWHERE)
+    return max(math.floor(share / finest + 1e-9), 1) * finest
+
+
+def joint_rates(robot: Robot) -> tuple[Array, Array]:
+    """Return how fast the joints go at 100 %, at least and at most [rad/s, m/s], ``(joints,)`` each.
+
+    They are bounds for arms of its length, not its data.
+    """
+    length = max(reach(robot, None), 0.1)
+    turns = [joint.kind == "revolute" for joint in robot.joints]
+    slowest = _SLOW[1] if length <= _SLOW[0] else _SLOW[2]
+    fastest = [min(rate, along / length) for rate, along in _FAST]
+    slow = [slowest if turning else _SLIDING[0] for turning in turns]
+    fast = [fastest[k >= _FIRST_JOINTS] if turning else _SLIDING[1] for k, turning in enumerate(turns)]
+    return np.array(slow), np.array(fast)
+
+
+def shown_speed(speed: float) -> str:
+    """Return a speed in mm/s, rounded up."""
+    return number(math.ceil(1e4 * speed - 1e-6) / 10.0, 1)
+
+
+def _fastest_point(robot: Robot, joints: Array) -> float:
+    """Return how fast the fastest of the targets and the flange goes, in the whole way of a move [m]."""
+    count = max(2, math.ceil(float(np.abs(np.diff(joints, axis=0)).max()) / _STEP) + 1)
+    share = np.linspace(0.0, 1.0, count)[:, None]
+    along = (1.0 - share) * joints[0] + share * joints[1]
+    fastest = 0.0
+    for name in (None, *(target.name for target in robot.targets)):
+        steps = np.diff(robot.forward(along, target=name)[0], axis=0)
+        fastest = max(fastest, float(np.linalg.norm(steps, axis=1).max()) * (count - 1))
+    return fastest
+
+
+def _carried(robot: Robot) -> Carried:
+    """Return what the controller is told of the tool: its tip is the target that is farthest from the flange."""
+    flange = robot.controller.flange
+    there = {one.name: np.array(robot.tool_place(one.name).translation) for one in robot.targets}
+    name = max(there, key=lambda one: float(np.linalg.norm(there[one])), default="")
+
+    def of_controller(point: Array) -> tuple[float, float, float]:
+        x, y, z = ((point - np.array(flange.translation)) @ flange.rotation).tolist()
+        return x, y, z
+
+    tip = of_controller(there[name]) if name else (0.0, 0.0, 0.0)
+    return Carried(name, tip, robot.payload.mass, of_controller(np.array(robot.payload.cog)))
+
+
+def _notes(robot: Robot, carried: Carried, driving: Driving, fastest: float, mark: str) -> tuple[str, ...]:
+    def at(point: tuple[str, ...]) -> str:
+        return "X {} Y {} Z {} mm".format(*point)
+
+    return (
+        "Measuring program of a plan",
+        f"Robot {robot.name}",
+        f"Plan {mark}",
+        f"Tip: target {carried.name} at" if carried.name else "Tip: the flange",
+        at(carried.tip_mm),
+        f"Load {number(carried.mass, 3)} kg at",
+        at(carried.cog_mm),
+        f"At most {shown_speed(fastest)} mm/s and {number(100 * driving.share, 2)} %",
+        f"Dwell {number(driving.dwell, 2)} s, wait: {driving.words}",
+        "Not verified, no safety function",
+        "First run: step by step,",
+        "at reduced speed, nobody near",
+        "Go to Home by hand before it",
+    )

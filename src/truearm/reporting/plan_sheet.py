@@ -1,0 +1,81 @@
+"""The sheet that goes with a measuring program: what is measured in which order, and what to write down beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.compensation.programs.numbers import written
+from truearm.notices import worst_first
+from truearm.reporting.page import page
+from truearm.results.plan import Plan
+from truearm.results.plan_program import PlanProgram
+from truearm.units import from_si
+
+#: What a calibration needs to be repeated, and what explains it later.
+_NOTED: Final = (
+    "Date, place, operator",
+    "Robot: serial number, hours in use, controller and its software",
+    "Tool and load: what is mounted, mass, centre of gravity",
+    "Instrument: serial number, calibrated when, standard deviation of a reading",
+    "Instrument: where it stands, how it is fixed",
+    "Environment: temperature at the start and at the end, draught, sun, vibration",
+    "Warm-up: how long, with which motion",
+    "First run step by step at reduced speed: when, by whom",
+)
+
+#: A row has no more boxes for targets.
+_MOST_TICKED: Final = 8
+
+
+@dataclass(frozen=True)
+class _Row:
+    label: str
+    joints: list[str]
+    reads: str
+
+
+def plan_sheet(planned: Plan) -> str:
+    """Return the sheet of a plan that has a program."""
+    program, made = planned.program, planned.made
+    assert program is not None
+    reads = dict(zip(made.labels, made.reads, strict=True)) if made.reads else {}
+    return page(
+        "plan-sheet.html.jinja",
+        {},
+        title=f"Measuring {made.robot.title}",
+        subtitle=f"{', '.join(program.files)}: {len(program.tour.measured)} configurations, joint positions as the "
+        "controller shows them.",
+        words=program.answer,
+        notices=worst_first(program.warnings),
+        command=planned.command,
+        noted=_NOTED,
+        headings=[
+            f"J{k} [{'deg' if joint.kind == 'revolute' else 'mm'}]" for k, joint in enumerate(made.robot.joints, 1)
+        ],
+        targets=_ticked([target.name for target in made.robot.targets]),
+        reads=bool(reads),
+        rows=_rows(planned, program, reads),
+    )
+
+
+def _ticked(targets: list[str]) -> list[str]:
+    """Return what is ticked in a row: each target, or all together where they are many."""
+    return targets if len(targets) <= _MOST_TICKED else [f"all {len(targets)}"]
+
+
+def _rows(planned: Plan, program: PlanProgram, reads: dict[str, str]) -> list[_Row]:
+    robot = planned.made.robot
+    stops = program.tour.measured
+    shown = robot.controller.from_model(np.array([stop.joints for stop in stops]))
+    units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
+    return [
+        _Row(
+            str(stop.label),
+            [written(from_si(value, unit), 2) for value, unit in zip(values, units, strict=True)],
+            reads.get(str(stop.label), ""),
+        )
+        for stop, values in zip(stops, shown.tolist(), strict=True)
+    ]

@@ -1,0 +1,418 @@
+"""The program that drives a plan: read back by the own reader, its speeds and waits, and run by the moving twin."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.plan_tours import a_tour
+
+import truearm
+from truearm.compensation.path_program import BY_NAME
+from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program, shown_speed
+from truearm.compensation.programs.motion_program import LONGEST_COMMENT, JointMove, MotionProgram, Wait
+from truearm.compensation.programs.program import Program, Source
+from truearm.compensation.programs.urscript.measuring import FASTEST
+from truearm.library import load_robot
+from truearm.modeling.chain import Array
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.planning.driving.tour import Tour
+from truearm.simulation.moving.arm import DRIVES, MovingArm, last_moves
+from truearm.simulation.moving.interpolator import joint_move
+from truearm.simulation.truths import truth_twin
+
+ROBOTS = {
+    "rapid": "irb1600",
+    "krl": "kr5",
+    "fanuc-ls": "lrmate200ic",
+    "urscript": "ur5e",
+    "inform": "gp7",
+    "val3": "tx2_60",
+}
+WAITS = ("time", "input", "operator")
+
+
+@cache
+def toured(name: str, approach: bool) -> tuple[Robot, Tour]:
+    return a_tour(load_robot(ROBOTS[name]), approach=approach)
+
+
+@cache
+def made(name: str, driving: Driving | None = None, *, approach: bool = True) -> tuple[Robot, Tour, MotionProgram]:
+    robot, tour = toured(name, approach)
+    driving = driving or Driving(wait="input", input="3")
+    return robot, tour, plan_program(tour, robot, BY_NAME[name].name, driving, "0123456789ab")[0]
+
+
+def text_of(name: str, program: MotionProgram) -> str:
+    motion = BY_NAME[name].motion
+    assert motion is not None
+    return "\n".join(motion(program).values())
+
+
+def read_again(name: str, program: MotionProgram) -> Program:
+    motion = BY_NAME[name].motion
+    assert motion is not None
+    sources = [Source(Path(file), text) for file, text in motion(program).items()]
+    assert all(source.text.isascii() for source in sources)
+    return BY_NAME[name].read(sources)
+
+
+def commanded(found: Program, count: int) -> Array:
+    """Return the joint positions of all moves as the controller takes them ``(moves, count)`` [rad or m]."""
+    targets = [found.targets[move.target] for move in found.moves]
+    assert {target.form.kind for target in targets} == {"joints"}
+    return np.array([target.values[:count] for target in targets]) * targets[0].form.angle
+
+
+def visited(found: Program) -> list[str]:
+    """Return the comment above each move."""
+    called = []
+    for move in found.moves:
+        lines = found.sources[move.source].text.splitlines()[: move.line - 1]
+        called.append(
+            next(m[1] for line in reversed(lines) if (m := re.search(r"(Measure \S+|Home|On the way|Approach)", line)))
+        )
+    return called
+
+
+@pytest.mark.parametrize("wait", WAITS)
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_own_reader_finds_the_planned_joint_positions_under_their_labels(name: str, wait: str) -> None:
+    robot, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
+    found = read_again(name, program)
+    assert found.skipped == ()
+    assert not found.unknown
+    assert {move.kind for move in found.moves} == {"joint"}
+    digit = 0.5e-6 if name == "urscript" else np.radians(0.5e-4)
+    went = robot.controller.to_model(commanded(found, len(robot.joints)))
+    shown = robot.controller.from_model(tour.joints)
+    assert np.abs(commanded(found, len(robot.joints)) - shown).max() <= digit * (1 + 1e-9)
+    assert np.abs(went - tour.joints).max() <= 2.1 * digit  # one joint may count another
+    expected = {"home": "Home", "via": "On the way", "approach": "Approach"}
+    assert visited(found) == [expected.get(stop.kind, f"Measure {stop.label}") for stop in tour.stops]
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_no_output_is_set_and_no_mode_changed(name: str) -> None:
+    for wait in WAITS:
+        text = text_of(name, made(name, Driving(wait=wait, input="3"))[2])  # type: ignore[arg-type]
+        for words in (
+            r"\bSetDO\b",
+            r"\bSet\s",
+            r"\bReset\s",
+            r"\bPulse",
+            r"\$OUT",
+            r"\bDO\[",
+            r"\bRO\[",
+            r"\bDOUT\b",
+            "_out",
+            "dioSet",
+        ):
+            assert not re.search(words, text), words
+        for words in (
+            "ConfL",
+            "CirPathMode",
+            "VelSet",
+            "AccSet",
+            "$OV_PRO",
+            "OVERRIDE",
+            "SPEED_SLIDER",
+            "setMonitorSpeed",
+            "workingMode",
+        ):
+            assert words not in text
+
+
+STOPS = {
+    "rapid": r"MoveAbsJ j\d+,s\d+(\\T:=[\d.]+)?,fine,tMeasure;",
+    "krl": r"  PTP \{[^}]*\}",
+    "fanuc-ls": r"J P\[\d+\] \d+% FINE    ;",
+    "urscript": r"  movej\(\[[^]]*\], v=0\.\d{4}\)",
+    "inform": r"MOVJ C\d{5} VJ=\d+\.\d\d PL=0",
+    "val3": r"  movej\(jPath\[\d+\],flange,mJoint\)",
+}
+#: How long it stands, and how it waits for the operator.
+STANDS = {
+    "rapid": (r"WaitTime \\InPos,2;", r'TPWrite "P\d+: measure, then start again";\n    Stop;'),
+    "krl": (r"WAIT SEC 2\n", r"; P\d+: measure, then start again\n  HALT"),
+    "fanuc-ls": (r"WAIT   2\.00\(sec\)", r"!Measure, then start again    ;\n.*PAUSE    ;"),
+    "urscript": (r"sleep\(2\)", r'popup\("P\d+: measure, then go on", blocking=True\)'),
+    "inform": (r"TIMER T=2\n", r"'Measure, then start again\nPAUSE\n"),
+    "val3": (
+        r"waitEndMove\(\)\n  delay\(2\)",
+        r'userPage\(\)\n  putln\("P\d+: measure, press a key"\)\n  nKey=get\(\)',
+    ),
+}
+#: How it waits for input 3 in P001: until it is off, then until it is on; lines without their numbers and blanks.
+INPUTS = {
+    "rapid": """
+WaitDI di3,0\\MaxTime:=300\\TimeFlag:=late;
+IF NOT late WaitDI di3,1\\MaxTime:=300\\TimeFlag:=late;
+IF late THEN
+TPWrite "P001: no signal";
+Stop;
+ENDIF""",
+    "krl": """
+$TIMER_STOP[20] = TRUE
+$TIMER[20] = -300000
+$TIMER_STOP[20] = FALSE
+WAIT FOR (NOT $IN[3]) OR $TIMER_FLAG[20]
+WAIT FOR $IN[3] OR $TIMER_FLAG[20]
+IF $TIMER_FLAG[20] THEN
+; P001: no signal
+HALT
+ENDIF""",
+    "fanuc-ls": """
+$WAITTMOUT=30000    ;
+WAIT DI[3]=OFF TIMEOUT,LBL[1]    ;
+WAIT DI[3]=ON TIMEOUT,LBL[1]    ;
+JMP LBL[2]    ;
+LBL[1]    ;
+!P001: no signal    ;
+PAUSE    ;
+LBL[2]    ;""",
+    "urscript": """
+looks = 15000
+while (looks > 0 and get_standard_digital_in(3) == True):
+sleep(0.02)
+looks = looks - 1
+end
+while (looks > 0 and get_standard_digital_in(3) == False):
+sleep(0.02)
+looks = looks - 1
+end
+if (looks <= 0):
+popup("P001: no signal", blocking=True)
+end""",
+    "inform": """
+WAIT IN#(3)=OFF T=300.00
+'P001: no signal
+PAUSE IF IN#(3)=ON
+WAIT IN#(3)=ON T=300.00
+'P001: no signal
+PAUSE IF IN#(3)=OFF""",
+    "val3": """
+if watch(diMeasure==false,300)==false
+userPage()
+putln("P001: no signal, press a key")
+nKey=get()
+endIf
+if watch(diMeasure==true,300)==false
+userPage()
+putln("P001: no signal, press a key")
+nKey=get()
+endIf""",
+}
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_robot_stops_stands_and_waits_in_every_configuration(name: str) -> None:
+    stands, operator = STANDS[name]
+    for wait in WAITS:
+        _, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
+        text = text_of(name, program)
+        plain = re.sub(r"^ *(\d+:)? *", "", text, flags=re.M)
+        count = len(tour.measured)
+        assert len(re.findall(STOPS[name], text)) == len(tour.stops)
+        assert sum(isinstance(step, Wait) for step in program.steps) == count
+        assert len(re.findall(stands, text)) == count
+        assert len(re.findall(operator, text)) == (count if wait == "operator" else 0)
+        assert plain.count(INPUTS[name]) == (1 if wait == "input" else 0)
+        assert text.count("no signal") == (INPUTS[name].count("no signal") * count if wait == "input" else 0)
+    assert ("BasicIO-1\\%I3" in text_of(name, made(name)[2])) == (name == "val3")
+
+
+@pytest.mark.parametrize("name", ["fanuc-ls", "inform"])
+def test_comments_are_no_longer_than_controllers_take_them(name: str) -> None:
+    robot, tour = a_tour(load_robot(ROBOTS[name]), labels=tuple(f"{k}" * LONGEST_LABEL for k in range(4)))
+    for wait in WAITS:
+        driving = Driving(wait=wait, input="12345")  # type: ignore[arg-type]
+        text = text_of(name, plan_program(tour, robot, BY_NAME[name].name, driving, "0123456789ab")[0])
+        comments = re.findall(r"^ *\d+:  !(.*)    ;$|^'(.*)$", text, re.M)
+        assert len(comments) > 15
+        assert max(len(fanuc + inform) for fanuc, inform in comments) <= LONGEST_COMMENT
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_head_says_what_the_program_is(name: str) -> None:
+    robot, _, program = made(name)
+    text = text_of(name, program)
+    for words in (
+        f"Robot {robot.name}",
+        "Plan 0123456789ab",
+        "At most 250 mm/s and 10 %",
+        "Dwell 2 s, wait: input 3, 300 s",
+        "Not verified, no safety function",
+        "First run: step by step,",
+        "Go to Home by hand before it",
+    ):
+        assert len(words) <= 32
+        assert words in text
+    assert text == text_of(name, made(name)[2])
+
+
+def test_the_controller_is_told_of_the_tool_in_its_own_axes() -> None:
+    turned = Transform.from_matrix(
+        np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([0.0, 0.0, 0.01])
+    )
+    for name, words in {
+        "rapid": "PERS tooldata tMeasure:=[TRUE,[[20,-30,90],[1,0,0,0]],[1.5,[2,-1,30],[1,0,0,0],0,0,0]];",
+        "krl": "$LOAD = {M 1.5,CM {X 2,Y -1,Z 30,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}",
+        "fanuc-ls": "!PAYLOAD[1] must hold this load    ;",
+        "urscript": "set_tcp(p[0.02, -0.03, 0.09, 0, 0, 0])\n  set_payload(1.5, [0.002, -0.001, 0.03])",
+        "inform": "'Tool file 0 must hold this load",
+        "val3": "// The controller must hold this load",
+    }.items():
+        given = load_robot(ROBOTS[name])
+        given = given.with_frames(given.base, {"near": (0.0, 0.0, 0.02), "far": (0.03, 0.02, 0.1)})
+        given = replace(
+            given, controller=replace(given.controller, flange=turned), payload=Payload(1.5, (0.001, 0.002, 0.04))
+        )
+        robot, tour = a_tour(given)
+        program, _ = plan_program(tour, robot, BY_NAME[name].name, Driving(), "abc")
+        text = text_of(name, program)
+        assert words in text
+        assert "Tip: target far at" in text
+        assert "Load 1.5 kg at" in text
+        found = read_again(name, program)
+        if name in ("rapid", "urscript"):
+            (load,) = found.loads.values()
+            assert load.mass == 1.5
+            assert load.cog == pytest.approx((0.002, -0.001, 0.03))
+
+
+def test_nothing_on_the_flange_weighs_as_little_as_a_tool_may() -> None:
+    bare = load_robot("irb120")
+    robot, tour = a_tour(bare.with_frames(bare.base, {"tip": (0.0, 0.0, 0.1)}))
+    text = text_of("rapid", plan_program(tour, robot, "RAPID", Driving(), "abc")[0])
+    assert "[0.001,[0,0,0.001],[1,0,0,0],0,0,0]" in text
+
+
+def durations(name: str, text: str, shown: Array, rates: Array) -> list[float]:
+    """Return how long the moves take at least that the text says, of joints with these rates at 100 %."""
+    turned = np.abs(np.diff(shown, axis=0))
+    if name == "rapid":
+        return [float(time) - 0.5 for time in re.findall(r"\\T:=([\d.]+)", text)]
+    if name == "urscript":
+        speeds = [float(v) for v in re.findall(r"v=([\d.]+)", text)][1:]
+        return [float(way.max()) / v for way, v in zip(turned, speeds, strict=True)]
+    pattern = {
+        "krl": r"VEL_AXIS\[1\] = (\d+)|PTP",
+        "fanuc-ls": r"J P\[\d+\] (\d+)%",
+        "inform": r"VJ=([\d.]+)",
+        "val3": r"mJoint\.vel=([\d.]+)|movej",
+    }
+    shares, last = [], 0.0
+    for found in re.finditer(pattern[name], text):
+        last = float(found[1]) / 100 if found[1] else last
+        if not found[1] or name in ("fanuc-ls", "inform"):
+            shares.append(last)
+    return [float((way / rates).max()) / share for way, share in zip(turned, shares[1:], strict=True)]
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+@pytest.mark.parametrize("driving", [Driving(), Driving(speed=0.1, share=0.3), Driving(speed=2.0, share=0.05)])
+def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Driving) -> None:
+    robot, tour, program = made(name, driving)
+    shown = robot.controller.from_model(tour.joints)
+    slow, fast = joint_rates(robot)
+    rates = np.full(len(slow), FASTEST) if name == "urscript" else fast
+    found = durations(name, text_of(name, program), shown, rates)
+    assert len(found) == len(tour.stops) - 1
+    fastest = 0.0
+    for start, end, seconds in zip(tour.joints[:-1], tour.joints[1:], found, strict=True):
+        along = start + np.linspace(0.0, 1.0, 400)[:, None] * (end - start)
+        for target in robot.targets:
+            steps = np.linalg.norm(np.diff(robot.forward(along, target=target.name)[0], axis=0), axis=1)
+            speed = float(steps.max()) * 399 / seconds
+            fastest = max(fastest, speed)
+    shares = [step.share for step in program.steps if isinstance(step, JointMove)]
+    assert max(shares) <= driving.share + 1e-12
+    assert min(shares) > 0.0
+    _, told = plan_program(tour, robot, BY_NAME[name].name, driving, "abc")
+    assert f"At most {1e3 * told:.4g}"[:10] in text_of(name, program)
+    assert told == driving.speed or name in ("krl", "fanuc-ls")
+    assert fastest <= 1.01 * told
+    assert fastest > 0.05 * driving.speed
+    if name == "rapid":
+        joints = np.abs(np.diff(shown, axis=0)) / np.array(found)[:, None]
+        assert (joints <= driving.share * slow * (1 + 1e-6)).all()
+
+
+def test_the_rates_of_known_arms_lie_within_their_bounds() -> None:
+    known = {  # deg/s at 100 %, of the makers' data sheets
+        "irb120": (250, 250, 250, 320, 320, 420),
+        "kr5": (154, 154, 228, 343, 384, 721),
+        "lrmate200ic": (350, 350, 400, 450, 450, 720),
+        "ur5e": (180,) * 6,
+    }
+    for name, rates in known.items():
+        slow, fast = joint_rates(load_robot(name))
+        assert (slow < np.radians(rates)).all()
+        assert (fast > np.radians(rates)).all()
+
+
+def test_a_language_of_whole_percent_says_how_fast_that_is() -> None:
+    robot, tour = toured("krl", approach=True)
+    program, fastest = plan_program(tour, robot, "KRL", Driving(speed=0.02), "abc")
+    assert {step.share for step in program.steps if isinstance(step, JointMove)} == {0.01}
+    assert 0.05 < fastest < 0.3
+    assert f"At most {shown_speed(fastest)} mm/s" in text_of("krl", program)
+    finer, kept = plan_program(tour, robot, "INFORM", Driving(speed=0.02), "abc")
+    assert kept == 0.02
+    assert "VJ=0." in text_of("inform", finer)
+
+
+def test_the_first_move_is_slow_wherever_it_begins() -> None:
+    for name in BY_NAME:
+        _, _, program = made(name)
+        first, *others = (step for step in program.steps if isinstance(step, JointMove))
+        assert first.seconds is None
+        assert first.share <= min(step.share for step in others) + 1e-12 or name == "urscript"
+        assert first.turning < np.radians(20.0)
+
+
+def test_the_twin_driven_by_the_program_stands_in_all_configurations_in_order() -> None:
+    planned = truearm.plan("irb120", poses=8, candidates=60, clearance=0.02, program="rapid", approach=True, seed=1)
+    assert planned.program is not None
+    assert planned.tour is not None
+    robot, tour = planned.made.robot, planned.tour
+    found = BY_NAME["rapid"].read([Source(Path(file), text) for file, text in planned.program.files.items()])
+    text = found.sources[0].text
+    times = [float(v) for v in re.findall(r"\\T:=([\d.]+)", text)]
+    went = robot.controller.to_model(commanded(found, 6))
+    step = 4e-3
+    pieces, ends, now = [went[:1]], [], 1
+    for start, end, seconds in zip(went[:-1], went[1:], times, strict=True):
+        moved = joint_move(start, end, np.abs(end - start).max() / (seconds - 0.5), DRIVES.acceleration, step)
+        stood = np.repeat(end[None], round(1.0 / step), axis=0)
+        pieces += [moved, stood]
+        now += len(moved) + len(stood)
+        ends.append(now - 1)
+    command = np.concatenate(pieces)
+    position, velocity = DRIVES.servo.follow(command, step)
+    labels = {stop.label: stop.joints for stop in tour.measured}
+    seen = [
+        next((label for label, joints in labels.items() if np.abs(joints - position[k]).max() < 1e-5), None)
+        for k in ends
+    ]
+    assert [label for label in seen if label] == [stop.label for stop in tour.measured]
+    assert np.abs(velocity[ends]).max() < 1e-6
+    twin = truth_twin(robot, "tracker-triangular", np.random.default_rng(0))
+    arm = MovingArm(robot, None, twin, Transform((0.05, 0.02, 0.1)), robot.payload)
+    rows = [k for k, label in zip(ends, seen, strict=True) if label]
+    approach = last_moves(command)[rows]
+    assert (approach == 1.0).all()  # every joint comes from below
+    stood_at = arm.at_rest(position[rows], approach, np.full(len(rows), np.inf))[:, :3, 3]
+    place, turned = robot.forward(position[rows])
+    tips = place + turned @ np.array(arm.tip.translation)
+    apart = np.linalg.norm(np.diff(stood_at, axis=0), axis=1) - np.linalg.norm(np.diff(tips, axis=0), axis=1)
+    assert (np.abs(apart) < 5e-3).all()
+    assert np.abs(apart).max() > 1e-5  # the true arm is not quite the nominal one

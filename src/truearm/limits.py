@@ -89,6 +89,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
         20_000, "the path has too many samples", "samples", "Take a longer step in the file, or go faster."
     ),
     "candidates": Limit(50_000, "the number is out of range", "candidates"),
+    "keep_out": Limit(20, "there are too many boxes to keep out of", "boxes", "Give one box for several."),
     "trials": Limit(1_000_000, "the number is out of range", "trials"),
     "monte_carlo": Limit(100_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),

@@ -236,6 +236,7 @@ def test_what_cannot_be_driven_is_refused(given: dict[str, object], parameter: s
         ({"keep_out": {"table": {"x": [5, 1]}}}, "keep_out, table, x: the range is empty"),
         ({"keep_out": {"cage": {"x": [-900, 900], "y": [-900, 900], "z": [-100, 1500]}}}, "holds the base"),
         ({"keep_out": {"block": {"x": [250, 500], "y": [-200, 200], "z": [500, 900]}}}, "is not clear.*box 'block'"),
+        ({"keep_out": {str(k): {"x": [900, 950 + k]} for k in range(21)}}, "too many boxes.*'21 boxes'.*20 boxes or"),
         ({"limits": {2: [200, 300]}}, "the limits of joint 2 leave nothing.*'200 to 300 deg'.*-110 to 110"),
         ({"limits": {2: [100, 110], 3: [60, 70]}}, "no configuration was found|is not clear|not where the plan"),
     ],

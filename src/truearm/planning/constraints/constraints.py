@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from truearm.errors import InputError, refusals_at
 from truearm.files import read_yaml
+from truearm.limits import refuse_beyond
 from truearm.modeling.chain import Array
 from truearm.modeling.loads import joint_loads
 from truearm.modeling.postures import Postures
@@ -223,6 +224,7 @@ def keep_out(constraints: Constraints, where: str) -> dict[str, tuple[Array, Arr
     InputError
         For a range the wrong way round, and for a box without any.
     """
+    refuse_beyond("keep_out", len(constraints.keep_out), where=f"{where}, keep_out")
     corners = {}
     for name, box in constraints.keep_out.items():
         ranges = (box.x, box.y, box.z)

@@ -121,6 +121,24 @@ class CollisionCheck:
         names = np.array([room.what for room in self._rooms], dtype=object)
         return {str(name): np.asarray((rooms[names == name] >= self.need).all(axis=0)) for name in dict.fromkeys(names)}
 
+    def sifted(self, q: Array) -> tuple[Array, dict[str, int]]:
+        """Return those of joint positions ``(n, joints)`` where all is kept clear, and how many others what has cost.
+
+        What takes longest is asked last, of those that are left, so each is lost to one thing alone.
+        """
+        names = sorted({room.what for room in self._rooms}, key=lambda name: (name not in (FLOOR, LINKS), name))
+        lost = dict.fromkeys(names, 0)
+        found = [np.zeros((0, self.arm.joints))]
+        for part in _parts(q):
+            points, left = self.arm.points(part), np.arange(len(part))
+            for name in names:
+                rooms = [room for room in self._rooms if room.what == name]
+                clear = (self._measured(rooms, points[..., left]) >= self.need).all(axis=0)
+                lost[name] += int(np.sum(~clear))
+                left = left[clear]
+            found.append(part[left])
+        return np.concatenate(found), lost
+
     def words(self, number: int) -> str:
         """Say what comes near what."""
         return self._rooms[number].words if self._rooms else "nothing"

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.planning.driving.ways import WayFinder
 
-#: So many times as many as are wanted are drawn at most.
-_TIMES = 40
+#: So many times as many as are wanted are drawn at most, but no more than this where twice as many are enough.
+_TIMES: Final = 40
+_MOST: Final = 200_000
 
 
 def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.Generator) -> Array:
@@ -35,24 +38,23 @@ def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.G
     first = np.minimum(low + approach, (low + high) / 2.0)
     lost: dict[str, int] = {}
     straight, clear = np.zeros((0, len(low))), np.zeros((0, len(low)))
-    drawn = 0
-    while drawn < _TIMES * count and len(straight) < count:
+    drawn, most = 0, min(_TIMES * count, max(_MOST, 2 * count))
+    while drawn < most and len(straight) < count:
         q = rng.uniform(first, high, (count, len(low)))
         drawn += count
-        kept = finder.check.kept(q)
-        for name, keeps in kept.items():
-            lost[name] = lost.get(name, 0) + int(np.sum(~keeps))
-        q = q[np.all([*kept.values(), np.ones(count, bool)], axis=0)]
+        q, cost = finder.check.sifted(q)
+        for name, number in cost.items():
+            lost[name] = lost.get(name, 0) + number
         q = q[finder.check.ways(np.maximum(q - approach, low), q).clear]
         home = np.broadcast_to(finder.home, q.shape)
         ways = finder.check.ways(q, home).clear
         straight, clear = np.concatenate([straight, q[ways]]), np.concatenate([clear, q])
     if not len(clear):
-        cost = ", ".join(f"{name} {number}" for name, number in lost.items() if number)
+        told = ", ".join(f"{name} {number}" for name, number in lost.items() if number)
         raise InputError(
             "there is no configuration in which the arm keeps clear",
             parameter="clearance",
-            came=f"{drawn} drawn; rejected by {cost}",
+            came=f"{drawn} drawn; rejected by {told}",
             cure="Lower `clearance`, or see that the limits, the floor and boxes to keep out of leave the arm room.",
         )
     return straight[:count] if 2 * len(straight) >= len(clear) else clear[:count]

@@ -75,9 +75,7 @@ def table(
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
     joints: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Second file with the joint positions.", show_default="as the mapping says"
-        ),
+        typer.Option(metavar="FILE", help="Second file with the joint positions.", show_default="as the mapping says"),
     ] = None,
     joints_are: JointsAreText = None,
 ) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.bags.streams import JointStream, TargetStream
@@ -198,7 +199,7 @@ def seen_at(stills: Sequence[Standstill], stream: TargetStream, settle: float) -
 
 
 def _refuse_motion(
-    stills: Sequence[Standstill], stream: TargetStream, parts: Sequence[tuple[Array, Array | None, Array]]
+    stills: Sequence[Standstill], stream: TargetStream, parts: Sequence[tuple[Array, Array | None, NDArray[np.bool_]]]
 ) -> None:
     whole = [number for number, (part, _, _) in enumerate(parts) if len(part) >= _LEAST_SAMPLES]
     if not whole:

@@ -140,15 +140,15 @@ def _refuse_far_files(tie: Alignment, cube: Cube, read: Mapping[str, Any], where
             far[name] = refusal
     if not far:
         return
-    name, refusal = next(iter(far.items()))
+    name, first = next(iter(far.items()))
     if len(far) == len(read):
-        raise refusal
+        raise first
     raise InputError(
         "this file lies far from the cube of the tests, where others do not",
         parameter=name,
         where=read[name].source,
-        came=refusal.came,
-        allowed=refusal.allowed,
+        came=first.came,
+        allowed=first.allowed,
         cure="Check the units in its header, and that it was read in the same frame as the others.",
     )
 
@@ -199,12 +199,27 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
 
 
 def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
-    if made.comparison is None or not made.comparison.left_out:
+    beside = made.comparison
+    if beside is None:
         return ()
-    return (
-        Notice(
-            "alignment-differs",
-            f"The two results were tied to the base in different ways: {', '.join(made.comparison.left_out)} are not "
-            "compared.",
-        ),
-    )
+    notices = []
+    if beside.left_out:
+        notices.append(
+            Notice(
+                "alignment-differs",
+                f"The two results were tied to the base in different ways: {', '.join(beside.left_out)} are not "
+                "compared.",
+            )
+        )
+    if beside.unlike:
+        told = "; ".join(f"{', '.join(ids)}: {why}" for why, ids in beside.unlike.items())
+        notices.append(Notice("plan-differs", f"Values that are not alike are not compared. {told}."))
+    if beside.unknown_plan:
+        notices.append(
+            Notice(
+                "plan-unknown",
+                "The other result does not say what was planned, as it was written by an older version: whether poses, "
+                "paths, tip and limit band were the same cannot be told. Evaluate its files again.",
+            )
+        )
+    return tuple(notices)

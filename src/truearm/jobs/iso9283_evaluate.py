@@ -18,6 +18,7 @@ from truearm.jobs.arguments import (
     progress_argument,
     python_call,
 )
+from truearm.manifest import written_differently
 from truearm.measurement.readers.performance_poses import read_attained_poses, read_pushes
 from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
 from truearm.notices import Notice
@@ -115,6 +116,7 @@ def iso9283_evaluate(
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
     warnings = (
         *_warnings(found),
+        *_of_plan(plan_path),
         *said_of_pushes(planned, found.pushes, instrument),
         *said_of_drift(planned, found.drift),
     )
@@ -196,6 +198,23 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
             )
         )
     return (*notices, *said_of_streams(found))
+
+
+def _of_plan(path: Path) -> tuple[Notice, ...]:
+    """Return that a plan was changed since truearm wrote it, where its manifest says so."""
+    try:
+        if not written_differently(path):
+            return ()
+    except InputError:  # what stands beside it is no manifest of truearm
+        return ()
+    return (
+        Notice(
+            "plan-changed",
+            f"{path.name} was changed since truearm wrote it, and programs and sheet beside it are not those of this "
+            "plan. Values are held against what it says now.",
+            "note",
+        ),
+    )
 
 
 def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:

@@ -18,7 +18,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, Words, nearest_names
 from truearm.files import read_bytes
 from truearm.limits import refuse_beyond
 from truearm.measurement.performance.records import Names, Samples
@@ -95,6 +95,8 @@ def read_settling_samples(path: Path) -> Samples:
 
 def _read(path: Path, place: Place) -> Samples:
     content = read_bytes(path, "samples_size")
+    if b"\n" not in content:  # lines of old Macs end in a carriage return alone
+        content = content.replace(b"\r", b"\n")
     source = str(path)
     header, start = _header(content, source, place)
     refuse_beyond("samples_read", content.count(b"\n") - header.line, where=source)
@@ -206,7 +208,15 @@ def _not_utf8(source: str, line: int) -> InputError:
 
 def _cells(text: str, line: int, header: _Header) -> list[str]:
     """Return the cells of one row, quotes removed."""
-    cells = [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
+    try:
+        cells = [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
+    except csv.Error as error:
+        raise InputError(
+            "the cells of the row cannot be read",
+            where=f"{header.source}, line {line}",
+            came=Words("a carriage return within it" if "\r" in text.rstrip() else str(error)),
+            cure="Separate them by commas, end every line with a line feed, and close quotes.",
+        ) from error
     if len(cells) != header.count:
         raise InputError(
             "the row does not have as many cells as the header",

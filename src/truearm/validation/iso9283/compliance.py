@@ -44,7 +44,9 @@ class PushLine:
     displacement
         Along the force, from where the line is without force [m], ``(n,)``.
     slope
-        [m/N].
+        Along the force [m/N].
+    slopes
+        Of all three coordinates in the base frame, ``(3,)`` [m/N].
     line
         Of each push in the file, ``(n,)``.
     """
@@ -54,6 +56,7 @@ class PushLine:
     force: Array
     displacement: Array
     slope: float
+    slopes: Array
     line: NDArray[np.intp]
 
 
@@ -84,10 +87,10 @@ def evaluate_pushes(
         along["xyz".index(direction[1])] = 1.0 if direction[0] == "+" else -1.0
         way = pushes.position @ (turn.T @ along)
         mine = pushes.direction.are(direction)
-        found = [
-            _line(pushes, direction, int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle)), way, instrument.sigma)
-            for cycle in np.unique(pushes.cycle[mine])
+        chosen = [
+            (int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle))) for cycle in np.unique(pushes.cycle[mine])
         ]
+        found = [_line(pushes, direction, cycle, rows, way, turn, instrument.sigma) for cycle, rows in chosen]
         slopes = np.array([line.slope for line in found])
         # What a reading leaves open of a slope, as the steps spread over the forces.
         unknown = max((instrument.sigma / _spread(line.force) for line in found), default=0.0)
@@ -116,7 +119,9 @@ def _spread(force: Array) -> float:
     return float(np.linalg.norm(force - force.mean()))
 
 
-def _line(pushes: Pushes, direction: str, cycle: int, rows: NDArray[np.intp], way: Array, sigma: float) -> PushLine:
+def _line(
+    pushes: Pushes, direction: str, cycle: int, rows: NDArray[np.intp], way: Array, turn: Array, sigma: float
+) -> PushLine:
     rows = rows[np.lexsort((way[rows], pushes.force[rows]))]
     force = pushes.force[rows]
     if not _spread(force) > 1e-9 * max(float(force.max()), 1.0):
@@ -139,7 +144,8 @@ def _line(pushes: Pushes, direction: str, cycle: int, rows: NDArray[np.intp], wa
             came=f"{1e3 * slope:.4g} mm/N",
             cure="Check the sign of the direction, and how the instrument was tied to the robot's base.",
         )
-    return PushLine(direction, cycle, force, moved - rest, slope, pushes.line[rows])
+    slopes = about @ (pushes.position[rows] - pushes.position[rows].mean(axis=0)) @ turn.T / (about @ about)
+    return PushLine(direction, cycle, force, moved - rest, slope, slopes, pushes.line[rows])
 
 
 def _check(plan: PerformancePlan, pushes: Pushes, directions: tuple[str, ...]) -> None:

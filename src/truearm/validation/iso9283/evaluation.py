@@ -21,6 +21,7 @@ from truearm.validation.iso9283.missing import missing_places
 from truearm.validation.iso9283.paths import PathDeviations, path_values
 from truearm.validation.iso9283.pose_rows import best_fit_of
 from truearm.validation.iso9283.poses import PoseCloud, evaluate
+from truearm.validation.iso9283.read_places import refuse_other_push_place, refuse_other_rests
 from truearm.validation.iso9283.settling import SettlingCurve, settling_values
 from truearm.validation.iso9283.values import Conditions, Instrument, Quantity, Value
 from truearm.validation.iso9283.velocity import VelocityCurves, velocity_values
@@ -167,9 +168,11 @@ def evaluated(
     if measured.settling is not None:
         progress(TESTS["t"].name)
         found, settling = settling_values(plan, measured.settling, transform, instrument)
+        refuse_other_rests(plan, settling, measured.settling.source)
         values += found
     if measured.forces is not None:
         progress(TESTS["compliance"].name)
+        refuse_other_push_place(plan, measured.forces, alignment.in_base(measured.forces.position))
         stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, instrument)
         values += stiff
     absent = missing_places(plan, values)

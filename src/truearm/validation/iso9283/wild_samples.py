@@ -140,7 +140,8 @@ def refuse_wild(samples: Samples, rows: NDArray[np.intp], position: Array, found
         where=f"{samples.source}, lines {line[first - 1]} and {line[first]}",
         came=f"{1e3 * off:.4g} mm from one sample to the next, and on from there",
         allowed="steps that a robot can take from one sample to the next",
-        cure="The instrument lost the target and found it elsewhere: measure the cycle again, or leave it out.",
+        cure="Check that times are in seconds. Otherwise the instrument lost the target and found it elsewhere: "
+        "measure the cycle again, or leave it out.",
     )
 
 

@@ -11,8 +11,9 @@ from truearm.modeling.chain import Array
 #: The parabola goes through the samples within this share of the excursion's width at half its height, which of an
 #: oscillation is a third of a period.
 TOP: Final = 1 / 6
-#: A top between two samples is beyond the larger by less than this share if a period has eight of them, and by no more
-#: standard deviations of noise besides.
+#: A top is beyond the larger of so few samples by less than this share if a period has eight, and by no more standard
+#: deviations of noise besides; of more samples the largest is beyond the top.
+_FEW: Final = 4
 _BETWEEN: Final = 0.1
 _NOISE: Final = 3.0
 
@@ -42,7 +43,8 @@ def top_of(time: Array, away: Array, peak: int, sigma: float) -> tuple[float, fl
     width = float(time[last] - time[first] - 0.5 * (time[last] - time[last - 1] + time[first + 1] - time[first]))
     near = np.flatnonzero(np.abs(time - time[peak]) <= TOP * width)
     near = near if len(near) >= 3 else np.arange(max(peak - 1, 0), min(peak + 2, len(time)))
-    most = (1.0 + _BETWEEN) * float(along[near].max()) + _NOISE * sigma
+    largest = float(along[near].max())
+    most = largest if len(near) > _FEW else (1.0 + _BETWEEN) * largest + _NOISE * sigma
     if len(near) < 3:
         return float(along[peak]), width
     t = (time[near] - time[peak]) / max(float(np.abs(time[near] - time[peak]).max()), 1e-12)

@@ -30,6 +30,7 @@ from truearm.shown import listed
 from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
+from truearm.validation.iso9283.said_of_rounding import said_of_rounding
 from truearm.validation.iso9283.said_of_streams import said_of_streams
 from truearm.validation.iso9283.values import Component, Instrument
 
@@ -114,7 +115,7 @@ def iso9283_evaluate(
             refuse_implausible(tie, planned.cube, positions, str(tie_path))
     instrument = Instrument(sigma, sigma_rot)
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
-    made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found), inputs)
+    made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found, instrument), inputs)
     if other is not None:
         with refusals_of("compare"):
             made = replace(made, comparison=compared(made.summary(), other))
@@ -134,7 +135,7 @@ _READERS: Final[Mapping[str, Callable[[Path], object]]] = {
 }
 
 
-def _warnings(found: Evaluation) -> tuple[Notice, ...]:
+def _warnings(found: Evaluation, instrument: Instrument) -> tuple[Notice, ...]:
     notices: list[Notice] = []
     if not found.alignment.is_standard:
         notices.append(
@@ -167,7 +168,7 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
                 "They say more about the measurement than about the robot.",
             )
         )
-    return (*notices, *said_of_streams(found))
+    return (*notices, *said_of_streams(found), *said_of_rounding(found, instrument))
 
 
 def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:

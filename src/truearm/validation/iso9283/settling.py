@@ -17,6 +17,7 @@ from truearm.errors import InputError
 from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.validation.iso9283.clock import Clock, clock_of
 from truearm.validation.iso9283.runs import LEAST_SAMPLES, Part, in_base, parts_of
 from truearm.validation.iso9283.smoothing import local_lines
 from truearm.validation.iso9283.streams import noise_of, spans_of
@@ -71,6 +72,8 @@ class SettlingCurve:
         In the base frame [m], ``(n, 3)``.
     lines
         Of the samples in the file, ``(n,)``.
+    clock
+        That of the record.
     """
 
     test: str
@@ -89,6 +92,7 @@ class SettlingCurve:
     sparse: tuple[bool, bool]
     position: Array
     lines: NDArray[np.intp]
+    clock: Clock
 
 
 def settling_values(
@@ -170,10 +174,11 @@ def _cycle(
             allowed=f"{LEAST_SAMPLES} or more",
             cure="Sample faster and longer, or leave the cycle out.",
         )
-    time = samples.time[rows] - samples.time[rows[0]]
+    clock = clock_of(samples.time[rows])
+    time = clock.time - clock.time[0]
     position = in_base(transform, samples.position[rows])
     _refuse_other_times(time, position, at)
-    refuse_wild(samples, rows, position, wild_steps(time, position, None), number)
+    refuse_wild(samples, rows, position, wild_steps(time, position, None), number, clock)
     band = plan.limit_band
     distance = np.asarray(np.linalg.norm(position - _final(position), axis=1))
     outside = _outside(distance, band, sigma)
@@ -215,9 +220,11 @@ def _cycle(
     speed = (distance[entered] - distance[entered + 1]) / (time[entered + 1] - time[entered])
     start = _start(time, position, band)
     settled = stay - entry
+    rounded = 2.0 * clock.sigma
     posing = stay - start
     if test == "posing-time":
         coarse = sparse = (step > COARSE * posing, False)
+        coarse = (coarse[0] or rounded > COARSE * posing, False)
     else:
         crossing = 2 * band / max(float(speed), 1e-12)
         slow = step > COARSE * crossing if settles else _LEAST_SAMPLES * step > min(settled, 3 * width)
@@ -227,7 +234,10 @@ def _cycle(
         blurred = not settles and overshoot - band < 3 * sigma
         # noise may put an excursion inside the band, or outside of it
         sparse = (slow, slow or few)
-        coarse = (slow or blurred or open_ > COARSE * settled, slow or few or blurred)
+        coarse = (
+            slow or blurred or (not settles and rounded > COARSE * settled) or open_ > COARSE * settled,
+            slow or few or blurred,
+        )
     where = part.place
     if test == "posing-time":
         planned = plan.test(test)
@@ -250,6 +260,7 @@ def _cycle(
         sparse,
         position,
         samples.line[rows],
+        clock,
     )
 
 

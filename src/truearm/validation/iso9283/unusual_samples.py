@@ -48,7 +48,9 @@ class Unusual:
     distance: float
 
 
-def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: Sequence[Array]) -> list[Unusual]:
+def unusual_samples(
+    times: Sequence[Array], positions: Sequence[Array], places: Sequence[Array], rounding: float = 0.0
+) -> list[Unusual]:
     """Return samples that lie apart from those about them, as none does there in half of the cycles.
 
     Each sample is compared with a cubic through the two before it and the two behind it: as it is, and with what is the
@@ -61,6 +63,8 @@ def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: 
         Of each cycle [s], ``(n,)``, and [m], ``(n, 3)``.
     places
         What tells where in the cycle a sample is, such as the arc length of its foot, ``(n,)`` each.
+    rounding
+        What rounding in the file leaves open of each coordinate, as a standard deviation [m]: the noise is no less.
     """
     if len(times) < _LEAST_CYCLES:
         return []
@@ -68,7 +72,7 @@ def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: 
     if high <= low:
         return []
     stretches = _stretches(places, low, high)
-    noise = float(np.median([scatter_of(position) for position in positions]))
+    noise = max(float(np.median([scatter_of(position) for position in positions])), rounding)
     away, usual = _apart_in_all(times, positions, stretches)
     other, usual_of_other = _apart_in_all(times, _without_common(positions, places, low, high), stretches)
     beyond = [one > np.maximum(_TIMES * there, there + _NOISE * noise) for one, there in zip(away, usual, strict=True)]

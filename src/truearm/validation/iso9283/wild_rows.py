@@ -38,7 +38,7 @@ _FAR: Final = 5.0
 _BEYOND: Final = (2.2, 1.8)
 #: What is counted as a Gaussian's deviation: where Student's t is as rare as this.
 _RARE: Final = 1e-5
-#: The scatter is never taken below this share of the instrument's, so that rounding makes no row wild.
+#: The scatter is never taken below this share of the instrument's, nor below that of rounding.
 _LEAST_SCATTER: Final = 1.0 / 3.0
 #: At most this share of all rows is wild, but three may be.
 _SHARE: Final = 0.02
@@ -121,11 +121,11 @@ def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRow
     groups = [part for one in cycles for part in (groups_of(one) if one.test == "dAP" else [one])]
     wild: list[WildRow] = []
     two: list[TwoPlaces] = []
-    sigmas: dict[Kind, float] = {"position": instrument.sigma, "orientation": instrument.sigma_rot or 0.0}
-    for kind, sigma in sigmas.items():
+    kinds: tuple[Kind, Kind] = ("position", "orientation")
+    for kind, least in zip(kinds, instrument.least_scatter(_LEAST_SCATTER), strict=True):
         mine = [one for one in groups if kind == "position" or one.angles is not None]
         if mine:
-            found = _Rows(mine, kind, sigma)
+            found = _Rows(mine, kind, least)
             places = found.two_places()
             named, alike = found.wild(places)
             wild += named
@@ -143,7 +143,7 @@ def without(cycles: Sequence[Cycles], wild: Sequence[WildRow]) -> list[Cycles]:
 class _Rows:
     """All rows of a campaign, by groups."""
 
-    def __init__(self, groups: list[Cycles], kind: Kind, sigma: float) -> None:
+    def __init__(self, groups: list[Cycles], kind: Kind, least: float) -> None:
         self.groups = groups
         self.kind: Kind = kind
         numbers = [one.points if kind == "position" or one.angles is None else one.angles for one in groups]
@@ -155,7 +155,7 @@ class _Rows:
         self.small = self.counts < _SMALL
         names: dict[tuple[str, float, float], int] = {}
         self.family = np.array([names.setdefault((g.test, g.velocity, g.load), len(names)) for g in groups])
-        self.floor = max(_LEAST_SCATTER * np.sqrt(3.0) * sigma, 1e-12)
+        self.floor = max(np.sqrt(3.0) * least, 1e-12)
 
     def two_places(self) -> dict[int, TwoPlaces]:
         """Return the groups whose cycles are in two places, three cycles or more in each."""

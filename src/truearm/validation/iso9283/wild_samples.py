@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
+from truearm.validation.iso9283.clock import Clock
 
 #: No tip is accelerated so much [m/s^2] while its velocity changes by so many times the commanded one, or the one about
 #: it, between two samples.
@@ -101,7 +102,9 @@ def wild_steps(time: Array, position: Array, velocity: float | None) -> WildStep
     return WildSteps(likely[impossible], pace[impossible], len(step))
 
 
-def refuse_wild(samples: Samples, rows: NDArray[np.intp], position: Array, found: WildSteps, cycle: int) -> None:
+def refuse_wild(
+    samples: Samples, rows: NDArray[np.intp], position: Array, found: WildSteps, cycle: int, clock: Clock
+) -> None:
     """Refuse a record with samples that no tip can have passed, naming them.
 
     Parameters
@@ -114,16 +117,26 @@ def refuse_wild(samples: Samples, rows: NDArray[np.intp], position: Array, found
         What no tip can do there.
     cycle
         Its number; 0 for a stream.
+    clock
+        Of the record.
 
     Raises
     ------
     InputError
-        If there are such steps.
+        If there are such steps; of times that are rounded too coarsely to tell, this is said instead.
     """
     if not len(found.before):
         return
+    if clock.is_coarse:
+        raise InputError(
+            "times of samples are rounded too coarsely to say how fast the tip moves",
+            where=f"{samples.source}, line {samples.line[rows[found.before[0]]]}, column time",
+            came=f"times to {clock.resolution:g} s, samples {float(np.diff(clock.time).mean()):.4g} s apart",
+            allowed="a tenth of the time between two samples, or less",
+            cure="Write the times with more decimals.",
+        )
     line, name = samples.line[rows], _name(samples, int(rows[0]), cycle)
-    wild, jumps = _groups(samples.time[rows], position, found)
+    wild, jumps = _groups(clock.time, position, found)
     if wild:
         shown = [_lines(line[first : last + 1].tolist()) for first, last, _ in wild[:_NAMED]]
         more = f" and {len(wild) - _NAMED} more such places" if len(wild) > _NAMED else ""

@@ -81,7 +81,7 @@ def wild_steps(time: Array, position: Array, velocity: float | None) -> WildStep
     if len(time) < 2 * _ABOUT:
         return WildSteps(np.empty(0, dtype=np.intp), np.empty((0, 3)), max(len(time) - 1, 0))
     lasts = np.diff(time)
-    lasts = np.maximum(lasts, 0.5 * float(np.median(lasts)))
+    lasts = np.maximum(lasts, 0.5 * float(np.median(lasts) or lasts.mean()))
     step = np.diff(position, axis=0)
     # what is far beyond every tip is sought alone: medians about all of a million steps would take their time
     size = np.linalg.norm(step, axis=1)

@@ -25,8 +25,8 @@ _STRETCH, _LEAST_STRETCH = 3.0, 0.0025
 _GAP = 1.6
 #: Fewer cycles do not show what is usual.
 _LEAST_CYCLES = 3
-#: The place jumps by a step so many times as long as the usual one of so many before and behind it, and by so many standard
-#: deviations of noise besides.
+#: The place jumps by a step so many times as long as the usual one of so many before and behind it, and by so many
+#: standard deviations of noise besides.
 _JUMP, _ABOUT, _OF_STEP = 1.8, 4, 6.0
 #: What is the same in all cycles is seen at so many places at most.
 _GRID = 4000

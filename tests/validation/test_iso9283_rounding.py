@@ -107,7 +107,7 @@ def test_times_too_coarse_to_say_how_fast_the_tip_is_are_refused_as_such() -> No
     steps = wild_steps(clock.time, x, None)
     assert clock.is_coarse
     assert len(steps.before)
-    with pytest.raises(InputError, match="rounded too coarsely.*more decimals"):
+    with pytest.raises(InputError, match=r"rounded too coarsely.*more decimals"):
         refuse_wild(samples, np.arange(len(t)), x, steps, 1, clock)
 
 
@@ -115,7 +115,7 @@ def test_times_that_are_the_same_by_rounding_are_not_called_written_twice(tmp_pa
     file = tmp_path / "settling.csv"
     rows = [f"t,P1,1,{0.004 * k:.2f},{k},0,0" for k in range(100)]
     file.write_text("criterion,pose,cycle,time [s],x [mm],y [mm],z [mm]\n" + "\n".join(rows) + "\n")
-    with pytest.raises(InputError, match="rounded so coarsely.*more decimals"):
+    with pytest.raises(InputError, match=r"rounded so coarsely.*more decimals"):
         read_settling_samples(file)
     rows = [f"t,P1,1,{0.004 * (k - (k > 50)):.3f},{k},0,0" for k in range(100)]
     file.write_text("criterion,pose,cycle,time [s],x [mm],y [mm],z [mm]\n" + "\n".join(rows) + "\n")

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
+from truearm.validation.iso9283.alike_cycles import AlikeCycles, alike_cycles
 from truearm.validation.iso9283.drift import groups_of
 from truearm.validation.iso9283.pose_rows import Cycles
 from truearm.validation.iso9283.values import Instrument, Value
@@ -110,14 +111,17 @@ class UnusualRows:
         Rows that lie far from the others.
     two_places
         Poses with two places of rest.
+    alike
+        Tests whose cycles are like those before them.
     """
 
     wild: tuple[WildRow, ...] = ()
     two_places: tuple[TwoPlaces, ...] = ()
+    alike: tuple[AlikeCycles, ...] = ()
 
 
 def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRows:
-    """Return rows that lie far from the others, in the order of the plan, and poses with two places of rest."""
+    """Return rows that lie far from the others, in the order of the plan, and what else is unusual about them."""
     groups = [part for one in cycles for part in (groups_of(one) if one.test == "dAP" else [one])]
     wild: list[WildRow] = []
     two: list[TwoPlaces] = []
@@ -130,7 +134,7 @@ def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRow
             named, alike = found.wild(places)
             wild += named
             two += [*places.values(), *alike]
-    return UnusualRows(tuple(wild), tuple(two))
+    return UnusualRows(tuple(wild), tuple(two), alike_cycles(cycles))
 
 
 def without(cycles: Sequence[Cycles], wild: Sequence[WildRow]) -> list[Cycles]:

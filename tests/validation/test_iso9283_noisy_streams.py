@@ -43,7 +43,7 @@ def test_a_tip_without_an_overshoot_has_none_that_is_not_marked() -> None:
 
 def test_a_top_is_not_far_beyond_the_largest_sample() -> None:
     # a parabola through three samples of which the last is far higher would have its top far beyond
-    time = np.arange(3) * 1e-3
+    time = np.arange(3.0) / 1000.0
     away = np.outer([0.60e-3, 1.0e-3, 0.999e-3], ALONG)
     assert 1.0e-3 < top_of(time, away, 1, 0.0)[0] <= 1.1e-3
 
@@ -93,7 +93,7 @@ def test_an_overshoot_that_noise_would_make_is_marked() -> None:
 
 
 def test_nothing_beyond_a_side_has_no_top() -> None:
-    time = np.arange(10) * 1e-3
+    time = np.arange(10.0) / 1000.0
     assert largest_top(time, np.zeros((10, 3)), np.ones(10, bool), 1e-6) == (0.0, 0.0)
     assert largest_top(time, np.ones((10, 3)), np.zeros(10, bool), 1e-6) == (0.0, 0.0)
 

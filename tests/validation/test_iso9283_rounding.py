@@ -14,6 +14,7 @@ from truearm.measurement.performance.records import Samples
 from truearm.measurement.performance.resolution import resolution_of
 from truearm.measurement.readers.performance_poses import read_attained_poses
 from truearm.measurement.readers.performance_samples import read_settling_samples
+from truearm.modeling.chain import Array
 from truearm.notices import Notice
 from truearm.planning.iso9283.way import Way
 from truearm.validation.iso9283.alignment import Alignment
@@ -54,9 +55,11 @@ def test_rounded_times_of_an_even_clock_are_found_again(rate: int, resolution: f
 
 def test_times_that_are_not_rounded_or_not_even_stay_as_they_are() -> None:
     rng = np.random.default_rng(4)
-    true = np.arange(400) / 240
+    true = np.arange(400.0) / 240.0
     uneven = np.round(np.sort(true + rng.normal(0.0, 1e-3, 400)), 3)
-    for time, sigma in ((true, 0.0), (np.round(true, 6), 0.0), (np.arange(400) / 1000, 0.0), (uneven, 1e-3 / 12**0.5)):
+    fine, thousand = np.round(true, 6), np.arange(400.0) / 1000.0
+    cases: list[tuple[Array, float]] = [(true, 0.0), (fine, 0.0), (thousand, 0.0), (uneven, 1e-3 / 12**0.5)]
+    for time, sigma in cases:
         clock = clock_of(time)
         assert (clock.time == time).all()
         assert clock.sigma == pytest.approx(sigma)

@@ -87,4 +87,4 @@ def _share(vectors: Array) -> float:
     product = vectors @ vectors.T / (n - 1)
     trace, square = float(np.trace(product)), float((product**2).sum())
     unbiased = (n - 1) ** 2 / ((n - 2) * (n + 1)) * (square - trace**2 / (n - 1))
-    return max(unbiased / trace**2, 1.0 / vectors.shape[1])
+    return float(max(unbiased / trace**2, 1.0 / vectors.shape[1]))

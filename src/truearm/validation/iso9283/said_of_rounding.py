@@ -68,8 +68,9 @@ def _times(found: Evaluation, instrument: Instrument) -> Notice | None:
 
 def _clocks(found: Evaluation) -> Iterator[tuple[str, Clock, float]]:
     """Yield whose each clock is, and how fast the tip is there: at rest where it enters the band [m/s]."""
-    for record in (*found.velocities, *found.deviations, *found.corners, *found.weaves):
-        run = record.run
+    runs = [one.run for one in found.velocities] + [one.run for one in found.deviations]
+    runs += [one.run for one in found.corners] + [one.run for one in found.weaves]
+    for run in runs:
         for clock in {id(cycle.clock): cycle.clock for cycle in run.cycles}.values():
             yield f"{run.test} on {run.path.path.name}", clock, run.velocity
     for curve in found.settling:

@@ -24,8 +24,9 @@ from truearm.validation.iso9283.values import COARSE, Instrument, Value
 #: A side is reached beyond this share of half the stroke.
 _SIDE = 0.4
 #: A turn is first read over this share of the time that the tip is on its side, before and behind: an eighteenth of the
-#: period of a sine; then over less, until a parabola leaves no more than noise, times this.
-_SHARE, _LEFT = 0.15, 1.15
+#: period of a sine; then over less, until a parabola leaves no more than noise, times this, and what
+#: chance adds to few samples.
+_SHARE, _LEFT = 0.15, 1.0
 #: Median size of a standard normal number.
 _MEDIAN = 0.6745
 #: A turn is sharper than a parabola if its outermost sample is so many standard deviations of noise beyond.
@@ -188,11 +189,13 @@ def _top(time: Array, across: Array, side: NDArray[np.intp], noise: float) -> fl
                 break
             x = (t[near] - centre) / half
             a, b, c = np.polyfit(x, y[near], 2)
-            left = float(np.sqrt(((y[near] - np.polyval((a, b, c), x)) ** 2).sum() / (len(x) - 3)))
+            free = len(x) - 3
+            left = float(np.sqrt(((y[near] - np.polyval((a, b, c), x)) ** 2).sum() / free))
+            most = noise * (_LEFT + np.sqrt(1.5 / free))
             at = float(np.clip(-b / (2 * a), -1.0, 1.0)) if a < 0 else 0.0
             top = float(a * at * at + b * at + c)
             centre += at * half
-        if a < 0 and left <= _LEFT * noise:
+        if a < 0 and left <= most:
             return top
         half /= 1.5
     peak = int(side[across[side].argmax()])

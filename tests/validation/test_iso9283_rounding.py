@@ -56,7 +56,7 @@ def test_rounded_times_of_an_even_clock_are_found_again(rate: int, resolution: f
 def test_times_that_are_not_rounded_or_not_even_stay_as_they_are() -> None:
     rng = np.random.default_rng(4)
     true = np.arange(400.0) / 240.0
-    uneven = np.round(np.sort(true + rng.normal(0.0, 1e-3, 400)), 3)
+    uneven: Array = np.round(np.sort(true + rng.normal(0.0, 1e-3, 400)), 3).astype(np.float64)
     fine, thousand = np.round(true, 6), np.arange(400.0) / 1000.0
     cases: list[tuple[Array, float]] = [(true, 0.0), (fine, 0.0), (thousand, 0.0), (uneven, 1e-3 / 12**0.5)]
     for time, sigma in cases:

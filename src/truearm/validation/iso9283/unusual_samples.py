@@ -173,7 +173,7 @@ def _beside(place: Array, jumps: Array) -> NDArray[np.bool_]:
     beside = np.any([near[k : k + n] for k in range(5)], axis=0)
     far = np.pad(begun + ended, 2, mode="edge")
     passed = np.ptp(np.array([far[k : k + n] for k in range(5)]), axis=0) > 0
-    return ~(beside | passed)
+    return np.asarray(~(beside | passed))
 
 
 def _turns(position: Array) -> Array:

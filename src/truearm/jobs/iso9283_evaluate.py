@@ -32,6 +32,7 @@ from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
 from truearm.validation.iso9283.said_of_drift import said_of_drift
 from truearm.validation.iso9283.said_of_pushes import said_of_pushes
+from truearm.validation.iso9283.said_of_rounding import said_of_rounding
 from truearm.validation.iso9283.said_of_streams import said_of_streams
 from truearm.validation.iso9283.values import Component, Instrument
 
@@ -115,7 +116,7 @@ def iso9283_evaluate(
     instrument = Instrument(sigma, sigma_rot)
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
     warnings = (
-        *_warnings(found),
+        *_warnings(found, instrument),
         *_of_plan(plan_path),
         *said_of_pushes(planned, found.pushes, instrument),
         *said_of_drift(planned, found.drift),
@@ -164,7 +165,7 @@ _READERS: Final[Mapping[str, Callable[[Path], object]]] = {
 }
 
 
-def _warnings(found: Evaluation) -> tuple[Notice, ...]:
+def _warnings(found: Evaluation, instrument: Instrument) -> tuple[Notice, ...]:
     notices: list[Notice] = []
     if not found.alignment.is_standard:
         notices.append(
@@ -197,7 +198,7 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
                 "They say more about the measurement than about the robot.",
             )
         )
-    return (*notices, *said_of_streams(found))
+    return (*notices, *said_of_streams(found), *said_of_rounding(found, instrument))
 
 
 def _of_plan(path: Path) -> tuple[Notice, ...]:

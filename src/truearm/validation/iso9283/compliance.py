@@ -2,7 +2,8 @@
 
 Public descriptions of ISO 9283:1998: the tip is pushed and pulled along each base axis in steps of a tenth of the rated
 load, and the displacement is given per force. Here it is the slope of a straight line through the steps of each cycle,
-along the force, so that the place of the unloaded tip and play at its first steps do not count as compliance.
+along the force, so that the place of the unloaded tip does not count. Play that the first step takes up is a part of
+the displacement, and of the slope: 20 um at the first of eleven steps to 29 N add 0.3 um/N.
 """
 
 from __future__ import annotations

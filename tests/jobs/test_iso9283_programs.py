@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import truearm
 from truearm.compensation.iso9283.slow_run import SLOW_RUN
 from truearm.errors import InputError
+from truearm.modeling.controller import Controller
 from truearm.notices import Notice
 from truearm.results.iso9283_plan import Iso9283Plan
 
@@ -117,6 +119,29 @@ def test_a_language_of_another_maker_and_speeds_that_it_does_not_say_are_told(cu
     assert (maker.code, maker.level, speed.code) == ("maker", "warning", "joint-speed-assumed")
     assert "programs were written in URScript." in maker.message
     assert [one.code for one in notices("fanuc")] == ["maker"]
+
+
+def test_programs_of_a_controller_whose_counting_is_not_known_say_so_or_are_refused(cube: Path) -> None:
+    robot = replace(truearm.load_robot("irb120"), controller=Controller(), maker="")
+
+    def of(language: str, controller: Controller = robot.controller) -> Iso9283Plan:
+        return truearm.iso9283_plan(
+            replace(robot, controller=controller), criteria=["ap"], cube=cube, load=3.0, program=language
+        )
+
+    with pytest.raises(InputError, match="controllers that run FANUC LS count joint 3 together with joint 2") as found:
+        of("fanuc")
+    assert found.value.parameter == "program"
+    for language in ("rapid", "krl", "urscript", "val3"):
+        made = of(language)
+        (told,) = [one for one in made.warnings if one.code == "controller-counts-assumed"]
+        assert told.level == "warning"
+        assert made.programs is not None
+        assert any("compare joints with the pendant" in text for text in made.programs.files.values())
+        assert told.message.partition(":")[0] in made.contents()["sheet.html"]
+    known = of("fanuc", Controller(source="the pendant shows the model's joints")).programs
+    assert known is not None
+    assert not any("compare joints" in text for text in known.files.values())
 
 
 def test_a_folder_takes_other_tests_and_all_of_them_again(cube: Path, tmp_path: Path) -> None:

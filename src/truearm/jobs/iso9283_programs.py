@@ -11,6 +11,7 @@ import numpy as np
 
 from truearm.compensation.iso9283.programs import measuring_programs
 from truearm.compensation.iso9283.slow_run import SLOW_RUN, check_slow_run, slow_run_text
+from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
 from truearm.compensation.path_program import BY_NAME
 from truearm.compensation.programs.motion_program import MotionProgram
 from truearm.compensation.programs.program import Language
@@ -47,6 +48,7 @@ def written_programs(
 
     What is to be said of them is added to `warnings`.
     """
+    refuse_unknown_counts(plan.robot, language.name)
     text = plan_text(plan)
     with refusals_of("program"):
         found = measuring_programs(plan, dwell, hash_of(text.encode())[:_MARK])
@@ -63,6 +65,7 @@ def written_programs(
         warnings.append(
             Notice("maker", f"{robot.name} is of {robot.maker}, and programs were written in {language.name}.")
         )
+    warnings += counts_notices(robot)
     if language.name in _JOINT_SPEEDS:
         warnings.append(
             Notice(

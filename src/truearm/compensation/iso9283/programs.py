@@ -13,6 +13,7 @@ import numpy as np
 
 from truearm.compensation.fake_targets import nominal_robot
 from truearm.compensation.iso9283.routes import Route, Routes
+from truearm.compensation.joint_counts import counts_comments
 from truearm.compensation.programs.motion_program import (
     CircleMove,
     JointMove,
@@ -186,6 +187,7 @@ class _Programs:
             f"Robot {self.plan.robot.name}",
             f"{100 * share:g} % velocity, {carried}",
             f"Plan {self.mark}",
+            *counts_comments(self.plan.robot),
             "Not verified, no safety function",
             "First run: step by step,",
             "at reduced speed, nobody near",

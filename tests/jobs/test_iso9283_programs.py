@@ -144,13 +144,28 @@ def test_programs_of_a_controller_whose_counting_is_not_known_say_so_or_are_refu
     assert not any("compare joints" in text for text in known.files.values())
 
 
-def test_a_folder_takes_other_tests_and_all_of_them_again(cube: Path, tmp_path: Path) -> None:
-    for criteria in (["av", "ap"], ["av"], ["av", "ap"]):
+def test_a_folder_never_holds_programs_of_two_plans(cube: Path, tmp_path: Path) -> None:
+    for criteria in (["av"], ["av", "ap"], ["av", "ap"]):
         planned(cube, program="krl", criteria=criteria, out=tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert sorted(path.name for path in (tmp_path / "programs").iterdir()) == ["AP_10.src", "AV_10.src"]
+    for other in ({"program": "krl"}, {"program": "rapid", "criteria": ["av", "ap"]}, {}, {"criteria": ["ad"]}):
+        with pytest.raises(InputError, match="programs of another plan are there, and would stay beside") as refusal:
+            planned(cube, out=tmp_path, **other)
+        assert refusal.value.parameter == "out"
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+    filled(tmp_path / SLOW_RUN)
+    planned(cube, program="krl", criteria=["av", "ap"], slow_run=tmp_path / SLOW_RUN, out=tmp_path)
+    (tmp_path / SLOW_RUN).unlink()
+    with pytest.raises(InputError, match=r"would stay beside this one; got '.*100.src'"):
+        planned(cube, program="krl", criteria=["av", "ap"], out=tmp_path)
+
+
+def test_a_program_of_somebody_else_is_not_overwritten(cube: Path, tmp_path: Path) -> None:
+    planned(cube, program="krl", out=tmp_path)
     (tmp_path / "programs" / "AD_10.src").write_text("of somebody else")
     with pytest.raises(InputError, match="was not written here by truearm, and is not overwritten"):
-        planned(cube, program="krl", criteria=["ad"], out=tmp_path)
+        planned(cube, program="krl", criteria=["av", "ad"], out=tmp_path)
 
 
 def test_ways_that_come_near_the_floor_are_told(cube: Path, tmp_path: Path) -> None:

@@ -174,14 +174,14 @@ def test_variation_between_approaches() -> None:
 
 
 def test_distances_by_cycles_and_axes() -> None:
-    wave = 1e-4 * np.cos(2 * np.pi * np.arange(30) / 30)
+    wave = 1e-4 * np.linspace(-1.0, 1.0, 30)
     way = (POINTS[3] - POINTS[1]) / np.linalg.norm(POINTS[3] - POINTS[1])
-    ends = np.concatenate([np.tile(POINTS[1], (30, 1)), POINTS[3] + (2e-4 + wave)[:, None] * way])
+    ends = np.concatenate([POINTS[1] + 1e-7 * np.outer(wave, way), POINTS[3] + (2e-4 + wave)[:, None] * way])
     task = plan(PlannedTest("AD", ("P2", "P4"), 30))
     values = evaluate(task, rows("AD", ["P2"] * 30 + ["P4"] * 30, [*range(1, 31)] * 2, ends), TIE, TRACKER).values
     assert found(values, "AD").value == pytest.approx(2e-4)
     assert found(values, "AD").where == "P2-P4"
-    assert found(values, "RD").value == pytest.approx(3 * wave.std(ddof=1))
+    assert found(values, "RD").value == pytest.approx(3 * wave.std(ddof=1), rel=1e-6)
     parts = [found(values, "AD", axis).value for axis in "xyz"]
     assert parts == pytest.approx(2e-4 * np.abs(way), abs=1e-12)
 

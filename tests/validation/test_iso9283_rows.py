@@ -25,6 +25,7 @@ from truearm.modeling.transform import (
 )
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.alignment import Alignment
+from truearm.validation.iso9283.copied import refuse_copied_poses
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
 from truearm.validation.iso9283.pose_rows import cycles_of
 from truearm.validation.iso9283.values import Instrument
@@ -276,6 +277,24 @@ def test_a_row_that_was_copied_is_refused() -> None:
     copied.position[other] = copied.position[one]
     with pytest.raises(InputError, match=f"lines {one + 2} and {other + 2}: 1 row with the time and the place"):
         found(plan, copied)
+
+
+def test_two_cycles_with_one_position_are_copies_unless_readings_are_rounded() -> None:
+    plan, read = campaign(1, ("AP",))
+    one, other = (int(rows_of(read, pose="P2", velocity=1.0, cycle=cycle)[0]) for cycle in (4, 5))
+    copied = moved(read, np.array([other]), np.zeros(3))
+    copied.position[other] = copied.position[one]
+    with pytest.raises(InputError, match=f"lines {one + 2} and {other + 2}: 1 row with the position of another cycle"):
+        found(plan, copied)
+    held = dataclasses.replace(read, position=read.position.copy())
+    rows = rows_of(read, pose="P2", velocity=1.0)
+    held.position[rows] = held.position[rows[0]]
+    with pytest.raises(InputError, match=f"{len(rows) - 1} rows with the position of another cycle of the same pose"):
+        found(plan, held)
+    rounded = dataclasses.replace(read, position=np.round(read.position, 5))
+    assert len(np.unique(rounded.position, axis=0)) < len(rounded.position)
+    refuse_copied_poses(rounded)
+    refuse_copied_poses(dataclasses.replace(held, position=held.position[rows[0]] + np.zeros_like(held.position)))
 
 
 def test_two_poses_that_were_swapped_are_refused() -> None:

@@ -25,11 +25,12 @@ from truearm.measurement.readers.performance_samples import read_path_samples, r
 from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
-from truearm.results.iso9283_notices import row_notices
+from truearm.results.iso9283_notices import copied_notices, row_notices
 from truearm.shown import listed
 from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
+from truearm.validation.iso9283.copied import copied_blocks
 from truearm.validation.iso9283.said_of_streams import said_of_streams
 from truearm.validation.iso9283.values import Component, Instrument
 
@@ -114,7 +115,7 @@ def iso9283_evaluate(
             refuse_implausible(tie, planned.cube, positions, str(tie_path))
     instrument = Instrument(sigma, sigma_rot)
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
-    made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found), inputs)
+    made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found, read), inputs)
     if other is not None:
         with refusals_of("compare"):
             made = replace(made, comparison=compared(made.summary(), other))
@@ -134,7 +135,7 @@ _READERS: Final[Mapping[str, Callable[[Path], object]]] = {
 }
 
 
-def _warnings(found: Evaluation) -> tuple[Notice, ...]:
+def _warnings(found: Evaluation, read: Mapping[str, Any]) -> tuple[Notice, ...]:
     notices: list[Notice] = []
     if not found.alignment.is_standard:
         notices.append(
@@ -146,6 +147,8 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
             )
         )
     notices += row_notices(found)
+    copied = [block for name in ("paths", "settling") if name in read for block in copied_blocks(read[name])]
+    notices += copied_notices(copied)
     few = sorted({value.id for value in found.values if value.status == "too-few-cycles"})
     if few:
         notices.append(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from truearm.notices import Notice
 from truearm.results.iso9283_table import UNITS, number_words
 from truearm.shown import counted
+from truearm.validation.iso9283.copied import CopiedBlock
 from truearm.validation.iso9283.evaluation import Evaluation
 from truearm.validation.iso9283.pose_rows import Cycles
 from truearm.validation.iso9283.values import Value
@@ -80,6 +82,28 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
             )
         )
     return tuple(notices)
+
+
+def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:
+    """Return what is to be known about samples that two cycles share."""
+    if not blocks:
+        return []
+    told = "; ".join(_copied_words(block) for block in blocks[:_TOLD])
+    more = f"; and {len(blocks) - _TOLD} more" if len(blocks) > _TOLD else ""
+    return [
+        Notice(
+            "copied-samples",
+            f"Cycles have samples at the same places to the last digit: {told}{more}. No robot does that: one was "
+            "copied from the other, or the readings are simulated without noise. RT and what else says how cycles "
+            "differ is too small. Write what was measured, or remove the copy.",
+        )
+    ]
+
+
+def _copied_words(block: CopiedBlock) -> str:
+    one, other = block.cycles
+    cycles = f"cycles {one} and {other} of " if one and other else ""
+    return f"{cycles}{block.test} {block.place}, {block.count} samples from lines {block.lines[0]} and {block.lines[1]}"
 
 
 def _wild_words(row: WildRow, without: str) -> str:

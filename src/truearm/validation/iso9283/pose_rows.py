@@ -17,6 +17,7 @@ from truearm.modeling.transform import rotation_vector
 from truearm.planning.iso9283.criteria import TEST_OF, TESTS
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.alignment import Alignment, best_fit
+from truearm.validation.iso9283.copied import refuse_copied_poses
 from truearm.validation.iso9283.orientation_check import refuse_far_orientations
 
 #: How far outside the cube is rounding [m].
@@ -124,6 +125,7 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
     _check_cube(plan, readings, position)
     _check_nearest(plan, readings, position)
     _check_copies(readings)
+    refuse_copied_poses(readings)
     rotation = None if readings.rotation is None else alignment.turned_to_base(readings.rotation)
     if rotation is not None:
         commanded = np.array([plan.poses[name].rotation for name in readings.pose.names])[readings.pose.code]

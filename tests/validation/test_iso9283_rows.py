@@ -307,8 +307,9 @@ def test_two_poses_that_were_swapped_are_refused() -> None:
     position = read.position.copy()
     pair = [int(rows_of(read, pose=pose, cycle=5, velocity=1.0)[0]) for pose in ("P2", "P4")]
     position[pair] = position[pair[::-1]]
-    with pytest.raises(InputError, match=rf"line {min(pair) + 2}, column pose: 2 poses at another place"):
+    with pytest.raises(InputError, match=rf"line {min(pair) + 2}, column pose: 2 poses at another place") as refusal:
         found(plan, dataclasses.replace(read, position=position))
+    assert re.search(rf"got 'P., and it lies at P.,.*; so also line {max(pair) + 2}'", str(refusal.value))
 
 
 def test_quaternions_in_another_order_are_refused() -> None:

@@ -340,7 +340,7 @@ def test_times_of_another_unit_are_refused(factor: float, word: str) -> None:
     samples = runs()
     text = refusal_of_path(replace(samples, time=samples.time * factor))
     assert f"the path line was run much {word} than commanded" in text
-    assert "allowed: 5 to 500 mm/s; commanded are 250. Write the times in seconds" in text
+    assert "allowed: 5 to 500 mm/s; commanded are 250. Name the unit of the times" in text
     rest = resting()
     word = {"slower": "more slowly", "faster": "faster"}[word]
     with pytest.raises(InputError, match=rf"the tip would move {word} than any robot's.*Write the times in seconds"):

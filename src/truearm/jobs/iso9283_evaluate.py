@@ -24,13 +24,13 @@ from truearm.measurement.readers.performance_poses import read_attained_poses, r
 from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
 from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
+from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
-from truearm.results.iso9283_notices import copied_notices, row_notices
-from truearm.shown import listed
+from truearm.results.iso9283_notices import copied_notices, cycle_notices, row_notices
 from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
-from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
 from truearm.validation.iso9283.copied import copied_blocks
+from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
 from truearm.validation.iso9283.said_of_streams import said_of_streams
 from truearm.validation.iso9283.values import Component, Instrument
 
@@ -115,7 +115,7 @@ def iso9283_evaluate(
             refuse_implausible(tie, planned.cube, positions, str(tie_path))
     instrument = Instrument(sigma, sigma_rot)
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
-    made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found, read), inputs)
+    made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(planned, found, read), inputs)
     if other is not None:
         with refusals_of("compare"):
             made = replace(made, comparison=compared(made.summary(), other))
@@ -135,7 +135,7 @@ _READERS: Final[Mapping[str, Callable[[Path], object]]] = {
 }
 
 
-def _warnings(found: Evaluation, read: Mapping[str, Any]) -> tuple[Notice, ...]:
+def _warnings(plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any]) -> tuple[Notice, ...]:
     notices: list[Notice] = []
     if not found.alignment.is_standard:
         notices.append(
@@ -149,11 +149,7 @@ def _warnings(found: Evaluation, read: Mapping[str, Any]) -> tuple[Notice, ...]:
     notices += row_notices(found)
     copied = [block for name in ("paths", "settling") if name in read for block in copied_blocks(read[name])]
     notices += copied_notices(copied)
-    few = sorted({value.id for value in found.values if value.status == "too-few-cycles"})
-    if few:
-        notices.append(
-            Notice("too-few-cycles", f"Fewer cycles than planned were measured for {listed(few)}; their values stand.")
-        )
+    notices += cycle_notices(plan, found)
     coarse: dict[str, list[str]] = {}
     for value in found.values:
         if value.status == "instrument-too-coarse" and value.component not in coarse.setdefault(value.id, []):

@@ -223,7 +223,7 @@ def _rated_load(arm: Robot, load: object, warnings: list[Notice]) -> float:
         parameter="load",
         where=arm.name,
         allowed="a mass above 0 [kg]",
-        cure="State it.",
+        cure="Give it as `load`, or state rated_load in the robot file.",
     )
 
 

@@ -38,7 +38,8 @@ _MARK: Final = 12
 _JOINT_SPEEDS: Final = {
     "RAPID": "joint motions have the share of the rated velocity, of the tip",
     "URScript": "100 % of the joints' speed is taken for 120 deg/s. Accelerations are URScript's own, 1.4 rad/s^2 and "
-    "1.2 m/s^2: on a short line the robot may not come to the velocity; state the acceleration a in the program where it shall",
+    "1.2 m/s^2: on a short line the robot may not come to the velocity; state the acceleration a in the program where "
+    "it shall",
 }
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from truearm.notices import Notice
+from truearm.planning.iso9283.criteria import TEST_OF
+from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_table import UNITS, number_words
 from truearm.shown import counted
 from truearm.validation.iso9283.copied import CopiedBlock
@@ -21,6 +23,8 @@ _TOLD: Final = 3
 _TOLD_PLACES: Final = 8
 #: So many values are told with and without a row.
 _VALUES: Final = 2
+#: Criteria of which each cycle of a place counts once.
+_EACH_CYCLE: Final = ("AP", "AD", "AT", "AT-reorientation", "CR", "AV", "WS", "t", "posing-time")
 #: Mean orientations further off than this are told [rad].
 _FAR_TURNED: Final = math.radians(2.0)
 
@@ -82,6 +86,41 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
             )
         )
     return tuple(notices)
+
+
+def cycle_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
+    """Return what is to be known about cycles that are fewer or more than planned."""
+    few, more = dict[str, None](), dict[str, None]()
+    for value in found.values:
+        planned = plan.test(TEST_OF[value.id])
+        if planned is None or value.component != "position" or value.status == "not-measured":
+            continue
+        words = f"{value.id} {value.where}: {value.cycles} of {planned.cycles}"
+        if value.status == "too-few-cycles":
+            few[words] = None
+        elif value.id in _EACH_CYCLE and value.cycles > planned.cycles:
+            more[words] = None
+    notices = []
+    if few:
+        notices.append(
+            Notice("too-few-cycles", f"Fewer cycles than planned were measured: {_some(few)}. Their values stand.")
+        )
+    if more:
+        notices.append(
+            Notice(
+                "more-cycles",
+                f"More cycles than planned were measured: {_some(more)}. All of them are in the values; check that "
+                "none belongs to another test.",
+                "note",
+            )
+        )
+    return notices
+
+
+def _some(words: Collection[str]) -> str:
+    told = list(words)
+    more = f"; and {len(told) - _TOLD_PLACES} more" if len(told) > _TOLD_PLACES else ""
+    return "; ".join(told[:_TOLD_PLACES]) + more
 
 
 def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:

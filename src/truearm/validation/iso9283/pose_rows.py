@@ -28,6 +28,8 @@ _NEARER: Final = 0.5
 _SAME_SHARE: Final = 5e-4
 #: A robot that has less than this share of the rows of another one was not measured, but its name mistyped.
 _FEW_ROWS: Final = 0.2
+#: So many more lines are named.
+_TOLD: Final = 5
 _FILES: Final = {"paths": "paths", "settling": "poses over time", "forces": "pushes"}
 
 
@@ -343,10 +345,14 @@ def _check_nearest(plan: PerformancePlan, readings: AttainedPoses, position: Arr
     if len(wrong):
         row = int(wrong[0])
         there = list(dict.fromkeys(names))[int(apart[row].argmin())]
+        lines = [str(int(line)) for line in readings.line[wrong[1 : 1 + _TOLD]]]
+        also = f"; so also line{'s' * (len(lines) != 1)} {', '.join(lines)}" if lines else ""
+        also += " and others" if len(wrong) > 1 + len(lines) else ""
         raise InputError(
             f"{len(wrong)} pose{'s' * (len(wrong) != 1)} at another place than the plan has it",
             where=f"{readings.source}, line {int(readings.line[row])}, column pose",
-            came=f"{_name(readings.pose, row)} is {1e3 * own[row]:.4g} mm off, {there} {1e3 * apart[row].min():.4g} mm",
+            came=f"{_name(readings.pose, row)}, and it lies at {there}, {1e3 * apart[row].min():.4g} mm from it, "
+            f"{1e3 * own[row]:.4g} mm from {_name(readings.pose, row)}{also}",
             cure="Correct the name, take the plan that was measured, or remove the cycle.",
         )
 

@@ -138,10 +138,12 @@ def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity:
     raise InputError(
         f"the path {path.path.name} was run much {'faster' if pace > velocity else 'slower'} than commanded",
         where=where,
-        came=f"{1e3 * pace:.4g} mm/s in the middle half",
+        came=f"{_apart(pace, _FASTER * velocity if pace > velocity else _SLOWEST * velocity)[0]} mm/s in the middle "
+        "half",
         allowed=f"{1e3 * _SLOWEST * velocity:.4g} to {1e3 * _FASTER * velocity:.4g} mm/s; commanded are "
         f"{1e3 * velocity:.4g}",
-        cure="Write the times in seconds, and check the column velocity [%] and the rated velocity of the plan.",
+        cure="Name the unit of the times in the header (s, ms, us), and check the column velocity [%] and the rated "
+        "velocity of the plan.",
     )
 
 
@@ -224,7 +226,7 @@ def _refuse_other_path(path: CommandedPath, few: Array, points: Array, distance:
 
 
 def _apart(came: float, allowed: float) -> tuple[str, str]:
-    """Return two lengths in mm with as many decimals as it takes to see that they differ."""
+    """Return two lengths in mm, or velocities in mm/s, with as many decimals as it takes to see that they differ."""
     for decimals in range(1, 7):
         both = f"{1e3 * came:.{decimals}f}", f"{1e3 * allowed:.{decimals}f}"
         if both[0] != both[1]:

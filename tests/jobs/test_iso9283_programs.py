@@ -144,6 +144,17 @@ def test_programs_of_a_controller_whose_counting_is_not_known_say_so_or_are_refu
     assert not any("compare joints" in text for text in known.files.values())
 
 
+def test_the_sheet_has_the_order_of_the_poses_and_the_tip(cube: Path) -> None:
+    sheet = planned(cube, criteria=["ap", "ad", "at"], tip=(0.01, 0.0, 0.1)).contents()["sheet.html"]
+    assert "P5, P4, P3, P2, P1" in sheet
+    assert "P2, P4" in sheet
+    assert "at x 10.000, y 0.000, z 100.000 mm in the flange frame" in sheet
+    assert "The flange itself is measured" in planned(cube).contents()["sheet.html"]
+    assert "in the order in which programs drive them" not in planned(cube).contents()["sheet.html"]
+    noted = planned(cube, velocity=None).contents()["sheet.html"]
+    assert '<p class="notice note"><strong>Note (rated-velocity-assumed)' in noted
+
+
 def test_a_folder_never_holds_programs_of_two_plans(cube: Path, tmp_path: Path) -> None:
     for criteria in (["av"], ["av", "ap"], ["av", "ap"]):
         planned(cube, program="krl", criteria=criteria, out=tmp_path)

@@ -22,8 +22,9 @@ from truearm.validation.iso9283.compliance import GRAVITY, evaluate_pushes
 from truearm.validation.iso9283.drift import groups_of
 from truearm.validation.iso9283.intervals import repeatability
 from truearm.validation.iso9283.inverted_tests import norm_interval
+from truearm.validation.iso9283.other_cube import other_cube
 from truearm.validation.iso9283.pose_rows import best_fit_of, cycles_of
-from truearm.validation.iso9283.poses import evaluate
+from truearm.validation.iso9283.poses import PoseCloud, evaluate
 from truearm.validation.iso9283.values import Instrument, Value
 from truearm.validation.iso9283.wild_pushes import wild_pushes
 
@@ -372,3 +373,26 @@ def test_a_tie_that_is_as_far_off_as_the_robot_leaves_drift_open() -> None:
     exact = Alignment("base-features", Transform(), 1e-9, 1e-9)
     low, high = found(evaluate(task, read, exact, TRACKER).values, "dAP").interval or (0.0, 1.0)
     assert high < 7e-5
+
+
+def test_poses_of_another_cube_are_told() -> None:
+    def clouds(scale: float, shift: float, wild: float = 0.0) -> tuple[PoseCloud, ...]:
+        middle = POINTS.mean(axis=0)
+        made = []
+        for k, point in enumerate(POINTS):
+            at = middle + scale * (point - middle) + np.array([shift, 0.0, wild * (-1) ** k])
+            made.append(PoseCloud("AP", "", NAMES[k], "", 1.0, 1.0, point, at[None], at, 0.0))
+        return tuple(made)
+
+    side = 0.2
+    larger = other_cube(clouds(1.02, 0.0), side)
+    assert larger is not None
+    assert (larger.test, larger.scale, larger.aside) == ("AP", pytest.approx(1.02), pytest.approx(0.0, abs=1e-12))
+    moved = other_cube(clouds(1.0, 0.011), side)
+    assert moved is not None
+    assert moved.aside == pytest.approx(0.011)
+    pair = other_cube(clouds(0.98, 0.001)[1:4:2], side)
+    assert pair is not None
+    assert pair.scale == pytest.approx(0.98)
+    for ordinary in (clouds(1.009, 0.0), clouds(1.0, 0.009), clouds(1.02, 0.0, wild=2e-3), clouds(1.02, 0.0)[:1]):
+        assert other_cube(ordinary, side) is None

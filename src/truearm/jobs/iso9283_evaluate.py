@@ -26,7 +26,7 @@ from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
-from truearm.results.iso9283_notices import copied_notices, cycle_notices, row_notices
+from truearm.results.iso9283_notices import copied_notices, cube_notices, cycle_notices, row_notices
 from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.copied import copied_blocks
@@ -150,6 +150,7 @@ def _warnings(plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any])
     copied = [block for name in ("paths", "settling") if name in read for block in copied_blocks(read[name])]
     notices += copied_notices(copied)
     notices += cycle_notices(plan, found)
+    notices += cube_notices(plan, found)
     coarse: dict[str, list[str]] = {}
     for value in found.values:
         if value.status == "instrument-too-coarse" and value.component not in coarse.setdefault(value.id, []):

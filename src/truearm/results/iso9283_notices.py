@@ -13,6 +13,7 @@ from truearm.results.iso9283_table import UNITS, number_words
 from truearm.shown import counted
 from truearm.validation.iso9283.copied import CopiedBlock
 from truearm.validation.iso9283.evaluation import Evaluation
+from truearm.validation.iso9283.other_cube import other_cube
 from truearm.validation.iso9283.pose_rows import Cycles
 from truearm.validation.iso9283.values import Value
 from truearm.validation.iso9283.wild_pushes import WildPush
@@ -115,6 +116,22 @@ def cycle_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
             )
         )
     return notices
+
+
+def cube_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
+    """Return what is to be known where the poses are those of another cube."""
+    other = other_cube(found.clouds, plan.cube.side)
+    if other is None:
+        return []
+    side = 1e3 * plan.cube.side
+    return [
+        Notice(
+            "other-cube",
+            f"The poses of {other.test} lie as those of a cube of {side * other.scale:.1f} mm, where the plan has "
+            f"{side:.1f} mm, with its middle {1e3 * other.aside:.1f} mm aside. No robot is off like that: were they "
+            "measured for another plan, or is the tie to the base another one? Give the plan.yaml that was measured.",
+        )
+    ]
 
 
 def _some(words: Collection[str]) -> str:

@@ -387,7 +387,8 @@ def test_poses_of_another_cube_are_told() -> None:
     side = 0.2
     larger = other_cube(clouds(1.02, 0.0), side)
     assert larger is not None
-    assert (larger.test, larger.scale, larger.aside) == ("AP", pytest.approx(1.02), pytest.approx(0.0, abs=1e-12))
+    assert larger.test == "AP"
+    assert (larger.scale, larger.aside) == pytest.approx((1.02, 0.0), abs=1e-9)
     moved = other_cube(clouds(1.0, 0.011), side)
     assert moved is not None
     assert moved.aside == pytest.approx(0.011)

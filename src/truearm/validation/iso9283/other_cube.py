@@ -62,13 +62,19 @@ def other_cube(clouds: tuple[PoseCloud, ...], side: float) -> OtherCube | None:
 
 
 def _explained(commanded: Array, error: Array, side: float) -> tuple[float, float] | None:
-    """Return scale and shift that explain errors ``(k, 3)`` of poses, two or more."""
+    """Return scale and shift that explain errors ``(k, 3)`` of poses, two or more, beside a turn of the frame.
+
+    Two poses have a distance alone, which tells the scale.
+    """
     out = commanded - commanded.mean(axis=0)
     shift = error.mean(axis=0)
-    scale = float(((error - shift) * out).sum() / (out**2).sum())
-    left = error - shift - scale * out
-    total = error if np.linalg.norm(shift) > _ASIDE * side else error - shift
-    if np.linalg.norm(left) > _LEFT * np.linalg.norm(total):
-        return None
+    moved = error - shift
+    if len(out) > 2:
+        turns = np.stack([np.cross(axis, out).ravel() for axis in np.eye(3)], axis=1)
+        moved = moved - (turns @ np.linalg.lstsq(turns, moved.ravel(), rcond=None)[0]).reshape(-1, 3)
+    scale = float((moved * out).sum() / (out**2).sum())
+    left = np.linalg.norm(moved - scale * out) if len(out) > 2 else 0.0
     aside = float(np.linalg.norm(shift))
-    return (1.0 + scale, aside) if abs(scale) > _SCALE or aside > _ASIDE * side else None
+    larger = abs(scale) > _SCALE and left <= _LEFT * abs(scale) * np.linalg.norm(out)
+    beside = aside > _ASIDE * side and left <= _LEFT * aside * np.sqrt(len(out))
+    return (1.0 + scale, aside) if larger or beside else None

@@ -13,16 +13,17 @@ from typing import Final
 
 from truearm.errors import InputError, did_you_mean
 
-# How many of the unit make one SI unit (lengths and grams, as divisors) or how much SI one unit is (angles, inch):
-# mm to m divides by 1000, which is correctly rounded, where multiplying by 0.001 is not.
-_PER_SI: Final = {"m": 1.0, "mm": 1e3, "um": 1e6, "g": 1e3, "ppm": 1e6, "1/deg": math.pi / 180.0}
+# How many of the unit make one SI unit (lengths, grams and times, as divisors) or how much SI one unit is (angles,
+# inch): mm to m divides by 1000, which is correctly rounded, where multiplying by 0.001 is not.
+_PER_SI: Final = {"m": 1.0, "mm": 1e3, "um": 1e6, "g": 1e3, "ppm": 1e6, "ms": 1e3, "us": 1e6, "1/deg": math.pi / 180.0}
 _SI_PER: Final = {
     **{"in": 0.0254, "rad": 1.0, "deg": math.pi / 180.0, "mrad": 1e-3, "1": 1.0, "1/mm": 1e3},
     **{"mrad/(N m)": 1e-3, "mrad/(N m)^2": 1e-3, "mrad/(N m)^3": 1e-3, "um/N": 1e-6, "um/(m K)": 1e-6},
-    **dict.fromkeys(("kg", "N", "N m", "degC"), 1.0),
+    **dict.fromkeys(("kg", "N", "N m", "degC", "s"), 1.0),
 }
 
 LENGTH_UNITS: Final = ("mm", "m", "um", "in")
+TIME_UNITS: Final = ("s", "ms", "us")
 ANGLE_UNITS: Final = ("deg", "rad")
 SMALL_ANGLE_UNITS: Final = ("mrad", "rad", "deg")
 

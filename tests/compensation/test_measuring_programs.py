@@ -209,8 +209,18 @@ def test_cycles_go_where_the_test_asks(programs: dict[str, MotionProgram]) -> No
     assert visited("DAP_10") == visited("T_100") == ["P2", "P1"] * 2
     assert visited("POSING_10") == ["P1", "D10", "P1", "D50"] * 2
     pushes = [step.text for step in programs["COMPL_10"].steps if isinstance(step, Remark)]
-    assert pushes[:3] == ["+x, cycle 1 of 2", "+x: 0 % of the rated load", "+x: 10 % of the rated load"]
-    assert len(pushes) == 2 * 6 * 12
+    assert pushes[0] == pushes.pop() == "To P1"
+    assert pushes[1:4] == ["+x, cycle 1 of 2", "+x: 0 % of the rated load", "+x: 10 % of the rated load"]
+    assert len(pushes) == 1 + 2 * 6 * 12
+
+
+def test_every_stop_has_its_name_in_every_language(programs: dict[str, MotionProgram]) -> None:
+    for language in BY_NAME:
+        if BY_NAME[language].motion is None:
+            continue
+        stops = re.findall(r"To (\S+)", text_of(language, programs["AP_10"]))
+        assert stops == ["P1", *["P5", "P4", "P3", "P2", "P1"] * 2, "P1"], language
+    assert "To start of line" in text_of("rapid", programs["AT_10"])
 
 
 def test_the_first_run_is_at_a_tenth_and_at_most_250_mm_a_second() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ast
+import dataclasses
+import inspect
 import json
 import re
 from collections.abc import Mapping
@@ -22,6 +25,7 @@ from truearm.modeling.transform import quaternion_from_rotation, rotation_from_q
 from truearm.planning.iso9283.criteria import TEST_OF
 from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
 from truearm.results.iso9283_evaluation import Iso9283Evaluation
+from truearm.results.iso9283_notices import cycle_notices
 from truearm.results.iso9283_table import worst_places
 from truearm.simulation.truths import truth_twin
 from truearm.validation.iso9283.missing import missing_places
@@ -221,9 +225,63 @@ def test_too_few_cycles_are_said_and_the_values_stand(small: Arguments) -> None:
     small["poses"].write_text("\n".join(lines[:-1]) + "\n")
     fewer = truearm.iso9283_evaluate(small["plan"], poses=small["poses"], alignment=small["alignment"])
     (said,) = [notice for notice in fewer.warnings if notice.code == "too-few-cycles"]
-    assert (said.level, "AP" in said.message) == ("warning", True)
+    assert said.level == "warning"
+    found = re.fullmatch(r"Fewer cycles .* measured: AP (P\d): (\d+) of (\d+); RP \1: \2 of \3. .*", said.message)
+    assert found is not None
+    assert int(found[2]) == int(found[3]) - 1
     assert {"too-few-cycles", "measured"} <= {value.status for value in positions(fewer, "AP").values()}
     assert all(np.isfinite(value.value) for value in positions(fewer, "AP").values())
+
+
+def test_more_cycles_than_planned_are_noted(small: Arguments) -> None:
+    whole = truearm.iso9283_evaluate(small["plan"], poses=small["poses"], alignment=small["alignment"])
+    plan = dataclasses.replace(
+        whole.plan, tests=tuple(dataclasses.replace(test, cycles=test.cycles - 1) for test in whole.plan.tests)
+    )
+    more = [notice for notice in cycle_notices(plan, whole.evaluation) if notice.code == "more-cycles"]
+    assert cycle_notices(whole.plan, whole.evaluation) == []
+    assert [notice.level for notice in more] == ["note"]
+    assert re.match(r"More cycles than planned were measured: AP P1: (\d+) of \d+; ", more[0].message)
+
+
+def test_times_may_be_in_other_units_that_the_header_names(small: Arguments, tmp_path: Path) -> None:
+    for name in ("poses", "paths", "settling"):
+        header, *rows = small[name].read_text().splitlines()
+        place = header.split(",").index("time [s]")
+        made = [header.replace("time [s]", "time [ms]")]
+        for row in rows:
+            cells = row.split(",")
+            cells[place] = repr(1e3 * float(cells[place])) if cells[place] else ""
+            made.append(",".join(cells))
+        (tmp_path / f"{name}-ms.csv").write_text("\n".join(made) + "\n")
+        one, other = (
+            truearm.iso9283_evaluate(**{"plan": small["plan"], "alignment": small["alignment"], name: file})
+            for file in (small[name], tmp_path / f"{name}-ms.csv")
+        )
+        assert [value.value for value in one.values] == pytest.approx([v.value for v in other.values], nan_ok=True)
+
+
+def test_texts_name_parameters_of_these_jobs_alone() -> None:
+    """A word in backticks is shown as an option by the command: texts may have no others."""
+    jobs = (truearm.iso9283_plan, truearm.iso9283_simulate, truearm.iso9283_evaluate)
+    known = {name for job in jobs for name in inspect.signature(job).parameters}
+    root = Path(truearm.__file__).parent
+    files = [file for file in root.rglob("*.py") if "iso9283" in str(file.relative_to(root))]
+    files += [root / "measurement" / "readers" / f"performance_{name}.py" for name in ("poses", "samples")]
+    assert len(files) > 40
+    for file in files:
+        tree = ast.parse(file.read_text())
+        documented = {
+            id(node.body[0].value)
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+            and node.body
+            and isinstance(node.body[0], ast.Expr)
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documented:
+                named = set(re.findall(r"(?<!`)`([a-z][a-z_]*)(?:=[^`]*)?`(?!`)", node.value))
+                assert named <= known, (file.name, node.value)
 
 
 def test_a_wild_row_is_said_with_the_value_without_it(small: Arguments) -> None:

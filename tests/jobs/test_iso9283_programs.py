@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import truearm
 from truearm.compensation.iso9283.slow_run import SLOW_RUN
 from truearm.errors import InputError
+from truearm.modeling.controller import Controller
 from truearm.notices import Notice
 from truearm.results.iso9283_plan import Iso9283Plan
 
@@ -119,13 +121,62 @@ def test_a_language_of_another_maker_and_speeds_that_it_does_not_say_are_told(cu
     assert [one.code for one in notices("fanuc")] == ["maker"]
 
 
-def test_a_folder_takes_other_tests_and_all_of_them_again(cube: Path, tmp_path: Path) -> None:
-    for criteria in (["av", "ap"], ["av"], ["av", "ap"]):
+def test_programs_of_a_controller_whose_counting_is_not_known_say_so_or_are_refused(cube: Path) -> None:
+    robot = replace(truearm.load_robot("irb120"), controller=Controller(), maker="")
+
+    def of(language: str, controller: Controller = robot.controller) -> Iso9283Plan:
+        return truearm.iso9283_plan(
+            replace(robot, controller=controller), criteria=["ap"], cube=cube, load=3.0, program=language
+        )
+
+    with pytest.raises(InputError, match="controllers that run FANUC LS count joint 3 together with joint 2") as found:
+        of("fanuc")
+    assert found.value.parameter == "program"
+    for language in ("rapid", "krl", "urscript", "val3"):
+        made = of(language)
+        (told,) = [one for one in made.warnings if one.code == "controller-counts-assumed"]
+        assert told.level == "warning"
+        assert made.programs is not None
+        assert any("compare joints with the pendant" in text for text in made.programs.files.values())
+        assert told.message.partition(":")[0] in made.contents()["sheet.html"]
+    known = of("fanuc", Controller(source="the pendant shows the model's joints")).programs
+    assert known is not None
+    assert not any("compare joints" in text for text in known.files.values())
+
+
+def test_the_sheet_has_the_order_of_the_poses_and_the_tip(cube: Path) -> None:
+    sheet = planned(cube, criteria=["ap", "ad", "at"], tip=(0.01, 0.0, 0.1)).contents()["sheet.html"]
+    assert "P5, P4, P3, P2, P1" in sheet
+    assert "P2, P4" in sheet
+    assert "at x 10.000, y 0.000, z 100.000 mm in the flange frame" in sheet
+    assert "The flange itself is measured" in planned(cube).contents()["sheet.html"]
+    assert "in the order in which programs drive them" not in planned(cube).contents()["sheet.html"]
+    noted = planned(cube, velocity=None).contents()["sheet.html"]
+    assert '<p class="notice note"><strong>Note (rated-velocity-assumed)' in noted
+
+
+def test_a_folder_never_holds_programs_of_two_plans(cube: Path, tmp_path: Path) -> None:
+    for criteria in (["av"], ["av", "ap"], ["av", "ap"]):
         planned(cube, program="krl", criteria=criteria, out=tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert sorted(path.name for path in (tmp_path / "programs").iterdir()) == ["AP_10.src", "AV_10.src"]
+    for other in ({"program": "krl"}, {"program": "rapid", "criteria": ["av", "ap"]}, {}, {"criteria": ["ad"]}):
+        with pytest.raises(InputError, match="programs of another plan are there, and would stay beside") as refusal:
+            planned(cube, out=tmp_path, **other)
+        assert refusal.value.parameter == "out"
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+    filled(tmp_path / SLOW_RUN)
+    planned(cube, program="krl", criteria=["av", "ap"], slow_run=tmp_path / SLOW_RUN, out=tmp_path)
+    (tmp_path / SLOW_RUN).unlink()
+    with pytest.raises(InputError, match=r"would stay beside this one; got '.*100.src'"):
+        planned(cube, program="krl", criteria=["av", "ap"], out=tmp_path)
+
+
+def test_a_program_of_somebody_else_is_not_overwritten(cube: Path, tmp_path: Path) -> None:
+    planned(cube, program="krl", out=tmp_path)
     (tmp_path / "programs" / "AD_10.src").write_text("of somebody else")
     with pytest.raises(InputError, match="was not written here by truearm, and is not overwritten"):
-        planned(cube, program="krl", criteria=["ad"], out=tmp_path)
+        planned(cube, program="krl", criteria=["av", "ad"], out=tmp_path)
 
 
 def test_ways_that_come_near_the_floor_are_told(cube: Path, tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def test_an_alignment_in_another_unit_is_named_and_no_path(small: Arguments) -> 
     found = refusal_of(small)
     assert found.parameter == "alignment"
     assert str(small["alignment"]) in str(found)
-    assert "Is `position` in m where the file says mm?" in str(found)
+    assert "Is the position in m where the file says mm?" in str(found)
 
 
 @pytest.mark.parametrize(

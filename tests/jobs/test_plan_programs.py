@@ -197,12 +197,17 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
     )
     for program in ("rapid", "krl", "fanuc", "urscript", "inform", "val3"):
         asked = wanted(program=program)
+        if program == "fanuc":
+            with pytest.raises(InputError, match="controllers that run FANUC LS count joint 3 together with joint 2"):
+                asked.check(robot)
+            continue
         asked.check(robot)
         driven = with_program(replace(planned, made=made, tour=tour, program=None), asked, robot, weighed=False).program
         assert driven is not None
         codes = [notice.code for notice in driven.warnings]
         assert codes == ["controller-counts-assumed", "tool-assumed", "joint-speed-assumed"]
         assert [notice.level for notice in driven.warnings] == ["warning", "warning", "note"]
+        assert any("compare joints with the pendant" in text for text in driven.files.values())
         assert "Nobody said the load of the flange" in driven.warnings[1].message
         by_hand = {"fanuc": "Payload schedule 1 on", "inform": "Tool file 0 on", "val3": "The tool flange on"}
         assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.lines())

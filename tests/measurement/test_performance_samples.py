@@ -99,6 +99,8 @@ def test_rows_are_the_same_whatever_the_size_of_the_blocks(
     ("row", "said"),
     [
         ("AP,line,1,0,1,2,3", "line 3, column criterion: there is no such test in this file"),
+        ("RT,line,1,0,1,2,3", "got 'RT'; allowed: AT, AT-reorientation, CR, AV, WS. Name the test: AT."),
+        ("AT,line,first,0,1,2,3", "allowed: 1, 2, 3 and so on, or nothing where"),
         ("WT,line,1,0,1,2,3", "AT, AT-reorientation, CR, AV, WS"),
         ("t,line,1,0,1,2,3", "Samples of t belong into the file of settling"),
         ("AT,,1,0,1,2,3", "line 3, column path: the cell is empty"),

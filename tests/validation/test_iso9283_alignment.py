@@ -79,10 +79,10 @@ def test_a_sound_tie_is_plausible(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"position": "[1.5, -0.31, 0.012]"}, "Is `position` in m where the file says mm?"),
-        ({"units": "{length: m, angle: deg}", "sigma": "3e-5"}, "Is `position` in mm where the file says m?"),
+        ({"position": "[1.5, -0.31, 0.012]"}, "Is the position in m where the file says mm?"),
+        ({"units": "{length: m, angle: deg}", "sigma": "3e-5"}, "Is the position in mm where the file says m?"),
         ({"position": "[310, 1500, -12]", "quaternion": "[0.7071067812, 0, 0, -0.7071067812]"}, "the base in the inst"),
-        ({"quaternion": "[0, 0, 0.7071067812, 0.7071067812]"}, "Does `quaternion` begin with x?"),
+        ({"quaternion": "[0, 0, 0.7071067812, 0.7071067812]"}, "Does the quaternion begin with x?"),
         ({"position": "[-4000, 0, 0]"}, "Check its numbers and units"),
     ],
 )

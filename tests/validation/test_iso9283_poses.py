@@ -22,8 +22,9 @@ from truearm.validation.iso9283.compliance import GRAVITY, evaluate_pushes
 from truearm.validation.iso9283.drift import groups_of
 from truearm.validation.iso9283.intervals import repeatability
 from truearm.validation.iso9283.inverted_tests import norm_interval
+from truearm.validation.iso9283.other_cube import other_cube
 from truearm.validation.iso9283.pose_rows import best_fit_of, cycles_of
-from truearm.validation.iso9283.poses import evaluate
+from truearm.validation.iso9283.poses import PoseCloud, evaluate
 from truearm.validation.iso9283.values import Instrument, Value
 from truearm.validation.iso9283.wild_pushes import wild_pushes
 
@@ -175,14 +176,14 @@ def test_variation_between_approaches() -> None:
 
 
 def test_distances_by_cycles_and_axes() -> None:
-    wave = 1e-4 * np.cos(2 * np.pi * np.arange(30) / 30)
+    wave = 1e-4 * np.linspace(-1.0, 1.0, 30)
     way = (POINTS[3] - POINTS[1]) / np.linalg.norm(POINTS[3] - POINTS[1])
-    ends = np.concatenate([np.tile(POINTS[1], (30, 1)), POINTS[3] + (2e-4 + wave)[:, None] * way])
+    ends = np.concatenate([POINTS[1] + 1e-7 * np.outer(wave, way), POINTS[3] + (2e-4 + wave)[:, None] * way])
     task = plan(PlannedTest("AD", ("P2", "P4"), 30))
     values = evaluate(task, rows("AD", ["P2"] * 30 + ["P4"] * 30, [*range(1, 31)] * 2, ends), TIE, TRACKER).values
     assert found(values, "AD").value == pytest.approx(2e-4)
     assert found(values, "AD").where == "P2-P4"
-    assert found(values, "RD").value == pytest.approx(3 * wave.std(ddof=1))
+    assert found(values, "RD").value == pytest.approx(3 * wave.std(ddof=1), rel=1e-6)
     parts = [found(values, "AD", axis).value for axis in "xyz"]
     assert parts == pytest.approx(2e-4 * np.abs(way), abs=1e-12)
 
@@ -373,3 +374,27 @@ def test_a_tie_that_is_as_far_off_as_the_robot_leaves_drift_open() -> None:
     exact = Alignment("base-features", Transform(), 1e-9, 1e-9)
     low, high = found(evaluate(task, read, exact, TRACKER).values, "dAP").interval or (0.0, 1.0)
     assert high < 7e-5
+
+
+def test_poses_of_another_cube_are_told() -> None:
+    def clouds(scale: float, shift: float, wild: float = 0.0) -> tuple[PoseCloud, ...]:
+        middle = POINTS.mean(axis=0)
+        made = []
+        for k, point in enumerate(POINTS):
+            at = middle + scale * (point - middle) + np.array([shift, 0.0, wild * (-1) ** k])
+            made.append(PoseCloud("AP", "", NAMES[k], "", 1.0, 1.0, point, at[None], at, 0.0))
+        return tuple(made)
+
+    side = 0.2
+    larger = other_cube(clouds(1.02, 0.0), side)
+    assert larger is not None
+    assert larger.test == "AP"
+    assert (larger.scale, larger.aside) == pytest.approx((1.02, 0.0), abs=1e-9)
+    moved = other_cube(clouds(1.0, 0.011), side)
+    assert moved is not None
+    assert moved.aside == pytest.approx(0.011)
+    pair = other_cube(clouds(0.98, 0.001)[1:4:2], side)
+    assert pair is not None
+    assert pair.scale == pytest.approx(0.98)
+    for ordinary in (clouds(1.009, 0.0), clouds(1.0, 0.009), clouds(1.02, 0.0, wild=2e-3), clouds(1.02, 0.0)[:1]):
+        assert other_cube(ordinary, side) is None

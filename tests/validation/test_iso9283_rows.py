@@ -25,6 +25,7 @@ from truearm.modeling.transform import (
 )
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.alignment import Alignment
+from truearm.validation.iso9283.copied import refuse_copied_poses
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
 from truearm.validation.iso9283.pose_rows import cycles_of
 from truearm.validation.iso9283.values import Instrument
@@ -278,6 +279,24 @@ def test_a_row_that_was_copied_is_refused() -> None:
         found(plan, copied)
 
 
+def test_two_cycles_with_one_position_are_copies_unless_readings_are_rounded() -> None:
+    plan, read = campaign(1, ("AP",))
+    one, other = (int(rows_of(read, pose="P2", velocity=1.0, cycle=cycle)[0]) for cycle in (4, 5))
+    copied = moved(read, np.array([other]), np.zeros(3))
+    copied.position[other] = copied.position[one]
+    with pytest.raises(InputError, match=f"lines {one + 2} and {other + 2}: 1 row with the position of another cycle"):
+        found(plan, copied)
+    held = dataclasses.replace(read, position=read.position.copy())
+    rows = rows_of(read, pose="P2", velocity=1.0)
+    held.position[rows] = held.position[rows[0]]
+    with pytest.raises(InputError, match=f"{len(rows) - 1} rows with the position of another cycle of the same pose"):
+        found(plan, held)
+    rounded = dataclasses.replace(read, position=np.round(read.position, 5))
+    assert len(np.unique(rounded.position, axis=0)) < len(rounded.position)
+    refuse_copied_poses(rounded)
+    refuse_copied_poses(dataclasses.replace(held, position=held.position[rows[0]] + np.zeros_like(held.position)))
+
+
 def test_two_poses_that_were_swapped_are_refused() -> None:
     plan, read = campaign(1, ("AD",))
     position = read.position.copy()
@@ -288,8 +307,9 @@ def test_two_poses_that_were_swapped_are_refused() -> None:
     position = read.position.copy()
     pair = [int(rows_of(read, pose=pose, cycle=5, velocity=1.0)[0]) for pose in ("P2", "P4")]
     position[pair] = position[pair[::-1]]
-    with pytest.raises(InputError, match=rf"line {min(pair) + 2}, column pose: 2 poses at another place"):
+    with pytest.raises(InputError, match=rf"line {min(pair) + 2}, column pose: 2 poses at another place") as refusal:
         found(plan, dataclasses.replace(read, position=position))
+    assert re.search(rf"got 'P., and it lies at P.,.*; so also line {max(pair) + 2}'", str(refusal.value))
 
 
 def test_quaternions_in_another_order_are_refused() -> None:

@@ -32,6 +32,7 @@ from truearm.validation.iso9283.corners import corner_values
 from truearm.validation.iso9283.paths import path_values
 from truearm.validation.iso9283.runs import in_base
 from truearm.validation.iso9283.settling import settling_values
+from truearm.validation.iso9283.synchronise import _apart
 from truearm.validation.iso9283.values import Instrument
 from truearm.validation.iso9283.velocity import velocity_values
 from truearm.validation.iso9283.weaving import weaving_values
@@ -205,11 +206,33 @@ def test_a_path_that_is_not_the_planned_one_is_refused() -> None:
     )
     first = samples.cycle == 1
     backwards = samples_of("AT", "line", [(1, samples.time[first], samples.position[first][::-1])])
-    assert "in another direction" in refused(backwards)
+    assert "the samples run the path line backwards" in refused(backwards)
     half = samples_of("AT", "line", [(1, samples.time[first][:80], samples.position[first][:80])])
     assert "run only a part of the path line" in refused(half)
     few = samples_of("AT", "line", [(1, samples.time[first][:10], samples.position[first][:10])])
     assert "too few samples of this cycle" in refused(few)
+
+
+def test_a_small_circle_is_judged_by_its_shape_where_the_robot_is_off_as_far_as_it_is_wide() -> None:
+    extent = 2.0 * float(np.linalg.norm(np.diff(PLAN.paths["small-circle"].points[:2], axis=0)))
+    for off in (0.21, 0.3, 0.39):
+        values, _ = path_values(PLAN, offset_runs("small-circle", np.tile(off * extent * NORMAL, (3, 1))), HERE, EXACT)
+        assert the(values, "AT").value == pytest.approx(off * extent, rel=1e-6)
+    beside = refused(offset_runs("small-circle", np.tile(0.41 * extent * NORMAL, (3, 1))))
+    assert "run the path small-circle too far beside it for planes through it to tell anything; got" in beside
+    assert f"{410 * extent:.1f} mm beside it as a whole'; allowed: {400 * extent:.1f} mm" in beside
+
+
+@pytest.mark.parametrize("name", ["small-circle", "large-circle", "rectangle"])
+def test_a_closed_path_that_is_run_backwards_is_called_so(name: str) -> None:
+    ahead = offset_runs(name, np.tile(1e-3 * NORMAL, (2, 1)))
+    rows = [(k, ahead.time[ahead.cycle == k], ahead.position[ahead.cycle == k][::-1]) for k in (1, 2)]
+    assert f"the samples run the path {name} backwards. Run it" in refused(samples_of("AT", name, rows))
+
+
+def test_two_lengths_that_differ_are_never_shown_alike() -> None:
+    assert _apart(5.00001e-3, 5e-3) == ("5.00001", "5.00000")
+    assert _apart(7e-3, 5e-3) == ("7.0", "5.0")
 
 
 def test_a_place_or_a_test_that_is_not_planned_is_refused() -> None:

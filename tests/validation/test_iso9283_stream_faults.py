@@ -28,7 +28,9 @@ from truearm.modeling.chain import Array
 from truearm.notices import Notice
 from truearm.planning.iso9283.way import Way
 from truearm.results.iso9283_evaluation import value_summary
+from truearm.results.iso9283_notices import copied_notices
 from truearm.validation.iso9283.alignment import Alignment
+from truearm.validation.iso9283.copied import copied_blocks
 from truearm.validation.iso9283.corners import corner_values
 from truearm.validation.iso9283.evaluation import Evaluation
 from truearm.validation.iso9283.paths import path_values
@@ -339,7 +341,7 @@ def test_times_of_another_unit_are_refused(factor: float, word: str) -> None:
     samples = runs()
     text = refusal_of_path(replace(samples, time=samples.time * factor))
     assert f"the path line was run much {word} than commanded" in text
-    assert "allowed: 5 to 500 mm/s; commanded are 250. Write the times in seconds" in text
+    assert "allowed: 5 to 500 mm/s; commanded are 250. Name the unit of the times" in text
     rest = resting()
     word = {"slower": "more slowly", "faster": "faster"}[word]
     with pytest.raises(InputError, match=rf"the tip would move {word} than any robot's.*Write the times in seconds"):
@@ -370,6 +372,23 @@ def test_orientations_in_another_order_are_refused() -> None:
     rotation = np.broadcast_to(np.diag([1.0, -1.0, -1.0]), (len(samples.time), 3, 3))
     with pytest.raises(InputError, match=r"columns qw to qz: .*180.0 deg off"):
         path_values(PLAN, replace(samples, rotation=rotation), HERE, TRACKER)
+
+
+def test_samples_that_two_cycles_share_are_named() -> None:
+    samples = runs()
+    assert copied_blocks(samples) == () == copied_blocks(replace(samples, position=np.round(samples.position, 5)))
+    position = samples.position.copy()
+    one, other = (np.flatnonzero(samples.cycle == cycle)[20:60] for cycle in (2, 4))
+    position[other] = position[one]
+    (block,) = copied_blocks(replace(samples, position=position))
+    assert (block.test, block.place, block.cycles, block.count) == ("AT", "line", (2, 4), 40)
+    assert block.lines == (int(samples.line[one[0]]), int(samples.line[other[0]]))
+    (notice,) = copied_notices([block])
+    assert (notice.code, notice.level) == ("copied-samples", "warning")
+    assert f"cycles 2 and 4 of AT line, 40 samples from lines {block.lines[0]} and {block.lines[1]}." in notice.message
+    assert copied_notices([]) == []
+    position[other[9:]] = samples.position[other[9:]]
+    assert copied_blocks(replace(samples, position=position)) == ()
 
 
 # -- samples that are too far apart --------------------------------------------------------------------

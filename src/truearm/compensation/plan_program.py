@@ -13,6 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from truearm.compensation.joint_counts import counts_comments
 from truearm.compensation.programs.motion_program import (
     Carried,
     InputWait,
@@ -252,6 +253,7 @@ def _notes(robot: Robot, carried: Carried, driving: Driving, fastest: float, mar
         at(carried.cog_mm),
         f"At most {shown_speed(fastest)} mm/s and {number(100 * driving.share, 2)} %",
         f"Dwell {number(driving.dwell, 2)} s, wait: {driving.words}",
+        *counts_comments(robot),
         "Not verified, no safety function",
         "First run: step by step,",
         "at reduced speed, nobody near",

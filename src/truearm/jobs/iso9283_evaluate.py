@@ -23,12 +23,13 @@ from truearm.measurement.readers.performance_poses import read_attained_poses, r
 from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
 from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
+from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.planning.poses.iso9283 import Cube
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
-from truearm.results.iso9283_notices import row_notices
-from truearm.shown import listed
+from truearm.results.iso9283_notices import copied_notices, cube_notices, cycle_notices, row_notices
 from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
+from truearm.validation.iso9283.copied import copied_blocks
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
 from truearm.validation.iso9283.said_of_drift import said_of_drift
 from truearm.validation.iso9283.said_of_pushes import said_of_pushes
@@ -116,7 +117,7 @@ def iso9283_evaluate(
     instrument = Instrument(sigma, sigma_rot)
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
     warnings = (
-        *_warnings(found, instrument),
+        *_warnings(planned, found, read, instrument),
         *_of_plan(plan_path),
         *said_of_pushes(planned, found.pushes, instrument),
         *said_of_drift(planned, found.drift),
@@ -165,7 +166,9 @@ _READERS: Final[Mapping[str, Callable[[Path], object]]] = {
 }
 
 
-def _warnings(found: Evaluation, instrument: Instrument) -> tuple[Notice, ...]:
+def _warnings(
+    plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any], instrument: Instrument
+) -> tuple[Notice, ...]:
     notices: list[Notice] = []
     if not found.alignment.is_standard:
         notices.append(
@@ -177,11 +180,10 @@ def _warnings(found: Evaluation, instrument: Instrument) -> tuple[Notice, ...]:
             )
         )
     notices += row_notices(found)
-    few = sorted({value.id for value in found.values if value.status == "too-few-cycles"})
-    if few:
-        notices.append(
-            Notice("too-few-cycles", f"Fewer cycles than planned were measured for {listed(few)}; their values stand.")
-        )
+    copied = [block for name in ("paths", "settling") if name in read for block in copied_blocks(read[name])]
+    notices += copied_notices(copied)
+    notices += cycle_notices(plan, found)
+    notices += cube_notices(plan, found)
     coarse: dict[str, list[str]] = {}
     for value in found.values:
         if value.status == "instrument-too-coarse" and value.component not in coarse.setdefault(value.id, []):

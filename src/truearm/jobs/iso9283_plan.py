@@ -21,7 +21,7 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
-from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, written_programs
+from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, refuse_stale, written_programs
 from truearm.jobs.tip import tip_argument
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
@@ -192,9 +192,11 @@ def iso9283_plan(
     programs = None if language is None else written_programs(plan, language, stands, record, warnings)
     found = Iso9283Plan(plan, call, tuple(warnings), inputs, programs)
     if folder is not None:
+        names = tuple(found.contents())
         if programs is not None:
-            folder_for(tuple(found.contents()), folder, robot, given_cube, record, ours=True)
-            refuse_losing_slow_run(folder, record)
+            folder_for(names, folder, robot, given_cube, record, ours=True)
+        refuse_losing_slow_run(folder, record)
+        refuse_stale(folder, names, record)
         found.save(folder)
     return found
 
@@ -221,7 +223,7 @@ def _rated_load(arm: Robot, load: object, warnings: list[Notice]) -> float:
         parameter="load",
         where=arm.name,
         allowed="a mass above 0 [kg]",
-        cure="State it.",
+        cure="Give it as `load`, or state rated_load in the robot file.",
     )
 
 

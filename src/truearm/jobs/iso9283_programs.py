@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from truearm.compensation.iso9283.programs import measuring_programs
 from truearm.compensation.iso9283.slow_run import SLOW_RUN, check_slow_run, slow_run_text
+from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
 from truearm.compensation.path_program import BY_NAME
 from truearm.compensation.programs.motion_program import MotionProgram
 from truearm.compensation.programs.program import Language
@@ -25,6 +26,7 @@ from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.iso9283.plan_file import plan_text
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_plan import WrittenPrograms
+from truearm.writing import same_place
 
 #: What each language is called; FANUC's has a short name as well.
 PROGRAM_LANGUAGES: Final[Mapping[str, Language]] = {**BY_NAME, "fanuc": BY_NAME["fanuc-ls"]}
@@ -36,7 +38,8 @@ _MARK: Final = 12
 _JOINT_SPEEDS: Final = {
     "RAPID": "joint motions have the share of the rated velocity, of the tip",
     "URScript": "100 % of the joints' speed is taken for 120 deg/s. Accelerations are URScript's own, 1.4 rad/s^2 and "
-    "1.2 m/s^2: on a short line the robot may not come to the velocity; state `a=` in the program where it shall",
+    "1.2 m/s^2: on a short line the robot may not come to the velocity; state the acceleration a in the program where "
+    "it shall",
 }
 
 
@@ -47,6 +50,7 @@ def written_programs(
 
     What is to be said of them is added to `warnings`.
     """
+    refuse_unknown_counts(plan.robot, language.name)
     text = plan_text(plan)
     with refusals_of("program"):
         found = measuring_programs(plan, dwell, hash_of(text.encode())[:_MARK])
@@ -63,6 +67,7 @@ def written_programs(
         warnings.append(
             Notice("maker", f"{robot.name} is of {robot.maker}, and programs were written in {language.name}.")
         )
+    warnings += counts_notices(robot)
     if language.name in _JOINT_SPEEDS:
         warnings.append(
             Notice(
@@ -115,3 +120,27 @@ def refuse_losing_slow_run(folder: Path, slow_run: Path | None) -> None:
             where=str(path),
             cure="Give it as `slow_run`, or choose another folder.",
         )
+
+
+def refuse_stale(folder: Path, names: Collection[str], slow_run: Path | None) -> None:
+    """Refuse a folder with programs or a record of another plan, that would stay beside this one.
+
+    Parameters
+    ----------
+    names
+        Of the files that are written.
+    slow_run
+        The record that was given: it may be there.
+    """
+    written = [name for one in sets_in(folder) for name in one.files]
+    for name in written:
+        given = name == SLOW_RUN and slow_run is not None and same_place(folder / name, slow_run)
+        theirs = name == SLOW_RUN or name.startswith(f"{_FOLDER}/")
+        if theirs and not given and name not in names and exists(folder / name):
+            raise InputError(
+                "programs of another plan are there, and would stay beside this one",
+                parameter="out",
+                where=str(folder),
+                came=name,
+                cure="Choose another folder, or remove that plan with its programs.",
+            )

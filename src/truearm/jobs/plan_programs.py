@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
 from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program, shown_speed
 from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.compensation.programs.program import Language
@@ -83,7 +84,8 @@ class ProgramWanted:
         Raises
         ------
         InputError
-            If the maker's controllers do not speak it, the arm has more than six joints, or the device is touched.
+            If the maker's controllers do not speak it, the arm has more than six joints, its controller is known to
+            count them otherwise and the robot file does not say how, or the device is touched.
         """
         if robot.maker and not self.language.runs_on(robot.maker):
             known = [name for name in _NAMES if PROGRAM_LANGUAGES[name].runs_on(robot.maker)]
@@ -103,6 +105,7 @@ class ProgramWanted:
                 came=f"{len(robot.joints)} joints",
                 cure=_BY_ROWS,
             )
+        refuse_unknown_counts(robot, self.language.name)
         if device is not None and device not in _SEEN:
             raise InputError(
                 "an arm is brought to what it touches by hand, not by a program",
@@ -290,16 +293,7 @@ def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "
 
 
 def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -> list[Notice]:
-    found = []
-    if not robot.controller.counts_known:
-        found.append(
-            Notice(
-                "controller-counts-assumed",
-                f"It is not known how the controller of {robot.name} counts its joints: the program has the model's "
-                "joint positions. Compare them with the pendant before anything moves, and say under controller in "
-                "the robot file how it counts.",
-            )
-        )
+    found = counts_notices(robot)
     unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
     if unsaid:
         cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []

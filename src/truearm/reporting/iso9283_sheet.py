@@ -6,7 +6,7 @@ import numpy as np
 
 from truearm.modeling.transform import quaternion_from_rotation
 from truearm.planning.iso9283.criteria import TESTS
-from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.planning.iso9283.planned import PerformancePlan, visited
 from truearm.planning.iso9283.way import Way
 from truearm.planning.poses.pose_plan import PosePlan
 from truearm.reporting.drawing import Figure
@@ -35,6 +35,7 @@ def iso9283_sheet(planned: Iso9283Plan) -> str:
         "What to measure, in which order, and what to note.",
         [
             *planned.answer,
+            _tip(plan),
             "The rows of different criteria are never evaluated together: measure each of them.",
             "Run every program at 10 % of the velocity first, from the first motion to the last, with nobody in reach "
             "of the robot, and note that it was completed. Only then run it faster.",
@@ -50,7 +51,7 @@ def iso9283_sheet(planned: Iso9283Plan) -> str:
                 _cube(plan),
             )
         ],
-        tables=[_tests(plan), _poses(plan), _noted()],
+        tables=[_tests(plan), *_orders(plan), _poses(plan), _noted()],
         notices=planned.warnings,
     )
 
@@ -74,6 +75,20 @@ def _tests(plan: PerformancePlan) -> Figures:
         rows.append((f"{', '.join(known.criteria)}: {known.name}", where, str(test.cycles), *percent, "________"))
     heading = ("Criteria and test", "Where", "Cycles", "Velocity [%]", "Load [%]", "Done")
     return Figures("Tests", heading, tuple(rows))
+
+
+def _tip(plan: PerformancePlan) -> str:
+    if plan.target is None:
+        return "The flange itself is measured: poses are those of its middle."
+    x, y, z = (f"{1e3 * v:.3f}" for v in plan.robot.tool_place(plan.target).translation)
+    return f"What is measured is the tip {plan.target}, at x {x}, y {y}, z {z} mm in the flange frame."
+
+
+def _orders(plan: PerformancePlan) -> list[Figures]:
+    """Return the order in which a program drives the poses of a cycle, for whoever writes down the readings."""
+    rows = [(test.id, ", ".join(visited(test))) for test in plan.tests if visited(test)]
+    heading = ("Test", "Poses of a cycle, in the order in which programs drive them")
+    return [Figures("Order of the poses", heading, tuple(rows))] if rows else []
 
 
 def _poses(plan: PerformancePlan) -> Figures:

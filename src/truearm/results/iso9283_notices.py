@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from truearm.notices import Notice
+from truearm.planning.iso9283.criteria import TEST_OF
+from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_table import UNITS, number_words
 from truearm.shown import counted
+from truearm.validation.iso9283.copied import CopiedBlock
 from truearm.validation.iso9283.evaluation import Evaluation
+from truearm.validation.iso9283.other_cube import other_cube
 from truearm.validation.iso9283.pose_rows import Cycles
 from truearm.validation.iso9283.values import Value
 from truearm.validation.iso9283.wild_pushes import WildPush
@@ -19,6 +24,8 @@ _TOLD: Final = 3
 _TOLD_PLACES: Final = 8
 #: So many values are told with and without a row.
 _VALUES: Final = 2
+#: Criteria of which each cycle of a place counts once.
+_EACH_CYCLE: Final = ("AP", "AD", "AT", "AT-reorientation", "CR", "AV", "WS", "t", "posing-time")
 #: Mean orientations further off than this are told [rad].
 _FAR_TURNED: Final = math.radians(2.0)
 
@@ -93,6 +100,79 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
             )
         )
     return tuple(notices)
+
+
+def cycle_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
+    """Return what is to be known about cycles that are fewer or more than planned."""
+    few, more = dict[str, None](), dict[str, None]()
+    for value in found.values:
+        planned = plan.test(TEST_OF[value.id])
+        if planned is None or value.component != "position" or value.status == "not-measured":
+            continue
+        words = f"{value.id} {value.where}: {value.cycles} of {planned.cycles}"
+        if value.status == "too-few-cycles":
+            few[words] = None
+        elif value.id in _EACH_CYCLE and value.cycles > planned.cycles:
+            more[words] = None
+    notices = []
+    if few:
+        notices.append(
+            Notice("too-few-cycles", f"Fewer cycles than planned were measured: {_some(few)}. Their values stand.")
+        )
+    if more:
+        notices.append(
+            Notice(
+                "more-cycles",
+                f"More cycles than planned were measured: {_some(more)}. All of them are in the values; check that "
+                "none belongs to another test.",
+                "note",
+            )
+        )
+    return notices
+
+
+def cube_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
+    """Return what is to be known where the poses are those of another cube."""
+    other = other_cube(found.clouds, plan.cube.side)
+    if other is None:
+        return []
+    side = 1e3 * plan.cube.side
+    return [
+        Notice(
+            "other-cube",
+            f"The poses of {other.test} lie as those of a cube of {side * other.scale:.1f} mm, where the plan has "
+            f"{side:.1f} mm, with its middle {1e3 * other.aside:.1f} mm aside. No robot is off like that: were they "
+            "measured for another plan, or is the tie to the base another one? Give the plan.yaml that was measured.",
+        )
+    ]
+
+
+def _some(words: Collection[str]) -> str:
+    told = list(words)
+    more = f"; and {len(told) - _TOLD_PLACES} more" if len(told) > _TOLD_PLACES else ""
+    return "; ".join(told[:_TOLD_PLACES]) + more
+
+
+def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:
+    """Return what is to be known about samples that two cycles share."""
+    if not blocks:
+        return []
+    told = "; ".join(_copied_words(block) for block in blocks[:_TOLD])
+    more = f"; and {len(blocks) - _TOLD} more" if len(blocks) > _TOLD else ""
+    return [
+        Notice(
+            "copied-samples",
+            f"Cycles have samples at the same places to the last digit: {told}{more}. No robot does that: one was "
+            "copied from the other, or the readings are simulated without noise. RT and what else says how cycles "
+            "differ is too small. Write what was measured, or remove the copy.",
+        )
+    ]
+
+
+def _copied_words(block: CopiedBlock) -> str:
+    one, other = block.cycles
+    cycles = f"cycles {one} and {other} of " if one and other else ""
+    return f"{cycles}{block.test} {block.place}, {block.count} samples from lines {block.lines[0]} and {block.lines[1]}"
 
 
 def _wild_words(row: WildRow, without: str) -> str:

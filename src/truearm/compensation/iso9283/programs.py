@@ -13,7 +13,9 @@ import numpy as np
 
 from truearm.compensation.fake_targets import nominal_robot
 from truearm.compensation.iso9283.routes import Route, Routes
+from truearm.compensation.joint_counts import counts_comments
 from truearm.compensation.programs.motion_program import (
+    LONGEST_COMMENT,
     CircleMove,
     JointMove,
     MotionProgram,
@@ -28,7 +30,7 @@ from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import homogeneous
 from truearm.planning.iso9283.criteria import TESTS
-from truearm.planning.iso9283.planned import PerformancePlan, PlannedPose, PlannedTest
+from truearm.planning.iso9283.planned import PerformancePlan, PlannedPose, PlannedTest, visited
 
 #: The first run: no more than this share of the rated velocity, and no faster than this [m/s].
 _SLOW: Final = 0.1
@@ -186,6 +188,7 @@ class _Programs:
             f"Robot {self.plan.robot.name}",
             f"{100 * share:g} % velocity, {carried}",
             f"Plan {self.mark}",
+            *counts_comments(self.plan.robot),
             "Not verified, no safety function",
             "First run: step by step,",
             "at reduced speed, nobody near",
@@ -218,12 +221,8 @@ class _Steps:
             self._approaches()
         elif test.id == "compliance":
             self._pushes()
-        elif test.id in ("t", "dAP"):
-            self._visits(name for place in test.places for name in ("P2", place))
-        elif test.id == "posing-time":
-            self._visits(name for place in test.approaches for name in ("P1", place))
         else:
-            self._visits(test.places if test.id == "AD" else reversed(test.places))
+            self._visits(visited(test))
 
     def _target(self, joints: Array) -> int:
         key = np.round(joints, 12).tobytes()
@@ -239,6 +238,7 @@ class _Steps:
             left, start = self._at
             self.programs.moves.setdefault(f"{self.test.id}, from {left} to {name}", np.array([start, joints]))
         self._at = name, joints
+        self.steps.append(Remark(f"To {name}"[:LONGEST_COMMENT]))
         self.steps.append(JointMove(self._target(joints), share, share * plan.rated_velocity))
 
     def _stand(self) -> None:

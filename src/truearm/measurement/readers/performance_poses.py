@@ -16,14 +16,14 @@ from truearm.measurement.readers.columns import Columns, named_columns, read_nam
 from truearm.measurement.readers.rows import unit_quaternions
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_from_quaternion
-from truearm.units import LENGTH_UNITS, from_si
+from truearm.units import LENGTH_UNITS, TIME_UNITS, from_si
 
 #: Of drift, whose groups have the same cycles again.
 DRIFT: Final = "dAP"
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _LENGTHS: Final[dict[str, tuple[str, ...]]] = dict.fromkeys(_POSITION, LENGTH_UNITS)
-_POSE_UNITS: Final[dict[str, tuple[str, ...]]] = {"velocity": ("%",), "load": ("%",), "time": ("s",)} | _LENGTHS
+_POSE_UNITS: Final[dict[str, tuple[str, ...]]] = {"velocity": ("%",), "load": ("%",), "time": TIME_UNITS} | _LENGTHS
 _POSES: Final = (
     {name: name for name in ("criterion", "robot", "pose", "cycle", "approach")}
     | {"velocity": "velocity [%]", "load": "load [%]", "time": "time [s]"}
@@ -66,7 +66,7 @@ def read_attained_poses(path: Path) -> AttainedPoses:
     load = _share(cells, columns, "load", "the load is not between none and the rated one")
     time = np.full(len(cells.lines), np.nan)
     if "time" in columns:
-        time = cells.numbers(columns["time"][0], "1", missing=True)
+        time = cells.numbers(*columns["time"], missing=True)
     names = (criterion, robot, pose, approach)
     group = _groups(*(one.code for one in names), velocity, load)
     rotation, resolution_rot = None, 0.0
@@ -157,9 +157,8 @@ def _positions(cells: Cells, columns: Columns) -> Array:
 def _cycles(cells: Cells, columns: Columns) -> NDArray[np.intp]:
     cycle = cells.numbers(columns["cycle"][0], "1")
     wrong = (cycle < 1) | (cycle > _LARGEST_CYCLE) | (cycle != np.round(cycle))
-    _refuse_first(
-        cells, columns, "cycle", wrong, "a cycle is a whole number from 1", "1, 2, 3 ..", "Number the cycles from 1."
-    )
+    what, allowed = "a cycle is a whole number from 1", "1, 2, 3 and so on"
+    _refuse_first(cells, columns, "cycle", wrong, what, allowed, "Number the cycles from 1.")
     return cycle.astype(np.intp)
 
 

@@ -29,13 +29,13 @@ from truearm.measurement.readers.sample_times import refuse_out_of_order
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_from_quaternion
 from truearm.printable import is_one_line
-from truearm.units import LENGTH_UNITS, as_number, checked_unit, from_si
+from truearm.units import LENGTH_UNITS, TIME_UNITS, as_number, checked_unit, from_si
 
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _SHARES: Final = ("velocity", "load")
 #: Units of the columns that have one.
-_UNITS: Final = {"time": ("s",), **dict.fromkeys(_POSITION, LENGTH_UNITS), **dict.fromkeys(_SHARES, ("%",))}
+_UNITS: Final = {"time": TIME_UNITS, **dict.fromkeys(_POSITION, LENGTH_UNITS), **dict.fromkeys(_SHARES, ("%",))}
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 #: So many bytes are parsed at once: more takes more memory and is not faster.
 _BLOCK: Final = 4_000_000
@@ -48,6 +48,16 @@ Place = Literal["path", "pose"]
 TESTS_OF: Final[dict[Place, tuple[str, ...]]] = {
     "path": ("AT", "AT-reorientation", "CR", "AV", "WS"),
     "pose": ("t", "posing-time"),
+}
+#: Criteria that are evaluated from the samples of a test with another id.
+_TEST_OF: Final = {
+    "RT": "AT",
+    "RT-reorientation": "AT-reorientation",
+    "CO": "CR",
+    "RV": "AV",
+    "FV": "AV",
+    "WF": "WS",
+    "OV": "t",
 }
 
 
@@ -266,6 +276,8 @@ def _check_labels(labels: dict[str, str], line: int, header: _Header) -> None:
     if criterion not in known:
         near = nearest_names(criterion, known, 1, 0.6)
         cure = f"Did you mean {near[0]}?" if near else "Name the test for which it was measured."
+        if (test := _TEST_OF.get(criterion)) in known:
+            cure = f"Name the test: {test}."
         if criterion in TESTS_OF["pose" if place == "path" else "path"]:
             cure = f"Samples of {criterion} belong into the file of {'paths' if place == 'pose' else 'settling'}."
         raise InputError(
@@ -288,7 +300,7 @@ def _check_labels(labels: dict[str, str], line: int, header: _Header) -> None:
             "this is no number of a cycle",
             where=header.at(line, "cycle"),
             came=cycle or None,
-            allowed="1, 2, 3 .." + (", or nothing where a whole test is one stream" if place == "path" else ""),
+            allowed="1, 2, 3 and so on" + (", or nothing where a whole test is one stream" if place == "path" else ""),
             cure="Count the cycles of each test from 1.",
         )
     for name in _SHARES:
@@ -344,7 +356,8 @@ def _samples(
     position = np.empty((len(code), 3))
     for axis, name in enumerate(_POSITION):
         position[:, axis] = numbers[:, of[name]] / from_si(1.0, header.columns[name][1])
-    large = np.flatnonzero((np.abs(position) > _LARGEST).any(axis=1) | (np.abs(numbers[:, of["time"]]) > 1e9))
+    time = np.ascontiguousarray(numbers[:, of["time"]]) / from_si(1.0, header.columns["time"][1])
+    large = np.flatnonzero((np.abs(position) > _LARGEST).any(axis=1) | (np.abs(time) > 1e9))
     if len(large):
         raise InputError(
             "the number is too large to be plausible",
@@ -356,7 +369,6 @@ def _samples(
     if "qw" in of:
         q = unit_quaternions(numbers[:, [of[part] for part in _QUATERNION]], header.source, lines.tolist())
         rotation = rotation_from_quaternion(q)
-    time = np.ascontiguousarray(numbers[:, of["time"]])
     order = np.argsort(code, kind="stable")
     refuse_out_of_order(header.source, time, code, order, lines)
     labels = {name: [key[number] for key in keys] for number, name in enumerate(header.labels)}

@@ -139,3 +139,14 @@ class PerformancePlan:
     def test(self, test: str) -> PlannedTest | None:
         """Return what is planned for a test, None if nothing is."""
         return next((one for one in self.tests if one.id == test), None)
+
+
+def visited(test: PlannedTest) -> tuple[str, ...]:
+    """Return the poses at which the robot stops in each cycle of a test of poses, in their order; none along paths."""
+    if test.id in ("t", "dAP"):
+        return tuple(name for place in test.places for name in ("P2", place))
+    if test.id == "posing-time":
+        return tuple(name for place in test.approaches for name in ("P1", place))
+    if test.id in ("AP", "E"):
+        return tuple(reversed(test.places))
+    return test.places if test.id == "AD" else ()

@@ -173,13 +173,13 @@ def refuse_implausible(tie: Alignment, cube: Cube, measured: Array, where: str) 
     x, y, z = given.translation
     w, i, j, k = given.quaternion
     cures = [
-        (Transform((f * x, f * y, f * z), given.quaternion), f"Is `position` in {unit}? Then say so in `units`.")
+        (Transform((f * x, f * y, f * z), given.quaternion), f"Is the position in {unit}? Then say so under units.")
         for f, unit in ((1e3, "m where the file says mm"), (1e-3, "mm where the file says m"))
     ]
     inverse = Transform.from_matrix(given.rotation.T, -given.rotation.T @ np.array(given.translation))
     cures += [
         (inverse, "Is this the base in the instrument's frame? The instrument's frame in the base frame belongs here."),
-        (Transform(given.translation, (k, w, i, j)), "Does `quaternion` begin with x? It begins with w: w, x, y, z."),
+        (Transform(given.translation, (k, w, i, j)), "Does the quaternion begin with x? It begins with w: w, x, y, z."),
     ]
     fitting = [cure for place, cure in cures if away(place) <= cube.side / 2]
     raise InputError(

@@ -17,6 +17,7 @@ from truearm.modeling.transform import rotation_vector
 from truearm.planning.iso9283.criteria import TEST_OF, TESTS
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.alignment import Alignment, best_fit
+from truearm.validation.iso9283.copied import refuse_copied_poses
 from truearm.validation.iso9283.drift_order import drift_order
 from truearm.validation.iso9283.orientation_check import refuse_far_orientations
 
@@ -28,6 +29,8 @@ _NEARER: Final = 0.5
 _SAME_SHARE: Final = 5e-4
 #: A robot that has less than this share of the rows of another one was not measured, but its name mistyped.
 _FEW_ROWS: Final = 0.2
+#: So many more lines are named.
+_TOLD: Final = 5
 _FILES: Final = {"paths": "paths", "settling": "poses over time", "forces": "pushes"}
 
 
@@ -125,6 +128,7 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
     _check_cube(plan, readings, position)
     _check_nearest(plan, readings, position)
     _check_copies(readings)
+    refuse_copied_poses(readings)
     rotation = None if readings.rotation is None else alignment.turned_to_base(readings.rotation)
     if rotation is not None:
         commanded = np.array([plan.poses[name].rotation for name in readings.pose.names])[readings.pose.code]
@@ -341,10 +345,14 @@ def _check_nearest(plan: PerformancePlan, readings: AttainedPoses, position: Arr
     if len(wrong):
         row = int(wrong[0])
         there = list(dict.fromkeys(names))[int(apart[row].argmin())]
+        lines = [str(int(line)) for line in readings.line[wrong[1 : 1 + _TOLD]]]
+        also = f"; so also line{'s' * (len(lines) != 1)} {', '.join(lines)}" if lines else ""
+        also += " and others" if len(wrong) > 1 + len(lines) else ""
         raise InputError(
             f"{len(wrong)} pose{'s' * (len(wrong) != 1)} at another place than the plan has it",
             where=f"{readings.source}, line {int(readings.line[row])}, column pose",
-            came=f"{_name(readings.pose, row)} is {1e3 * own[row]:.4g} mm off, {there} {1e3 * apart[row].min():.4g} mm",
+            came=f"{_name(readings.pose, row)}, and it lies at {there}, {1e3 * apart[row].min():.4g} mm from it, "
+            f"{1e3 * own[row]:.4g} mm from {_name(readings.pose, row)}{also}",
             cure="Correct the name, take the plan that was measured, or remove the cycle.",
         )
 

@@ -14,8 +14,13 @@ from truearm.validation.iso9283.commanded import CommandedPath
 
 #: Samples and places of the path that are compared with each other.
 _SAMPLES, _PLACES = 500, 400
-#: Farther from the path than this share of its extent, in the middle of all samples, it is another path.
-_FAR = 0.2
+#: Farther from the path than this share of its extent, in the middle of all samples, it is another path, unless it is
+#: this path as a whole beside its place, by no more than the other share. Nearer than the third it is this path.
+_FAR, _BESIDE, _SURE = 0.2, 0.4, 0.03
+#: Run backwards, samples are so much nearer to the path the other way round.
+_REVERSED = 0.5
+#: Path, direction and distance are judged by samples that are this share of the extent apart: not by those at rest.
+_STEP = 0.01
 #: The tip is not faster than so many times the command, and where it is slower than this share, times are in another
 #: unit.
 _FASTER, _SLOWEST = 2.0, 0.02
@@ -85,10 +90,9 @@ def along_path(path: CommandedPath, position: Array, where: str) -> Array:
     places = np.linspace(0.0, path.length, _PLACES)
     points = path.points(places)
     few = position[chosen]
-    cost = (few**2).sum(axis=1)[:, None] - 2 * few @ points.T + (points**2).sum(axis=1)
-    match = _monotone(cost)
-    distance = np.sqrt(np.maximum(cost[np.arange(len(chosen)), match], 0.0))
-    _refuse_far(path, few, distance, where)
+    match, distance = _matched(few, points)
+    moving = _moving(few, _STEP * path.extent)
+    _refuse_other_path(path, few[moving], points, float(np.median(distance[moving])), where)
     near = np.interp(np.arange(len(position)), chosen, places[match])
     step = float(np.abs(np.diff(near)).max(initial=0.0))
     along = path.feet(position, near, 0.02 * path.length + 2 * step)
@@ -138,11 +142,29 @@ def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity:
     raise InputError(
         f"the path {path.path.name} was run much {'faster' if pace > velocity else 'slower'} than commanded",
         where=where,
-        came=f"{1e3 * pace:.4g} mm/s in the middle half",
+        came=f"{_apart(pace, _FASTER * velocity if pace > velocity else _SLOWEST * velocity)[0]} mm/s in the middle "
+        "half",
         allowed=f"{1e3 * _SLOWEST * velocity:.4g} to {1e3 * _FASTER * velocity:.4g} mm/s; commanded are "
         f"{1e3 * velocity:.4g}",
-        cure="Write the times in seconds, and check the column velocity [%] and the rated velocity of the plan.",
+        cure="Name the unit of the times in the header (s, ms, us), and check the column velocity [%] and the rated "
+        "velocity of the plan.",
     )
+
+
+def _moving(few: Array, step: float) -> NDArray[np.intp]:
+    """Return samples of which each is at least `step` from the one before it [m]."""
+    kept = [0]
+    for k, apart in enumerate(np.linalg.norm(np.diff(few, axis=0), axis=1).tolist(), 1):
+        if apart >= step or np.linalg.norm(few[k] - few[kept[-1]]) >= step:
+            kept.append(k)
+    return np.array(kept, dtype=np.intp)
+
+
+def _matched(few: Array, points: Array) -> tuple[NDArray[np.intp], Array]:
+    """Return the place of each sample on a path, and how far it is from there [m]."""
+    cost = (few**2).sum(axis=1)[:, None] - 2 * few @ points.T + (points**2).sum(axis=1)
+    match = _monotone(cost)
+    return match, np.sqrt(np.maximum(cost[np.arange(len(few)), match], 0.0))
 
 
 def _monotone(cost: Array) -> NDArray[np.intp]:
@@ -159,21 +181,58 @@ def _monotone(cost: Array) -> NDArray[np.intp]:
     return match
 
 
-def _refuse_far(path: CommandedPath, few: Array, distance: Array, where: str) -> None:
-    allowed = _FAR * path.extent + path.path.stroke / 2
-    if np.median(distance) <= allowed:
+def _refuse_other_path(path: CommandedPath, few: Array, points: Array, distance: float, where: str) -> None:
+    """Refuse samples of another path, in another direction, or so far beside that planes through the path tell nothing.
+
+    Shape and direction are judged once the samples are moved onto the path's middle: a robot that is off by as much as
+    a small circle is wide still runs this circle.
+    """
+    if distance <= _SURE * path.extent:
         return
-    dense = path.points(np.linspace(0.0, path.length, _PLACES))
-    least = np.sqrt(((few[:, None] - dense[None]) ** 2).sum(axis=2)).min(axis=1)
-    reverse = bool(np.median(least) <= allowed)
+    allowed = _FAR * path.extent + path.path.stroke / 2
+    offset = (few.max(axis=0) + few.min(axis=0) - points.max(axis=0) - points.min(axis=0)) / 2
+    moved = few - offset
+    ahead, back = (float(np.median(_matched(moved, way)[1])) for way in (points, points[::-1]))
+    if back <= min(allowed, _REVERSED * ahead):
+        raise InputError(
+            f"the samples run the path {path.path.name} backwards",
+            where=where,
+            cure="Run it in the direction of the plan.",
+        )
+    if distance <= allowed:
+        return
+    beside, most = float(np.linalg.norm(offset)), _BESIDE * path.extent
+    if ahead <= allowed and beside <= most:
+        return
+    if ahead <= allowed and beside <= path.extent:
+        came, most_came = _apart(beside, most)
+        raise InputError(
+            f"the samples run the path {path.path.name} too far beside it for planes through it to tell anything",
+            where=where,
+            came=f"{came} mm beside it as a whole",
+            allowed=f"{most_came} mm",
+            cure="Check how the instrument is tied to the robot's base; or plan in a larger cube.",
+        )
+    least = float(np.median(np.sqrt(((few[:, None] - points[None]) ** 2).sum(axis=2)).min(axis=1)))
+    other_order = least <= allowed
+    came, most_came = _apart(distance if other_order else max(least, allowed), allowed)
     raise InputError(
-        f"the samples run the path {path.path.name} in another direction or order"
-        if reverse
+        f"the samples run the path {path.path.name} in another order"
+        if other_order
         else f"the samples never come near the path {path.path.name}",
         where=where,
-        came=f"{1e3 * float(np.median(distance if reverse else least)):.1f} mm from it, half of the samples further",
-        allowed=f"{1e3 * allowed:.1f} mm",
+        came=f"{came} mm from it, half of the samples further",
+        allowed=f"{most_came} mm",
         cure="Run it as the plan says."
-        if reverse
+        if other_order
         else "Check the name of the path, the unit, and how the instrument is tied to the robot's base.",
     )
+
+
+def _apart(came: float, allowed: float) -> tuple[str, str]:
+    """Return two lengths in mm, or velocities in mm/s, with as many decimals as it takes to see that they differ."""
+    for decimals in range(1, 7):
+        both = f"{1e3 * came:.{decimals}f}", f"{1e3 * allowed:.{decimals}f}"
+        if both[0] != both[1]:
+            break
+    return both

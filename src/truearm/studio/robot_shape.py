@@ -126,9 +126,8 @@ def _base(plan: Layout) -> LinkShape:
     end = line.origin + joint.before * line.next_axis
     bodies: list[Mesh] = []
     if not joint.slides:
-        start = foot + np.array([0.0, 0.0, 0.1 * joint.radius])
         corner = line.origin + plan.feet[0][1] * line.next_axis
-        bodies.append(tube([start, corner, end], (1.25 * joint.radius, 0.95 * joint.radius)))
+        bodies.append(tube([end, corner, foot], (0.9 * joint.radius, 1.2 * joint.radius), flat_end=True))
     return LinkShape("base", together(bodies), together([plate, *_rail(plan, 0)]))
 
 

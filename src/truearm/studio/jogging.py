@@ -84,7 +84,7 @@ class Jogging:
     def numbers(self) -> list[float]:
         """Joint positions in the numbers of `whose` [deg or mm]."""
         shown = self._shown(self.joints)
-        return [from_si(float(value), unit) for value, unit in zip(shown, self.units, strict=True)]
+        return [float(from_si(float(value), unit)) + 0.0 for value, unit in zip(shown, self.units, strict=True)]
 
     def ranges(self) -> list[tuple[float, float]]:
         """Return from where to where each number can go while the others stay [deg or mm].
@@ -100,7 +100,8 @@ class Jogging:
             # Where a joint has no limits a number shows two turns, or 2 m, to either side.
             free = 4.0 * math.pi if unit == "deg" else 2.0
             least, most = max(float(ways[0].max()), -free), min(float(ways[1].min()), free)
-            found.append((number + from_si(min(least, 0.0), unit), number + from_si(max(most, 0.0), unit)))
+            low, high = (float(from_si(way, unit)) for way in (min(least, 0.0), max(most, 0.0)))
+            found.append((number + low, number + high))
         return found
 
     def set_number(self, joint: int, number: float) -> None:
@@ -152,8 +153,9 @@ class Jogging:
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         p, R = self.pose(frame)
         self._angles = FIXED_XYZ_ANGLES.numbers(R[None], self._angles)
-        x, y, z = (p * 1e3).tolist()
-        a, b, c = np.rad2deg(self._angles[0]).tolist()
+        # Rounded to what nobody measures, so that no -0 and no 89.99999999 is shown.
+        x, y, z = (np.round(p * 1e3, 6) + 0.0).tolist()
+        a, b, c = (np.round(np.rad2deg(self._angles[0]), 6) + 0.0).tolist()
         return (x, y, z), (a, b, c)
 
     def go_to_numbers(self, frame: JogFrame, position: tuple[float, ...], turns: tuple[float, ...]) -> PoseStatus:

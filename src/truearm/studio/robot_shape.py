@@ -88,7 +88,7 @@ def robot_shape(robot: Robot) -> RobotShape:
 
 
 def link_poses(robot: Robot, joints: Array | Postures) -> tuple[Array, Array]:
-    """Return where the links of a robot are in the world: base, links, flange, and the flange again for the tool.
+    """Return where the links of a robot are in the world: base, links, flange, and again for the tool.
 
     With joint effects in the model they are where those have moved them: bent by loads, tilted, grown warm.
 
@@ -109,7 +109,7 @@ def link_poses(robot: Robot, joints: Array | Postures) -> tuple[Array, Array]:
         turning = next(k for k, element in enumerate(link) if element.variable is not None)
         passed += len(moved)
         places.append(passed - (len(link) - 1 - turning))
-    places += [len(robot.trunk.elements)] * 2
+    places += [len(robot.trunk.elements)] * (2 if robot.targets else 1)
     positions = np.stack([kinematics.origin(place).T for place in places], axis=1)
     rotations = np.stack([np.broadcast_to(kinematics.matrix(p), (len(positions), 3, 3)) for p in places], axis=1)
     return positions, quaternion_from_rotation(rotations)

@@ -261,7 +261,7 @@ class Scene:
             self._parts["fixtures"] += self._fixture(robot, fixture, f"/fixtures/{number}")
         look = np.array(base.translation) + base.rotation @ (self.length * np.array([0.15, 0.0, 0.3]))
         self._server.initial_camera.look_at = look
-        self._server.initial_camera.position = look + base.rotation @ (self.length * np.array([1.0, -1.35, 0.55]))
+        self._server.initial_camera.position = look + base.rotation @ (self.length * np.array([0.8, -1.05, 0.42]))
 
     def _fixture(self, robot: Robot, fixture: Fixture, name: str) -> list[Any]:
         kinematics = robot.fixture_kinematics(fixture.name)

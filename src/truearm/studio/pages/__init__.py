@@ -6,6 +6,7 @@ from typing import Final
 
 from truearm.studio.page import Page
 from truearm.studio.pages.cell import CellPage
+from truearm.studio.pages.jog import JogPage
 
 #: One tab each.
-PAGES: Final[tuple[type[Page], ...]] = (CellPage,)
+PAGES: Final[tuple[type[Page], ...]] = (CellPage, JogPage)

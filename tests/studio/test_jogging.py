@@ -55,7 +55,7 @@ def test_ranges_end_where_the_first_joint_meets_its_limit(name: str) -> None:
                 assert (arm.joints >= arm.low - 1e-12).all()
                 assert (arm.joints <= arm.high + 1e-12).all()
                 assert np.isclose(arm.joints, (arm.low, arm.high)[end], atol=1e-9).any() or name == "lrmate200ic"
-                arm.set_number(k, limit + (1000.0, -1000.0)[1 - end] * (-1 if end == 0 else 1))
+                arm.set_number(k, limit + (-1000.0, 1000.0)[end])
                 assert arm.numbers[k] == pytest.approx(limit, abs=1e-9)
 
 

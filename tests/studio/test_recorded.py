@@ -58,8 +58,8 @@ def test_plans_and_measurements_are_lists_of_configurations(tmp_path: Path) -> N
         ("configuration," + ",".join(f"joint_{k} [mm]" for k in range(1, 7)) + "\na,1,2,3,4,5,6\n", "joint_1"),
         ("configuration," + ",".join(f"joint_{k}" for k in range(1, 7)) + "\na,1,2,3,4,5,6\n", "unit"),
         ("configuration," + ",".join(f"joint_{k} [deg]" for k in range(1, 7)) + "\na,1,2,x,4,5,6\n", "line 2"),
-        ("configuration," + ",".join(f"joint_{k} [deg]" for k in range(1, 7)) + "\n", ""),
-        ("", ""),
+        ("configuration," + ",".join(f"joint_{k} [deg]" for k in range(1, 7)) + "\n", "a header and no rows"),
+        ("", "the file is empty"),
     ],
 )
 def test_other_tables_are_refused(tmp_path: Path, text: str, words: str) -> None:

@@ -99,7 +99,8 @@ class Jogging:
             ways = np.sort(ways[:, np.abs(rate) > 0.0], axis=0)
             # Where a joint has no limits a number shows two turns, or 2 m, to either side.
             free = 4.0 * math.pi if unit == "deg" else 2.0
-            least, most = max(float(ways[0].max()), -free), min(float(ways[1].min()), free)
+            least, most = float(ways[0].max()), float(ways[1].min())
+            least, most = (least if math.isfinite(least) else -free), (most if math.isfinite(most) else free)
             low, high = (float(from_si(way, unit)) for way in (min(least, 0.0), max(most, 0.0)))
             found.append((number + low, number + high))
         return found

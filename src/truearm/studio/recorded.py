@@ -101,8 +101,6 @@ def read_recorded(path: Path, robot: Robot) -> Recorded:
     heading = next((name for name in _LABELS if name in cells.names), None)
     labels = [str(k + 1) for k in range(len(values))] if heading is None else cells.texts(cells.names.index(heading))
     kept = [k for k in range(len(labels)) if k == 0 or labels[k] != labels[k - 1]]
-    if not kept:
-        raise InputError("the file has no configurations", where=str(path))
     return Recorded(tuple(labels[k] for k in kept), values[kept], joints_are)
 
 

@@ -6,13 +6,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import viser
 from websockets.asyncio.server import ServerConnection
 
 from truearm.errors import InputError
-from truearm.files import exists
+from truearm.files import exists, read_bytes
 from truearm.library import load_robot
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
@@ -163,6 +164,13 @@ class Window:
                     self.refresh()
 
             self._work = Work(do, arguments, said, ended)
+
+    def download(self, path: Path) -> None:
+        """Send a file of the project to the browser of the window that works."""
+        content = read_bytes(path)
+        for client, connection in [*self._windows.values()]:
+            if self.gate.is_working(connection):
+                client.send_file_download(path.name, content, save_immediately=True)
 
     @property
     def busy(self) -> bool:

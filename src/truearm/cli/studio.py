@@ -21,7 +21,7 @@ def studio(
     ] = False,
     port: Annotated[int, typer.Option(metavar="N", help="To listen on; 0 for any that is free.")] = 8080,
     host: Annotated[
-        str, typer.Option(metavar="HOST", help="Address of this machine to listen on; others than loopback need a token.")
+        str, typer.Option(metavar="HOST", help="Address to listen on; others than loopback need a token.")
     ] = "127.0.0.1",
     token: Annotated[
         str | None,
@@ -39,6 +39,7 @@ def studio(
     from truearm.studio.gate import is_loopback
     from truearm.studio.serving import serve
 
+    tunnel = f"ssh -L {port}:127.0.0.1:{port} THIS-MACHINE"
     with progress() as say:
         served = serve(
             folder,
@@ -52,8 +53,8 @@ def studio(
     try:
         if not is_loopback(host):
             print_line(
-                "Whoever reaches this machine and has the token can read and change the project, and what it sends is "
-                "not encrypted. An SSH tunnel is the better way: ssh -L 8080:127.0.0.1:8080 THIS-MACHINE, without --host.",
+                "Whoever reaches this machine and has the token can read and change the project, and nothing that is "
+                f"sent is encrypted. An SSH tunnel is the better way: leave out --host, and open {tunnel}.",
                 err=True,
             )
         print_line(f"The studio of {served.window.project.folder} is at {served.access.entrance} until Ctrl-C.")

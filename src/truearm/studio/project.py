@@ -231,7 +231,7 @@ class Project:
     def names(self, *suffixes: str) -> list[str]:
         """Return the names of files of the project, those of some endings, three folders deep."""
         found = [name for name in self._stamps() if not suffixes or name.lower().endswith(suffixes)]
-        return sorted(name for name in found if name not in (PROJECT_FILE, MANIFEST))
+        return sorted(name for name in found if name != PROJECT_FILE and name.rpartition("/")[2] != MANIFEST)
 
     def take_in(self, name: str, content: bytes) -> str:
         """Write an uploaded file into the folder and return its name there.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -28,8 +29,8 @@ DEMONSTRATION: Final[Mapping[str, Any]] = {
     "taught": ["none"],
     "controller_kinematics": "nominal",
 }
-#: A token that somebody chooses has so many characters at least, of letters, digits, - and _.
-_TOKEN_LENGTH: Final = 16
+#: What a token is made of that somebody chooses.
+_TOKEN: Final = re.compile(r"[A-Za-z0-9_-]{16,200}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,8 @@ def serve(
     Raises
     ------
     InputError
-        If the folder is no project or holds something else than the demonstration, or host, port or token cannot be used.
+        If the folder is no project, or holds something else than the demonstration; or if host, port or token cannot be
+        used.
     """
     chosen = token_argument(token, host)
     # Nothing of a project is made where it cannot be served.
@@ -141,13 +143,12 @@ def token_argument(token: object, host: str) -> str | None:
     """Return the token that was given, or a new one where there must be one."""
     if token is None:
         return None if is_loopback(host) else new_token()
-    if isinstance(token, str) and len(token) >= _TOKEN_LENGTH and token.replace("-", "").replace("_", "").isalnum():
-        if token.isascii():
-            return token
+    if isinstance(token, str) and _TOKEN.fullmatch(token):
+        return token
     raise InputError(
         "this is no token that keeps others out",
         parameter="token",
-        allowed=f"{_TOKEN_LENGTH} or more letters, digits, - and _",
+        allowed="16 to 200 letters, digits, - and _",
         cure="Leave it out where the host is not loopback: then one is made.",
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
 from truearm.identification.choosing.choice import AUTO
@@ -27,8 +27,8 @@ class CalibratePage:
         gui, settings = window.gui, window.project.settings
         self._data = gui.add_dropdown("Measurements", (NONE,))
         self._model = gui.add_dropdown("Model", _MODELS, initial_value=AUTO)
-        self._train = gui.add_text("Train on", "", hint="configurations, or all; empty for 70 %")
-        self._seed = gui.add_text("Seed", str(settings.seed), hint="of the split, a whole number from 0 on")
+        self._train: Any = gui.add_text("Train on", "", hint="configurations, or all; empty for 70 %")
+        self._seed: Any = gui.add_text("Seed", str(settings.seed), hint="of the split, a whole number from 0 on")
         self._loss = gui.add_dropdown("Loss", tuple(LOSSES))
         self._run = gui.add_button("Calibrate")
         self._said = gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))

@@ -34,6 +34,7 @@ class ProofPage:
         self._shown: tuple[Any, ...] = ()
         self._table = gui.add_html("")
         self._picture = gui.add_dropdown("Picture", ("",), visible=False)
+        self._place = gui.add_folder("Picture", visible=False)
         self._plot: Any = None
         self._files = gui.add_button_group("Download", RESULT_FILES[:3], visible=False)
         self._notices = gui.add_html("")
@@ -47,22 +48,23 @@ class ProofPage:
         if folder is None or not exists(folder / "result.json"):
             self._table.content = words.paragraph("There is no result yet: calibrate first.")
             self._notices.content, self._shown, self._figures = "", (), {}
-            self._picture.visible = self._files.visible = False
-            if self._plot is not None:
-                self._plot.visible = False
+            self._picture.visible = self._files.visible = self._place.visible = False
             return
         stat = (folder / "result.json").stat()
         shown = (folder, stat.st_mtime_ns, stat.st_size, project.settings.data, project.settings.dark)
         if shown == self._shown:
             return
         result = _read_result(folder / "result.json")
-        self._table.content = words.lines([f"Status: {result['status']}"]) + figures_table(result)
-        self._notices.content = words.notices(self._told(result)) + words.lines(
-            f"Next: {step['message']}" for step in result.get("next", ())
-        )
+        try:
+            shown_figures = words.lines([f"Status: {result['status']}"]) + figures_table(result)
+            told = words.notices(self._told(result))
+            told += words.lines(f"Next: {step['message']}" for step in result.get("next", ()))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise _no_result(folder / "result.json") from error
+        self._table.content, self._notices.content = shown_figures, told
         self._figures = _report_figures(folder / "report.html")
         self._files.visible = True
-        self._picture.visible = bool(self._figures)
+        self._picture.visible = self._place.visible = bool(self._figures)
         if self._figures:
             first = self._picture.value if self._picture.value in self._figures else next(iter(self._figures))
             offer(self._picture, self._figures, first, None)
@@ -93,10 +95,10 @@ class ProofPage:
         layout = {name: value for name, value in drawn["layout"].items() if name not in ("width", "height")}
         figure = go.Figure(data=drawn["data"], layout=layout, skip_invalid=True)
         if self._plot is None:
-            self._plot = self._window.gui.add_plotly(figure, aspect=1.2)
+            with self._place:
+                self._plot = self._window.gui.add_plotly(figure, aspect=1.2)
         else:
             self._plot.figure = figure
-            self._plot.visible = True
 
     def _download(self) -> None:
         folder = self._window.project.file("result")
@@ -105,16 +107,19 @@ class ProofPage:
 
 
 def figures_table(result: dict[str, Any]) -> str:
-    """Return the errors of a result as a table, with as many digits as the command prints."""
-    rows = []
-    for part, name in _PARTS:
-        said = result.get(part)
-        for kind, unit in _KINDS if said else ():
-            if kind in said:
-                spread = [f"{said[kind][what]:.3f}" for what in ("mean", "rms", "p95", "max")]
-                what = kind.partition("_")[0]
-                rows.append([f"{name}: {what}", str(said["configurations"]), *(f"{text} {unit}" for text in spread)])
-    return words.table(["part", "configurations []", "mean []", "rms []", "95 % []", "max []"], rows)
+    """Return the errors of a result as a table of each kind, with as many digits as the command prints."""
+    shown = ""
+    for kind, unit in _KINDS:
+        rows = []
+        for part, name in _PARTS:
+            spread = (result.get(part) or {}).get(kind)
+            if spread is not None:
+                figures = [f"{spread[what]:.3f}" for what in ("mean", "rms", "p95", "max")]
+                rows.append([f"{name} ({result[part]['configurations']})", *figures])
+        if rows:
+            heads = [f"{what} [{unit}]" for what in ("mean", "rms", "95 %", "max")]
+            shown += words.table([f"{kind.partition('_')[0]} (configurations)", *heads], rows)
+    return shown
 
 
 def _read_result(path: Path) -> dict[str, Any]:
@@ -122,10 +127,14 @@ def _read_result(path: Path) -> dict[str, Any]:
     try:
         result = json.loads(read_text(path))
     except (json.JSONDecodeError, RecursionError) as error:
-        raise InputError("this is no result of a calibration", where=str(path), cure="Calibrate again.") from error
+        raise _no_result(path) from error
     if not isinstance(result, dict) or not str(result.get("truearm")).startswith("truearm-result/"):
-        raise InputError("this is no result of a calibration", where=str(path), cure="Calibrate again.")
+        raise _no_result(path)
     return result
+
+
+def _no_result(path: Path) -> InputError:
+    return InputError("this is no result of a calibration", where=str(path), cure="Calibrate again.")
 
 
 def _report_figures(path: Path) -> dict[str, Any]:

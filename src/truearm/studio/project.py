@@ -69,7 +69,7 @@ class Settings(BaseModel):
     cell: _Name | None = None
     taught: tuple[_Name, ...] | None = None
     controller_kinematics: _Name | None = None
-    corrected: _Name = "corrected"
+    corrected: _Name = "result/corrected"
     dark: bool = False
 
     def text(self) -> str:
@@ -229,9 +229,9 @@ class Project:
         return tuple(sorted(found, key=lambda one: one.name))
 
     def names(self, *suffixes: str) -> list[str]:
-        """Return the names of files of the project, those of some endings, two folders deep."""
+        """Return the names of files of the project, those of some endings, three folders deep."""
         found = [name for name in self._stamps() if not suffixes or name.lower().endswith(suffixes)]
-        return sorted(name for name in found if name not in (PROJECT_FILE, MANIFEST))
+        return sorted(name for name in found if name != PROJECT_FILE and name.rpartition("/")[2] != MANIFEST)
 
     def take_in(self, name: str, content: bytes) -> str:
         """Write an uploaded file into the folder and return its name there.
@@ -274,12 +274,12 @@ class Project:
         return hash_of(path.read_bytes()) if path.is_file() else None
 
     def _stamps(self) -> dict[str, tuple[int, int]]:
-        """Return size and time of the last change of every file that is no hidden one, two folders deep."""
+        """Return size and time of the last change of every file that is no hidden one, three folders deep."""
         found: dict[str, tuple[int, int]] = {}
         for place, folders, files in os.walk(self.folder):
             here = Path(place)
             depth = len(here.relative_to(self.folder).parts)
-            folders[:] = [name for name in folders if not name.startswith(".") and depth < 1]
+            folders[:] = [name for name in folders if not name.startswith(".") and depth < 2]
             for name in files:
                 if name.startswith(".") or not is_one_line(name.replace(" ", "x")):
                     continue

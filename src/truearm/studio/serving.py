@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import socket
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from truearm.errors import InputError
 from truearm.studio.gate import Access, Gate, is_loopback, listening_socket, new_token, start_server
@@ -16,8 +17,20 @@ from truearm.studio.pages import PAGES
 from truearm.studio.project import Project, open_project
 from truearm.studio.window import Window
 
-#: A token that somebody chooses has so many characters at least, of letters, digits, - and _.
-_TOKEN_LENGTH = 16
+#: What is chosen in a new project of the demonstration: what it calibrated and corrected itself.
+DEMONSTRATION: Final[Mapping[str, Any]] = {
+    "truearm": "truearm-studio/1",
+    "robot": "irb120",
+    "data": "measurements.csv",
+    "payload": "2.7kg,50mm,25mm,100mm",
+    "model": "elastic",
+    "program": "plate.mod",
+    "cell": "cell.yaml",
+    "taught": ["none"],
+    "controller_kinematics": "nominal",
+}
+#: What a token is made of that somebody chooses.
+_TOKEN: Final = re.compile(r"[A-Za-z0-9_-]{16,200}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +63,10 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     token: str | None = None,
-    first: Mapping[str, Any] | None = None,
+    demo: bool = False,
     pages: Sequence[type[Page]] = PAGES,
     say: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Studio:
     """Serve a project.
 
@@ -66,23 +80,32 @@ def serve(
         To listen on; 0 for any that is free.
     token
         What a browser must bring; None for none on loopback, and for a new one elsewhere.
-    first
-        Settings of a new project.
+    demo
+        Fill the folder with what :func:`truearm.demo` writes, and choose it.
     pages
         Of the window.
     say
         Called with every request that is refused.
+    progress
+        Called with a few words at each step before the window is there.
 
     Raises
     ------
     InputError
-        If the folder is no project, or host, port or token cannot be used.
+        If the folder is no project, or holds something else than the demonstration; or if host, port or token cannot be
+        used.
     """
     chosen = token_argument(token, host)
     # Nothing of a project is made where it cannot be served.
     bound = listening_socket(host_argument(host), port_argument(port))
     try:
-        project: Project = open_project(folder, first)
+        project: Project = open_project(folder, DEMONSTRATION if demo else None)
+        if demo:
+            from truearm.jobs.demo import demo as job
+
+            job(project.folder, progress=progress)
+            project.look()
+        progress("opening the window")
         access = Access(host, bound.getsockname()[1], chosen, names_of(host))
         gate = Gate(access)
         server = start_server(gate, bound, "truearm studio")
@@ -120,13 +143,12 @@ def token_argument(token: object, host: str) -> str | None:
     """Return the token that was given, or a new one where there must be one."""
     if token is None:
         return None if is_loopback(host) else new_token()
-    if isinstance(token, str) and len(token) >= _TOKEN_LENGTH and token.replace("-", "").replace("_", "").isalnum():
-        if token.isascii():
-            return token
+    if isinstance(token, str) and _TOKEN.fullmatch(token):
+        return token
     raise InputError(
         "this is no token that keeps others out",
         parameter="token",
-        allowed=f"{_TOKEN_LENGTH} or more letters, digits, - and _",
+        allowed="16 to 200 letters, digits, - and _",
         cure="Leave it out where the host is not loopback: then one is made.",
     )
 

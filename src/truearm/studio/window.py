@@ -6,13 +6,15 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 import viser
 from websockets.asyncio.server import ServerConnection
 
 from truearm.errors import InputError
-from truearm.files import exists
+from truearm.files import exists, read_bytes
 from truearm.library import load_robot
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
@@ -29,7 +31,7 @@ _TOLD: Final = 40
 #: So often the folder is looked at for changes of other programs [s].
 _LOOK: Final = 2.0
 #: Width of the pages, and width and height of the notices, which float over a corner of the scene [px].
-_WIDTH: Final = 470
+_WIDTH: Final = 520
 _NOTICES: Final = (440, 230)
 
 
@@ -154,7 +156,8 @@ class Window:
                         self._doing.content = words.paragraph(f"{title}: refused")
                         self.refuse(outcome)
                     else:
-                        self._doing.content = words.paragraph(f"{title}: done")
+                        seconds = time.monotonic() - work.began
+                        self._doing.content = words.paragraph(f"{title}: done in {seconds:.1f} s")
                         self.project.look()
                         try:
                             done(outcome)
@@ -162,7 +165,14 @@ class Window:
                             self.refuse(error)
                     self.refresh()
 
-            self._work = Work(do, arguments, said, ended)
+            work = self._work = Work(do, arguments, said, ended)
+
+    def download(self, path: Path) -> None:
+        """Send a file of the project to the browser of the window that works."""
+        content = read_bytes(path)
+        for client, connection in [*self._windows.values()]:
+            if self.gate.is_working(connection):
+                client.send_file_download(path.name, content, save_immediately=True)
 
     @property
     def busy(self) -> bool:
@@ -211,7 +221,7 @@ class Window:
         self._stopped.set()
         if self._work is not None:
             self._work.cancel()
-        self.server.stop()
+        self.server.stop()  # type: ignore[no-untyped-call]
 
     # The frame ---------------------------------------------------------------------------------------------------
 
@@ -239,12 +249,10 @@ class Window:
             self._notices = gui.add_html(words.paragraph("Nothing to say yet."))
         self._cancel.on_click(self.action(self._cancelled))
         panel.float(x=15, y=-15, width=_NOTICES[0], height=_NOTICES[1])
-        for label, keys, do in (
-            ("Undo the last edit of the project", "cmd/ctrl", self._undo_edit),
-            ("Redo the edit of the project", "cmd/ctrl+shift", self._redo_edit),
-        ):
-            command = gui.add_command(label, hotkey="Z", modifier=keys)
-            command.on_trigger(self.action(do))
+        undo = gui.add_command("Undo the last edit of the project", hotkey="Z", modifier="cmd/ctrl")
+        redo = gui.add_command("Redo the edit of the project", hotkey="Z", modifier="cmd/ctrl+shift")
+        undo.on_trigger(self.action(self._undo_edit))
+        redo.on_trigger(self.action(self._redo_edit))
         self.refresh()
 
     def _pressed(self, name: str) -> None:
@@ -323,10 +331,10 @@ class Window:
                 said = client.gui.add_html(words.notice(text), order=-2.0)
                 button = client.gui.add_button("Take over", order=-1.0, color="orange")
                 self.gate.offers.add(button._impl.uuid)
-                button.on_click(lambda _, mine=connection: self._take_over(mine))
+                button.on_click(partial(self._take_over, connection))
                 self._banners[number] = [said, button]
 
-    def _take_over(self, connection: ServerConnection) -> None:
+    def _take_over(self, connection: ServerConnection, _: Any) -> None:
         self.gate.take_over(connection)
         self._show_who_works()
 
@@ -334,4 +342,3 @@ class Window:
         for client, mine in [*self._windows.values()]:
             if mine is connection:
                 client.add_notification("Refused", why, color="orange", auto_close_seconds=10)
-

@@ -32,7 +32,7 @@ def paragraph(text: object) -> str:
 def lines(texts: Iterable[str]) -> str:
     """Return what a record prints, line by line, in letters of one width."""
     shown = "\n".join(plain(spelled(text)) for text in texts)
-    return f'<pre style="{_STYLE};white-space:pre-wrap;font-family:monospace">{shown}</pre>'
+    return f'<pre style="{_STYLE};white-space:pre-wrap;font-family:monospace;font-size:0.78em">{shown}</pre>'
 
 
 def notices(found: Sequence[Notice]) -> str:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from truearm.errors import InputError
 from truearm.jobs.show import show
 from truearm.library import library
 from truearm.studio import words
+from truearm.studio.pages.choices import offer
 from truearm.studio.window import Window
-
-#: What stands in a list of files where none is chosen.
-NONE = "(none)"
 
 
 class CellPage:
@@ -23,10 +21,14 @@ class CellPage:
         self._window = window
         gui = window.gui
         self._robot = gui.add_dropdown("Robot", (window.project.settings.robot,))
-        self._payload = gui.add_text("Payload", "", hint="mass and place of its centre, such as 2.7kg,50mm,25mm,100mm")
-        self._upload = gui.add_upload_button("Take a file into the project", hint="robots, URDFs, measurements, programs")
-        self._about = gui.add_html("")
-        self._files = gui.add_html("")
+        self._payload: Any = gui.add_text(
+            "Payload", "", hint="mass and place of its centre, such as 2.7kg,50mm,25mm,100mm"
+        )
+        self._upload = gui.add_upload_button("Take a file into the project", hint="a robot, measurements, a program")
+        with gui.add_folder("Files of the project"):
+            self._files = gui.add_html("")
+        with gui.add_folder("What is known of the robot", expand_by_default=False):
+            self._about = gui.add_html("")
         self._robot.on_update(window.action(lambda: window.edit(robot=self._robot.value)))
         self._payload.on_update(window.action(self._weigh))
         self._upload.on_upload(window.action(self._take_in))
@@ -35,12 +37,10 @@ class CellPage:
         """Show the robot of the settings, and the files of the folder."""
         window, settings = self._window, self._window.project.settings
         files = window.project.names(".yaml", ".yml", ".urdf", ".xacro", ".xml")
-        options = dict.fromkeys([*library(), *files, settings.robot])
-        self._robot.options = tuple(options)
-        self._robot.value = settings.robot
+        offer(self._robot, [*library(), *files], settings.robot, None)
         self._payload.value = settings.payload or ""
-        rows = [[name] for name in window.project.names()]
-        self._files.content = words.table(["files of the project"], rows) if rows else ""
+        names = window.project.names()
+        self._files.content = words.lines(names) if names else words.paragraph("None yet: take one in.")
         try:
             self._about.content = words.lines(show(window.robot()).lines())
         except InputError as error:

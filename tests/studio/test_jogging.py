@@ -166,3 +166,24 @@ def test_an_elastic_arm_reaches_the_pose_it_was_told() -> None:
     arm.go_to(p[0], R[0])
     assert arm.pose()[0] == pytest.approx(p[0], abs=1e-8)
     assert np.abs(arm.joints - Q).max() > 1e-4
+
+
+@pytest.mark.parametrize("name", ["irb120", "fr3", "katana450", "li3"])
+@pytest.mark.parametrize("elastic", [False, True])
+def test_a_pose_that_is_dragged_to_is_met_without_a_leap(name: str, elastic: bool) -> None:
+    robot = load_robot(name)
+    if elastic and name != "li3":
+        robot = robot.with_effects(["compliance"])
+        robot = robot.with_values({n: 1e-4 for n in robot.parameters if n.startswith("compliance")})
+    middle = np.array([sum(joint.range) / 2.0 for joint in robot.joints]) + 0.3
+    arm = Jogging(robot, middle)
+    for k in range(8):
+        p, R = robot.forward(middle + 0.1 * np.sin(0.5 * k + np.arange(len(middle))), frame="world")
+        before = arm.joints
+        assert arm.drag_to(p[0], R[0]) is PoseStatus.REACHED
+        assert arm.pose("world")[0] == pytest.approx(p[0], abs=1e-8)
+        assert np.abs(arm.joints - before).max() < 0.3
+    far = arm.pose("world")[0] + [2.0, 0.0, 0.0]
+    with pytest.raises(InputError, match="cannot go to this pose"):
+        arm.drag_to(far, R[0])
+    assert arm.pose("world")[0] == pytest.approx(p[0], abs=1e-8)

@@ -13,10 +13,12 @@ from truearm.jobs.inverse import inverse
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import Controller, JointsOf
 from truearm.modeling.formats.joint_columns import counting
+from truearm.modeling.inverse.candidates import REACHED, Candidates
 from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
-from truearm.modeling.inverse.pose_solver import Orientation
+from truearm.modeling.inverse.pose_solver import Orientation, PoseTask
 from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.orientations import FIXED_XYZ_ANGLES
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.units import from_si, to_si
 
@@ -27,6 +29,8 @@ JOG_FRAMES: Final[tuple[JogFrame, ...]] = ("base", "world", "tool")
 _FREEDOM: Final[dict[int, Orientation]] = {3: "free", 4: "free", 5: "axis"}
 #: Rounding that is no way beyond a limit [rad or m].
 _ROUNDING: Final = 1e-9
+#: A pose that is dragged to may turn a joint by so much in one step [rad or m]; further away all branches are tried.
+_A_LITTLE: Final = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +78,14 @@ class Jogging:
         fits = joints is not None and joints.shape == self.low.shape and np.isfinite(joints).all()
         self.joints: Array = np.clip(joints if fits and joints is not None else _start(robot), self.low, self.high)
         self._angles = np.zeros((1, 3))
+        self._bent: Postures | None = None
+
+    @property
+    def at(self) -> Postures:
+        """The arm at its joint positions with the loads there, which are found once."""
+        if self._bent is None or not np.array_equal(self._bent.joints[0], self.joints):
+            self._bent = self.robot.loaded(self.joints[None].copy())
+        return self._bent
 
     @property
     def units(self) -> list[str]:
@@ -142,7 +154,7 @@ class Jogging:
 
     def pose(self, frame: JogFrame = "base") -> tuple[Array, Array]:
         """Return the tip's position ``(3,)`` [m] and rotation ``(3, 3)`` in the base or the world."""
-        p, R = self.robot.forward(self.joints, frame="world" if frame == "world" else "base", target=self.tip)
+        p, R = self.robot.forward(self.at, frame="world" if frame == "world" else "base", target=self.tip)
         return p[0], R[0]
 
     def pose_numbers(self, frame: JogFrame) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -198,6 +210,32 @@ class Jogging:
         self.joints = np.clip(found.joints[0], self.low, self.high)
         return found.status[0]
 
+    def drag_to(self, position: Array, rotation: Array) -> PoseStatus:
+        """Go to a pose of the tip in the world, as :meth:`go_to`, a little way from where it is in less time.
+
+        Steps from where the arm is lead to the nearest joint positions, if they lead there at all.
+        """
+        if self._near(position, rotation):
+            return PoseStatus.REACHED
+        return self.go_to(position, rotation, "world")
+
+    def _near(self, position: Array, rotation: Array) -> bool:
+        """Go to a pose in the world by steps from where the arm is; return whether that was possible."""
+        x, y, z = rotation.T[:, :, None]
+        length = reach(self.robot, self.tip)
+        task = PoseTask(self.robot, self.tip, self.orientation, position[:, None], (x, y, z), length)
+        pool = Candidates(task, self.joints[None], None)
+        pool.add(np.zeros(1, np.intp), self.robot.variables(self.at, self.robot.values)[: len(self.joints)].T)
+        found = pool.joints[0]
+        if not pool.satisfied(None)[0] or np.abs(found - self.joints).max() > _A_LITTLE:
+            return False
+        before, self.joints = self.joints, np.clip(found, self.low, self.high)
+        # Where a joint is all but balanced it may come to rest at the other end of its play, and the arm elsewhere.
+        if max(task.distances(task.error(self.robot.forward_kinematics(self.at, self.tip)))).item() <= REACHED:
+            return True
+        self.joints = before
+        return False
+
     def branches(self) -> list[Branch]:
         """Return all ways to the pose where the tip is now.
 
@@ -218,8 +256,7 @@ class Jogging:
 
         It is 0 in a singular posture, and as ``ik`` has it for a whole pose.
         """
-        at = self.robot.loaded(self.joints[None])
-        jacobian = self.robot.joint_jacobian(at, self.tip)[0].copy()
+        jacobian = self.robot.joint_jacobian(self.at, self.tip)[0].copy()
         jacobian[:3] /= reach(self.robot, self.tip)
         if self.orientation == "free":
             jacobian = jacobian[:3]

@@ -13,6 +13,7 @@ import viser
 
 from truearm.modeling.chain import Array
 from truearm.modeling.fixtures import Fixture
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, quaternion_from_rotation
 from truearm.studio.arrows import Arrows
@@ -70,9 +71,9 @@ class DrawnRobot:
                         receive_shadow=not ghost,
                     )
 
-    def move(self, joints: Array) -> None:
-        """Show it at joint positions ``(joints,)`` [rad or m], bent as it would be."""
-        positions, quaternions = link_poses(self.robot, joints[None])
+    def move(self, at: Array | Postures) -> None:
+        """Show it at joint positions ``(1, joints)`` [rad or m], or a posture, bent as it would be."""
+        positions, quaternions = link_poses(self.robot, at)
         for link, position, quaternion in zip(self._links, positions[0], quaternions[0], strict=True):
             link.position, link.wxyz = position, quaternion
 
@@ -132,13 +133,19 @@ class Scene:
                 self._surroundings(nominal if calibrated is None else calibrated)
         return other_arm
 
-    def move(self, joints: Array) -> None:
-        """Show the robots at joint positions ``(joints,)``."""
-        self.joints = np.array(joints, float)
+    def move(self, at: Postures, of: Robot) -> None:
+        """Show the robots at joint positions.
+
+        Parameters
+        ----------
+        at, of
+            A posture, and the robot whose loads are known there; another robot bends in its own way.
+        """
+        self.joints = at.joints[0].copy()
         with self._server.atomic():
             for robot in (self.solid, self.ghost):
                 if robot is not None:
-                    robot.move(self.joints)
+                    robot.move(at if robot.robot is of else at.joints)
 
     def show_tip(self, position: Array, rotation: Array) -> None:
         """Show the frame of the tip that is moved, in the world [m]."""

@@ -159,7 +159,7 @@ class JogPage:
     def _dragged(self) -> None:
         arm = self._jogged()
         try:
-            arm.go_to(np.array(self._handle.position), rotation_from_quaternion(np.array(self._handle.wxyz)), "world")
+            arm.drag_to(np.array(self._handle.position), rotation_from_quaternion(np.array(self._handle.wxyz)))
         except InputError as error:
             self._said.content = words.paragraph(words.refusal(error))
             return
@@ -205,7 +205,7 @@ class JogPage:
         """Draw the arm where it is, and everything that follows."""
         arm = self.jogging
         assert arm is not None
-        self.scene.move(arm.joints)
+        self.scene.move(arm.at, arm.robot)
         if branches and self._branches:
             self._branches = []
             self._branch.options, self._branch.value = (_NEAREST,), _NEAREST

@@ -27,7 +27,7 @@ class Arrows:
     segments
         Start and end of each [m], ``(n, 2, 3)``.
     colours
-        ``(n, 2, 3)``, 0 to 255, at both ends.
+        ``(n, 3)``, 0 to 255.
     words
         What must stand beside them: how much they are magnified, and how large the largest is.
     """
@@ -61,7 +61,7 @@ def error_arrows(points: Array, errors: Array, factor: float) -> Arrows:
     largest = float(size.max(initial=0.0))
     colours = coloured(size, 0.0, largest)
     words = f"errors x {times:g}, largest {largest * 1e3:.3g} mm"
-    return Arrows(np.stack([at, at + times * by], axis=1), np.repeat(colours[:, None], 2, axis=1), words)
+    return Arrows(np.stack([at, at + times * by], axis=1), colours, words)
 
 
 def coloured(values: Array, low: float, high: float) -> NDArray[np.uint8]:

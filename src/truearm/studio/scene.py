@@ -266,9 +266,11 @@ class Scene:
         self._clear("fixtures")
         for number, fixture in enumerate(robot.fixtures):
             self._parts["fixtures"] += self._fixture(robot, fixture, f"/fixtures/{number}")
-        look = np.array(base.translation) + base.rotation @ (self.length * np.array([0.15, 0.0, 0.3]))
+        # The arm stands a little right of the middle and above it: notices float over the corner below on the left.
+        look = np.array(base.translation) + base.rotation @ (self.length * np.array([0.02, -0.05, 0.08]))
+        look += base.rotation @ np.array([0.0, 0.0, 0.6 * self.solid.floor])
         self._server.initial_camera.look_at = look
-        self._server.initial_camera.position = look + base.rotation @ (self.length * np.array([0.8, -1.05, 0.42]))
+        self._server.initial_camera.position = look + base.rotation @ (self.length * np.array([0.85, -1.15, 0.6]))
 
     def _fixture(self, robot: Robot, fixture: Fixture, name: str) -> list[Any]:
         kinematics = robot.fixture_kinematics(fixture.name)

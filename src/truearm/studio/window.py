@@ -179,6 +179,11 @@ class Window:
         """Whether a long action runs."""
         return self._work is not None
 
+    @property
+    def stopped(self) -> bool:
+        """Whether nothing is served any more."""
+        return self._stopped.is_set()
+
     def wait(self, seconds: float) -> bool:
         """Wait for the long action to end; return whether it has, for tests."""
         work = self._work

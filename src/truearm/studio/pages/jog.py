@@ -13,6 +13,7 @@ from truearm.errors import InputError
 from truearm.files import exists
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.jogging import JOG_FRAMES, Branch, Jogging, JogFrame
 from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
@@ -86,6 +87,7 @@ class JogPage:
             if ghost is not None:
                 self._arms["calibrated"] = ghost
             self._arm.options = tuple(self._arms)
+            self._ghost.disabled = ghost is None
             self._take("calibrated" if self._arm.value == "calibrated" and ghost is not None else "nominal")
         self._show_recorded()
 
@@ -291,7 +293,7 @@ class JogPage:
         while True:
             passed = time.monotonic() - began
             with self._window.lock:
-                if over.is_set() or self.jogging is None:
+                if over.is_set() or self._window.stopped or self.jogging is None:
                     return
                 self.jogging.go(motion.at(passed))
                 self._moved()
@@ -306,7 +308,5 @@ class JogPage:
             self._playing = None
 
 
-def _no_robot() -> Any:
-    from truearm.notices import Notice
-
+def _no_robot() -> Notice:
     return Notice("no-real-robot", _SAFE, "note")

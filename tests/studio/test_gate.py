@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import socket
 import threading
 import time
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -40,6 +42,17 @@ def eventually(condition: Any, seconds: float = 5.0) -> bool:
             return False
         time.sleep(0.01)
     return True
+
+
+def is_closed(line: Any) -> bool:
+    """Return whether the other end closes a connection."""
+    try:
+        while True:
+            line.recv(5)
+    except ConnectionClosed:
+        return True
+    except TimeoutError:
+        return False
 
 
 def own(studio: Studio) -> str:
@@ -103,7 +116,7 @@ def test_two_headers_of_one_name_are_refused(serving: Serving) -> None:
     assert alive(studio)
 
 
-@pytest.mark.parametrize("brought", [None, "wrong", TOKEN[:-1], TOKEN + "x", "\u00e4", "%s"])
+@pytest.mark.parametrize("brought", [None, "qqqq", TOKEN[:-1], TOKEN + "x", "\u00e4", "%s"])
 def test_without_the_token_nothing_is_served_and_no_connection_accepted(serving: Serving, brought: str | None) -> None:
     said: list[str] = []
     studio = serving(token=TOKEN, say=said.append)
@@ -215,8 +228,13 @@ def test_malformed_frames_close_their_connection_alone(serving: Serving, sent: b
     request += f"Sec-WebSocket-Protocol: viser-v{viser.__version__}\r\n\r\n"
     with window(studio) as other:
         send(other, **CAMERA)
-        got = answer(studio, request.encode() + sent, 2.0)
-        assert got.startswith(b"HTTP/1.1 101")
+        with socket.create_connection(("127.0.0.1", studio.access.port), timeout=2) as raw:
+            raw.sendall(request.encode())
+            assert raw.recv(12) == b"HTTP/1.1 101"
+            with suppress(ConnectionError, TimeoutError):
+                raw.sendall(sent)
+                while raw.recv(1 << 16):
+                    pass
         send(other, **CAMERA)
         assert len(other.recv(5)) > 0
     assert alive(studio)
@@ -241,9 +259,7 @@ def test_malformed_messages_close_their_connection_alone(serving: Serving, sent:
     studio = serving(say=said.append)
     with window(studio) as line:
         line.send(sent)
-        with pytest.raises(ConnectionClosed):
-            while True:
-                line.recv(5)
+        assert is_closed(line)
     assert any(text.startswith("refused: a ") for text in said)
     assert alive(studio)
 
@@ -282,10 +298,13 @@ def test_only_the_value_of_an_element_can_be_changed(serving: Serving) -> None:
         assert eventually(lambda: any("otherwise" in text for text in said))
         send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": "kr5"})
         assert eventually(lambda: studio.window.project.settings.robot == "kr5")
-        for value in ("../../etc/passwd", "/etc/passwd", "<script>alert(1)</script>", "nobody.yaml"):
+        for count, value in enumerate(("../../etc/passwd", "/etc/passwd", "C:\\x", "a\nb"), 1):
             send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": value})
-        assert eventually(lambda: "no place" in studio.window._notices.content)
-    assert "<script>" not in studio.window._notices.content
+            assert eventually(lambda wanted=count: studio.window._notices.content.count("no place") == wanted)  # type: ignore[misc]
+        send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": "<script>alert(1)</script>"})
+        assert eventually(lambda: "script" in studio.window.project.settings.robot)
+    shown = [getattr(one, "content", "") for one in studio.window.gui._gui_input_handle_from_uuid.values()]
+    assert "<script>" not in studio.window._notices.content + "".join(shown)
     assert alive(studio)
 
 
@@ -339,9 +358,7 @@ def test_more_of_a_file_than_was_announced_closes_the_connection(serving: Servin
     with window(studio) as line:
         working(studio, line)
         upload(line, button, "lie.csv", bytes(200_000), 100, 3)
-        with pytest.raises(ConnectionClosed):
-            while True:
-                line.recv(5)
+        assert is_closed(line)
     assert any("more of a file than was announced" in text for text in said)
     assert not (studio.window.project.folder / "lie.csv").exists()
     assert eventually(lambda: not studio.window.gui._current_file_upload_states)
@@ -358,7 +375,7 @@ def test_a_second_window_reads_until_it_takes_over(serving: Serving) -> None:
         (offer,) = studio.window.gate.offers
         send(second, type="GuiUpdateMessage", uuid=robot, updates={"value": "kr5"})
         send(second, type="GuiUpdateMessage", uuid=offer, updates={"value": True})
-        assert eventually(lambda: not studio.window.gate.offers - {offer} and offer not in studio.window.gate.offers)
+        assert eventually(lambda: offer not in studio.window.gate.offers)
         assert studio.window.project.settings.robot == "irb120"
         assert eventually(lambda: len(studio.window._banners) == 1)  # now the first one reads
         send(first, type="GuiUpdateMessage", uuid=robot, updates={"value": "ur5"})

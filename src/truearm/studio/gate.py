@@ -222,7 +222,7 @@ class Gate:
             return self._refuse(connection, 401, "no token, or a wrong one")
         if query:
             return self._refuse(connection, 404, "an address with a question mark, which could name another server")
-        if is_socket and len(connection.server.connections) > _WINDOWS:
+        if is_socket and len(connection.server.connections) >= _WINDOWS:
             return self._refuse(connection, 503, f"more than {_WINDOWS} windows at once")
         return None
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-
 from tests.studio.conftest import Serving
+
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
+from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.arrows import Arrows, coloured, error_arrows
 from truearm.studio.pages.jog import JogPage
@@ -26,8 +27,8 @@ BY_A_USER = SimpleNamespace(client=object())
 
 
 @pytest.fixture
-def studio(serving: Serving) -> Iterator[Studio]:
-    yield serving()
+def studio(serving: Serving) -> Studio:
+    return serving()
 
 
 @pytest.fixture
@@ -68,7 +69,12 @@ def flange_drawn(page: JogPage) -> tuple[Any, Any]:
 
 def test_it_says_that_no_real_robot_moves(serving: Serving, monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str] = []
-    monkeypatch.setattr(words, "notice", lambda notice: shown.append(f"{notice.code}: {notice.message}") or "")
+
+    def noted(notice: Notice) -> str:
+        shown.append(f"{notice.code}: {notice.message}")
+        return ""
+
+    monkeypatch.setattr(words, "notice", noted)
     serving()
     assert any(text.startswith("no-real-robot: ") and "none moves" in text for text in shown)
 
@@ -112,7 +118,7 @@ def test_a_pose_in_numbers_and_by_the_handle(page: JogPage) -> None:
     drawn, _ = flange_drawn(page)
     assert drawn == pytest.approx([0.35, 0.05, 0.6], abs=1e-9)
     _, turned = flange_drawn(page)
-    drag(page, drawn + [0.01, -0.02, 0.0], turned)
+    drag(page, drawn + np.array([0.01, -0.02, 0.0]), turned)
     assert flange_drawn(page)[0] == pytest.approx([0.36, 0.03, 0.6], abs=1e-9)
     act(page._frame, "tool")
     assert page._place.value == (0.0, 0.0, 0.0)
@@ -204,8 +210,8 @@ def test_no_other_file_is_recorded_into(page: JogPage, studio: Studio, name: str
 
 def test_files_of_others_are_not_recorded_into(page: JogPage, studio: Studio) -> None:
     file = studio.window.project.folder / "plan.csv"
-    file.write_text("configuration,joint_1 [deg],joint_2 [deg],joint_3 [deg],joint_4 [deg],joint_5 [deg],joint_6 [deg],reads\n"
-                    "c1,1,2,3,4,5,6,x\n")  # fmt: skip
+    headings = ",".join(f"joint_{k} [deg]" for k in range(1, 7))
+    file.write_text(f"configuration,{headings},reads\nc1,1,2,3,4,5,6,x\n")
     before = file.read_text()
     act(page._list, "plan.csv")
     act(page._record, "record")
@@ -220,7 +226,8 @@ def _notices(studio: Studio) -> str:
 
 
 def test_nominal_and_calibrated_stand_where_the_instrument_saw_the_robot(studio: Studio, page: JogPage) -> None:
-    robot = load_robot("irb120").with_frames(Transform((1.0, 2.0, 0.5), (0.0, 0.0, 0.0, 1.0)), {"b'><i>": (0.0, 0.0, 0.1)})
+    base = Transform((1.0, 2.0, 0.5), (0.0, 0.0, 0.0, 1.0))
+    robot = load_robot("irb120").with_frames(base, {"b'><i>": (0.0, 0.0, 0.1)})
     found = robot.with_values({"a_3": 0.2712, "theta_offset_2": -1.565})
     folder = studio.window.project.folder / "result"
     folder.mkdir()
@@ -283,17 +290,18 @@ def test_errors_are_magnified_and_the_factor_is_said(page: JogPage) -> None:
 def test_many_points_go_in_one_upload(page: JogPage, studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     sent: list[str] = []
     queue = studio.window.server.scene._queue_scene_message
-    monkeypatch.setattr(
-        studio.window.server.scene,
-        "_queue_scene_message",
-        lambda message: (sent.append(type(message).__name__), queue(message)),
-    )
+
+    def noted(message: Any) -> None:
+        sent.append(type(message).__name__)
+        queue(message)
+
+    monkeypatch.setattr(studio.window.server.scene, "_queue_scene_message", noted)
     rng = np.random.default_rng(0)
     cloud = rng.normal(size=(5000, 3))
     page.scene.show_points("candidates", cloud, coloured(cloud[:, 2], -1.0, 1.0))
     page.scene.show_arrows("errors", error_arrows(cloud[:500], 1e-4 * cloud[:500], 1000.0))
     assert sent.count("PointCloudMessage") == 1
-    assert sent.count("ArrowsMessage") == 1
+    assert sent.count("ArrowMessage") == 1
     assert isinstance(page.scene._parts["candidates"], list)
     assert isinstance(error_arrows(cloud, cloud, 1.0), Arrows)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from tests.studio.arms import GANTRY, POINT, SCARA
+
 from truearm.errors import InputError
 from truearm.jobs.inverse import inverse
 from truearm.library import load_robot

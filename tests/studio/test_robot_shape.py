@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from tests.studio.arms import GANTRY, ODD, SCARA
+
 from truearm.library import library, load_robot
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion

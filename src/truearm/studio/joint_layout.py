@@ -10,6 +10,7 @@ moved aside so that they can pass, as far as the table has an offset there.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -255,7 +256,8 @@ def _side_by_side(
     shifts, ways = [0.0], [1.0]  # of each joint's count: common = shift + way * own
     for joint in range(first, last):
         line = lines[joint + 1]
-        assert line.axis is not None and line.next_axis is not None
+        assert line.axis is not None
+        assert line.next_axis is not None
         ways.append(ways[-1] * float(np.sign(line.axis @ line.next_axis)))
         shifts.append(shifts[-1] + ways[-2] * float(line.origin @ line.axis))
     start, end = feet[first][1], shifts[-1] + ways[-1] * feet[last + 1][0]
@@ -290,7 +292,7 @@ def _aside(start: float, end: float, room: list[float]) -> list[float]:
         choices = grown
     for chosen in choices:
         whole = [start, *chosen, end]
-        steps = [abs(b - a) for a, b in zip(whole, whole[1:], strict=False)]
+        steps = [abs(b - a) for a, b in pairwise(whole)]
         outside = sum(max(low - at, at - high, 0.0) for at in chosen)
         cost = (round(outside, 9), sum(steps))
         if all(step >= 0.9 * least for step, least in zip(steps, room, strict=True)) and cost < best:

@@ -27,7 +27,7 @@ _HINGE, _COLLAR = 0.95, 0.42
 _FLANGE, _FLANGE_THICK, _PLATE, _PLATE_THICK = 0.8, 0.3, 1.75, 0.22
 #: Of a rail: half its width by the radius of a drum; of its carriage.
 _RAIL, _CARRIAGE = 0.45, 0.9
-#: Radius of the rods that hold targets by the length of the arm; of a target, that of a reflector of 1.5 inches at most.
+#: Radius of rods that hold targets, and of targets, by the length of the arm; no more than a reflector of 1.5 inches.
 _ROD, _TARGET, _LARGEST_TARGET = 0.006, 0.012, 0.01905
 
 

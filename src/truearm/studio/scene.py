@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 from truearm.modeling.fixtures import Fixture
@@ -21,6 +22,8 @@ from truearm.studio.robot_shape import link_poses, robot_shape
 from truearm.studio.solids import frame_about
 
 Colour = tuple[int, int, int]
+#: One colour for all, or one each.
+Colours = NDArray[np.uint8] | Colour
 #: Links and joints of the solid robot, and of the ghost.
 _SOLID: Final[tuple[Colour, Colour]] = ((222, 225, 230), (84, 96, 114))
 _GHOST: Final[tuple[Colour, Colour]] = ((70, 130, 180), (40, 90, 140))
@@ -199,7 +202,9 @@ class Scene:
         place = (float(middle[0]), float(middle[1]), float(top[2]) + 0.1 * self.length)
         self._parts[name] = [shown, self._scene.add_label(f"/{name}/words", arrows.words, position=place)]
 
-    def show_points(self, name: str, points: Array | None, colours: Array | Colour = (70, 130, 180)) -> None:
+    def show_points(
+        self, name: str, points: Array | None, colours: Colours = (70, 130, 180)
+    ) -> None:
         """Draw points ``(n, 3)`` [m] in the world in one upload; None takes them away.
 
         Parameters

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -138,7 +139,7 @@ def _without_short_legs(path: list[Array], radius: float) -> list[Array]:
     """Leave out inner corners of a path with a leg too short to bend, the shortest leg first."""
     path = list(path)
     while len(path) > 2:
-        legs = [float(np.linalg.norm(b - a)) for a, b in zip(path, path[1:], strict=False)]
+        legs = [float(np.linalg.norm(b - a)) for a, b in pairwise(path)]
         short = int(np.argmin(legs))
         if legs[short] >= _SHORT_LEG * radius:
             break

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -15,7 +16,7 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.notices import Notice
 from truearm.studio import words
-from truearm.studio.jogging import JOG_FRAMES, Branch, Jogging, JogFrame
+from truearm.studio.jogging import JOG_FRAMES, Branch, JogFrame, Jogging
 from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
@@ -46,23 +47,32 @@ class JogPage:
         self._playing: threading.Event | None = None
         gui = window.gui
         gui.add_html(words.notice(_no_robot()))
-        self._arm = gui.add_dropdown("Arm", ("nominal",), hint="whose parameters and joint effects poses are found with")
+        self._arm: Any = gui.add_dropdown(
+            "Arm", ("nominal",), hint="whose parameters and joint effects poses are found with"
+        )
         self._ghost = gui.add_checkbox("Calibrated arm as a shadow", True)
-        self._whose = gui.add_dropdown("Numbers of", _WHOSE, initial_value="model", hint="as the pendant shows joints, or the model's")
+        self._whose: Any = gui.add_dropdown(
+            "Numbers of", _WHOSE, initial_value="model", hint="as the pendant shows joints, or the model's"
+        )
         self._joints = gui.add_folder("Joints")
         self._sliders: list[Any] = []
         self._said = gui.add_html("")
         with gui.add_folder("Pose"):
-            self._tip = gui.add_dropdown("Tip", (_FLANGE,))
-            self._frame = gui.add_dropdown("Axes of", JOG_FRAMES, initial_value="base", hint="tool: by how much to move from here")
-            self._place = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.1)
-            self._turns = gui.add_vector3(
-                "rx, ry, rz [deg]", (0.0, 0.0, 0.0), step=0.1, hint="about the fixed axes x, y and z, one after the other"
+            self._tip: Any = gui.add_dropdown("Tip", (_FLANGE,))
+            self._frame: Any = gui.add_dropdown(
+                "Axes of", JOG_FRAMES, initial_value="base", hint="tool: by how much to move from here"
+            )
+            self._place: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.1)
+            self._turns: Any = gui.add_vector3(
+                "rx, ry, rz [deg]",
+                (0.0, 0.0, 0.0),
+                step=0.1,
+                hint="about the fixed axes x, y and z, one after the other",
             )
             self._go = gui.add_button("Go to this pose")
             self._handle_on = gui.add_checkbox("Handle to drag in the scene", True)
             self._find = gui.add_button("Find all branches")
-            self._branch = gui.add_dropdown("Branch", (_NEAREST,))
+            self._branch: Any = gui.add_dropdown("Branch", (_NEAREST,))
         with gui.add_folder("Recorded configurations"):
             self._list = gui.add_text("File", "recorded.csv")
             self._record = gui.add_button_group("Pose", ("record", "remove last"))
@@ -143,7 +153,7 @@ class JogPage:
             for k, (joint, unit) in enumerate(zip(arm.robot.joints, arm.units, strict=True)):
                 low, high = arm.ranges()[k]
                 slider = self._window.gui.add_slider(f"{joint.name} [{unit}]", low, max(high, low + 0.01), 0.01, low)
-                slider.on_update(self._newest(f"joint {k}", lambda k=k: self._slid(k)))
+                slider.on_update(self._newest(f"joint {k}", partial(self._slid, k)))
                 self._sliders.append(slider)
         if self._handle is not None:
             self._handle.remove()
@@ -173,7 +183,7 @@ class JogPage:
         self._moved()
 
     def _find_branches(self) -> None:
-        self._branches = [branch for branch in self._jogged().branches()]
+        self._branches = self._jogged().branches()
         names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
         self._branch.options = (_NEAREST, *names)
 
@@ -242,7 +252,9 @@ class JogPage:
     def _file(self) -> Any:
         name = self._list.value.strip()
         if not name.lower().endswith(".csv"):
-            raise InputError("a table of configurations belongs here", parameter="File", came=name, allowed="a CSV file")
+            raise InputError(
+                "a table of configurations belongs here", parameter="File", came=name, allowed="a CSV file"
+            )
         return self._window.project.path(name, "File")
 
     def _read(self) -> Recorded | None:

@@ -273,7 +273,9 @@ class Jogging:
             if value <= low + _ROUNDING or value >= high - _ROUNDING:
                 told.append(f"{joint.name} is at its limit.")
         value = self.singular_value()
-        told.append(f"Smallest singular value: {value:.3g}" + (", near a singular posture." if value < NEAR_SINGULAR else "."))
+        told.append(
+            f"Smallest singular value: {value:.3g}" + (", near a singular posture." if value < NEAR_SINGULAR else ".")
+        )
         return told
 
     def _controller(self) -> Controller | None:

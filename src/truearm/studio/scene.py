@@ -202,9 +202,7 @@ class Scene:
         place = (float(middle[0]), float(middle[1]), float(top[2]) + 0.1 * self.length)
         self._parts[name] = [shown, self._scene.add_label(f"/{name}/words", arrows.words, position=place)]
 
-    def show_points(
-        self, name: str, points: Array | None, colours: Colours = (70, 130, 180)
-    ) -> None:
+    def show_points(self, name: str, points: Array | None, colours: Colours = (70, 130, 180)) -> None:
         """Draw points ``(n, 3)`` [m] in the world in one upload; None takes them away.
 
         Parameters

@@ -1,6 +1,6 @@
 """What long actions do: each calls one job, as the command of its name does in the project's folder.
 
-They run in a process of their own (:mod:`truearm.studio.work`), whose working folder is the project's. So what they
+They read files of the project alone, and run in a process of their own (:mod:`truearm.studio.work`), whose working folder is the project's. So what they
 write is, to the byte, what the command writes there.
 """
 
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from truearm.files import confined_reads
 from truearm.notices import Notice
 
 Progress = Callable[[str], None]
@@ -46,7 +47,8 @@ def check(folder: Path, robot: str, data: str, progress: Progress) -> Outcome:
 
     os.chdir(folder)
     progress("comparing the readings with the robot")
-    found = job(robot, data)
+    with confined_reads(folder):
+        found = job(robot, data)
     return Outcome(tuple(found.lines()), found.warnings)
 
 
@@ -63,7 +65,8 @@ def calibrate(folder: Path, robot: str, data: str, out: str, progress: Progress,
     os.chdir(folder)
     given = {name: value for name, value in options.items() if value is not None}
     command = calibrate_command(robot, data, given)
-    found = job(robot, data, out=out, command=command, progress=progress, **given)
+    with confined_reads(folder):
+        found = job(robot, data, out=out, command=command, progress=progress, **given)
     return Outcome(tuple(found.lines()), found.warnings, found.files, found.finished)
 
 
@@ -87,17 +90,18 @@ def compensate(
     from truearm.jobs.compensate import compensate as job
 
     os.chdir(folder)
-    made = job(
-        robot,
-        [program],
-        out=out,
-        tools=cell,
-        frames=cell,
-        taught=taught,
-        controller_kinematics=controller_kinematics,
-        command=compensate_command(robot, program, cell, taught, controller_kinematics),
-        progress=progress,
-    )
+    with confined_reads(folder):
+        made = job(
+            robot,
+            [program],
+            out=out,
+            tools=cell,
+            frames=cell,
+            taught=taught,
+            controller_kinematics=controller_kinematics,
+            command=compensate_command(robot, program, cell, taught, controller_kinematics),
+            progress=progress,
+        )
     return Outcome(tuple(made.lines()), made.warnings, tuple(one.name for one in made.files))
 
 

@@ -14,7 +14,7 @@ import viser
 from websockets.asyncio.server import ServerConnection
 
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes
+from truearm.files import confined_reads, exists, read_bytes
 from truearm.library import load_robot
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
@@ -83,7 +83,7 @@ class Window:
         def called(event: Any) -> None:
             if getattr(event, "client", None) is None:
                 return
-            with self.lock:
+            with self.lock, confined_reads(self.project.folder):
                 try:
                     do()
                 except InputError as error:
@@ -199,18 +199,20 @@ class Window:
         """
         said = self.project.settings.payload
         payload = None if said is None else Payload.of(said, "payload")
-        return load_robot(self.project.robot_source()).with_payload(payload, None)
+        with confined_reads(self.project.folder):
+            return load_robot(self.project.robot_source()).with_payload(payload, None)
 
     def calibrated(self) -> Robot | None:
         """Return the calibrated robot; None if there is none yet."""
         folder = self.project.file("result")
         if folder is None or not exists(folder / "calibrated.yaml"):
             return None
-        return load_robot(folder / "calibrated.yaml")
+        with confined_reads(self.project.folder):
+            return load_robot(folder / "calibrated.yaml")
 
     def refresh(self) -> None:
         """Show what is true now on every page."""
-        with self.lock:
+        with self.lock, confined_reads(self.project.folder):
             settings = self.project.settings
             self._where.content = words.paragraph(f"{self.project.folder}")
             if self._dark != settings.dark:

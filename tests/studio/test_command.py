@@ -68,7 +68,7 @@ def test_a_demonstration_replaces_no_measurements(truearm: Truearm, tmp_path: Pa
 def test_without_the_extra_it_says_what_to_install(
     truearm: Truearm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("truearm.cli.studio.find_spec", lambda _: None)
+    monkeypatch.setattr(sys.modules["truearm.cli.studio"], "find_spec", lambda _: None)
     run = truearm("studio", tmp_path / "new", "--no-open")
     assert run.code == 2
     assert "the studio needs the extra truearm[studio]. Install it: pip install 'truearm[studio]'." in run.err

@@ -147,6 +147,18 @@ def test_another_programs_edit_is_told_never_overwritten_and_taken_by_reloading(
     assert not file.exists()
 
 
+def test_the_studios_own_writing_hides_no_change_of_another_program(project: Project) -> None:
+    (project.folder / "a.csv").write_text("1")
+    project.edit(robot="kr5")
+    project.take_in("b.csv", b"2")
+    (project.folder / "result").mkdir()
+    (project.folder / "result" / "c.yaml").write_text("3")
+    project.look("result")
+    assert [(one.name, one.how) for one in project.changes()] == [("a.csv", "new")]
+    project.look()
+    assert project.changes() == ()
+
+
 def test_files_taken_in_replace_nothing(project: Project) -> None:
     assert project.take_in("a b.csv", b"1") == "a b.csv"
     assert project.take_in("a b.csv", b"1") == "a b.csv"

@@ -216,9 +216,20 @@ class Project:
         self._written = self._stamp_of_file()
         self.look()
 
-    def look(self) -> None:
-        """Take note of the files as they are now: the studio has read or written them."""
-        self._seen = self._stamps()
+    def look(self, *names: str) -> None:
+        """Take note of files as they are now, those of some names and in folders of these; without names, of all.
+
+        The studio itself has written them.
+        """
+        now = self._stamps()
+
+        def meant(name: str) -> bool:
+            return any(name == one or name.startswith(f"{one}/") for one in names)
+
+        if names:
+            stay = {name: stamp for name, stamp in self._seen.items() if not meant(name)}
+            now = stay | {name: stamp for name, stamp in now.items() if meant(name)}
+        self._seen = now
 
     def changes(self) -> tuple[ChangedFile, ...]:
         """Return which files other programs have changed since the last look."""
@@ -253,8 +264,8 @@ class Project:
                 where=name,
                 cure="Rename the one or the other.",
             )
-        write_text_or_bytes(path, content)
-        self.look()
+        write_files(path.parent, {path.name: content})
+        self.look(name)
         return name
 
     def _write(self, settings: Settings) -> None:
@@ -267,7 +278,7 @@ class Project:
             )
         write_text(self.folder / PROJECT_FILE, settings.text())
         self._written = self._stamp_of_file()
-        self.look()
+        self.look(PROJECT_FILE)
 
     def _stamp_of_file(self) -> str | None:
         path = self.folder / PROJECT_FILE
@@ -289,11 +300,6 @@ class Project:
                     continue
                 found[self.relative(here / name)] = (known.st_size, known.st_mtime_ns)
         return found
-
-
-def write_text_or_bytes(path: Path, content: bytes) -> None:
-    """Write a whole file or nothing."""
-    write_files(path.parent, {path.name: content})
 
 
 def open_project(folder: object, first: Mapping[str, Any] | None = None) -> Project:

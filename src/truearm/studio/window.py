@@ -30,6 +30,8 @@ from truearm.writing import put_back_old
 _TOLD: Final = 40
 #: So often the folder is looked at for changes of other programs [s].
 _LOOK: Final = 2.0
+#: A text is taken when nothing was typed for so long [s].
+_REST: Final = 0.6
 #: Width of the pages, and width and height of the notices, which float over a corner of the scene [px].
 _WIDTH: Final = 520
 _NOTICES: Final = (440, 230)
@@ -89,6 +91,21 @@ class Window:
                 except InputError as error:
                     self.refuse(error)
                     self.refresh()
+
+        return called
+
+    def settled(self, do: Callable[[], None]) -> Callable[[Any], None]:
+        """Return a callback as :meth:`action` does, for a text that somebody types: `do` waits for the typing to rest."""
+        act, waiting = self.action(do), list[threading.Timer]()
+
+        def called(event: Any) -> None:
+            with self.lock:
+                while waiting:
+                    waiting.pop().cancel()
+                timer = threading.Timer(_REST, act, (event,))
+                timer.daemon = True
+                waiting.append(timer)
+                timer.start()
 
         return called
 
@@ -158,7 +175,8 @@ class Window:
                     else:
                         seconds = time.monotonic() - work.began
                         self._doing.content = words.paragraph(f"{title}: done in {seconds:.1f} s")
-                        self.project.look()
+                        settings = self.project.settings
+                        self.project.look(settings.result, settings.corrected)
                         try:
                             done(outcome)
                         except InputError as error:

@@ -34,8 +34,8 @@ class CalibratePage:
         self._said = gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))
         self._data.on_update(window.action(lambda: window.edit(data=chosen(self._data))))
         self._model.on_update(window.action(lambda: window.edit(model=self._model.value)))
-        self._train.on_update(window.action(lambda: window.edit(train=_train(self._train.value))))
-        self._seed.on_update(window.action(lambda: window.edit(seed=_whole(self._seed.value, "seed"))))
+        self._train.on_update(window.settled(lambda: window.edit(train=_train(self._train.value))))
+        self._seed.on_update(window.settled(lambda: window.edit(seed=_whole(self._seed.value, "seed"))))
         self._loss.on_update(window.action(lambda: window.edit(loss=self._loss.value)))
         self._run.on_click(window.action(self._calibrate))
 

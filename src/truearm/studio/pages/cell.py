@@ -30,7 +30,7 @@ class CellPage:
         with gui.add_folder("What is known of the robot", expand_by_default=False):
             self._about = gui.add_html("")
         self._robot.on_update(window.action(lambda: window.edit(robot=self._robot.value)))
-        self._payload.on_update(window.action(self._weigh))
+        self._payload.on_update(window.settled(self._weigh))
         self._upload.on_upload(window.action(self._take_in))
 
     def refresh(self) -> None:

@@ -13,6 +13,8 @@ import pytest
 from tests.studio.conftest import Serving
 
 from truearm.errors import InputError
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.simulate import simulate
 from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
@@ -20,6 +22,7 @@ from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.arrows import Arrows, coloured, error_arrows
 from truearm.studio.pages.jog import JogPage
+from truearm.studio.pages.proof import ProofPage
 from truearm.studio.serving import Studio
 
 #: An event of a user; those of the studio itself have no client.
@@ -312,3 +315,30 @@ def test_colours_go_from_dark_to_light() -> None:
     assert np.array_equal(colours[3], colours[4])
     assert (np.diff(colours[1:4].sum(axis=1)) > 0).all()
     assert np.array_equal(coloured(np.array([3.0]), 1.0, 1.0)[0], colours[0])
+
+
+def test_errors_of_a_result_are_drawn_from_before_to_after(studio: Studio, page: JogPage) -> None:
+    window, folder = studio.window, studio.window.project.folder
+    simulate("irb120", truth="random", poses=60, noise=5e-5, seed=1, out=folder / "data.csv")
+    found = calibrate("irb120", folder / "data.csv", model="geometric", seed=3, out=folder / "result")
+    window.project.look()
+    window.edit(data="data.csv", seed=3)
+    arrows = next(page._arrows for page in window.pages if isinstance(page, ProofPage))
+    act(arrows._draw)
+    assert window.wait(60.0)
+    assert eventually(lambda: bool(page.scene._parts.get("errors")))
+    assert found.validation is not None
+    largest = found.validation.position_norms.max() * 1e3
+    assert page.scene._parts["errors"][1].text == f"errors x 200, largest {largest:.3g} mm"
+    act(arrows._share, 0.0)
+    act(arrows._factor, 50.0)
+    largest = found.nominal.position_norms.max() * 1e3
+    assert page.scene._parts["errors"][1].text == f"errors x 50, largest {largest:.3g} mm"
+    # Of another split the figures would be others than those of the result.
+    window.edit(seed=4)
+    act(arrows._draw)
+    assert window.wait(60.0)
+    assert eventually(lambda: "split otherwise" in _notices(studio))
+    act(arrows._hide)
+    assert page.scene._parts["errors"] == []
+    assert arrows._factor.disabled

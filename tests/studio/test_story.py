@@ -13,6 +13,7 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.cli.conftest import truearm as truearm
 
+from truearm.studio.pages.jog import JogPage
 from truearm.studio.project import PROJECT_FILE
 from truearm.studio.serving import Studio, serve
 
@@ -132,6 +133,28 @@ def test_from_an_empty_folder_to_a_corrected_program_by_clicking(
     with person.page.expect_download() as came:
         person.press("report.html")
     assert Path(came.value.path()).read_bytes() == (folder / "result" / "report.html").read_bytes()
+
+    person.press("Draw the errors")
+    person.wait_for("errors x 200, largest ")
+
+    person.turn_to("Jog")
+    person.wait_for("No real robot is connected to this window, and none moves.")
+    number = person.page.locator('xpath=//label[text()="axis_2 [deg]"]/following::input[@type="text"][1]')
+    number.fill("40")
+    number.press("Enter")
+    jog = next(page for page in person.studio.window.pages if isinstance(page, JogPage))
+    for _ in range(100):
+        person.page.wait_for_timeout(50)
+        if jog.jogging is not None and jog.jogging.joints[1] > 0.69:
+            break
+    assert jog.jogging is not None
+    assert jog.jogging.numbers[1] == 40.0
+    assert jog.scene.ghost is not None
+    person.press("record")
+    person.wait_for("Recorded: P1")
+    assert (folder / "recorded.csv").read_text().splitlines()[1].startswith("P1,0.0,40.0,")
+    person.picture("jog")
+    jog.scene.show_arrows("errors", None)
 
     person.turn_to("Programs")
     person.press("Correct the program")

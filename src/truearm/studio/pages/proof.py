@@ -14,6 +14,7 @@ from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES
 from truearm.studio import words
 from truearm.studio.pages.choices import offer
+from truearm.studio.pages.error_arrows import ErrorArrows
 from truearm.studio.window import Window
 
 #: Where the report has the data of its pictures.
@@ -37,6 +38,7 @@ class ProofPage:
         self._place = gui.add_folder("Picture", visible=False)
         self._plot: Any = None
         self._files = gui.add_button_group("Download", RESULT_FILES[:3], visible=False)
+        self._arrows = ErrorArrows(window)
         self._notices = gui.add_html("")
         self._picture.on_update(window.action(self._draw))
         self._files.on_click(window.action(self._download))
@@ -44,6 +46,7 @@ class ProofPage:
     def refresh(self) -> None:
         """Show the result that stands in the folder."""
         project = self._window.project
+        self._arrows.refresh()
         folder = project.file("result")
         if folder is None or not exists(folder / "result.json"):
             self._table.content = words.paragraph("There is no result yet: calibrate first.")

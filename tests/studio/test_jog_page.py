@@ -14,6 +14,7 @@ from tests.studio.conftest import Serving
 
 from truearm.errors import InputError
 from truearm.jobs.calibrate import calibrate
+from truearm.jobs.plan import plan
 from truearm.jobs.simulate import simulate
 from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
@@ -22,6 +23,7 @@ from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.arrows import Arrows, coloured, error_arrows
 from truearm.studio.pages.jog import JogPage
+from truearm.studio.pages.plan import PlanPage
 from truearm.studio.pages.proof import ProofPage
 from truearm.studio.serving import Studio
 
@@ -342,3 +344,28 @@ def test_errors_of_a_result_are_drawn_from_before_to_after(studio: Studio, page:
     act(arrows._hide)
     assert page.scene._parts["errors"] == []
     assert arrows._factor.disabled
+
+
+def test_a_plan_is_the_commands_and_drawn_in_space(studio: Studio, page: JogPage, tmp_path: Path) -> None:
+    window = studio.window
+    planning = next(page for page in window.pages if isinstance(page, PlanPage))
+    planning._poses._impl.value, planning._candidates._impl.value = "30", 60
+    act(planning._run)
+    assert window.wait(60.0)
+    assert eventually(lambda: bool(page.scene._parts.get("chosen")))
+    made = plan("irb120", poses=30, candidates=60, noise=1e-4, out=tmp_path / "plan.csv")
+    assert (window.project.folder / "plan.csv").read_bytes() == (tmp_path / "plan.csv").read_bytes()
+    assert len(page.scene._parts["chosen"][0].points) == 30
+    assert made.made.robot.forward(made.joints, frame="world")[0] == pytest.approx(
+        page.scene._parts["chosen"][0].points, abs=1e-6
+    )
+    assert made.answer[0].split(".")[0] in planning._said.content
+    act(planning._cloud, False)
+    assert page.scene._parts["chosen"] == page.scene._parts["predicted"] == []
+    planning._poses._impl.value = "many"
+    act(planning._run)
+    assert "a number of poses belongs here" in _notices(studio)
+    # What it wrote is a list of configurations that can be played.
+    page._list._impl.value = "plan.csv"
+    page._show_recorded()
+    assert page._recorded.content.count(", ") == 6

@@ -135,11 +135,11 @@ def test_from_an_empty_folder_to_a_corrected_program_by_clicking(
     assert Path(came.value.path()).read_bytes() == (folder / "result" / "report.html").read_bytes()
 
     person.press("Draw the errors")
-    person.wait_for("errors x 200, largest ")
+    person.wait_for("Draw the errors: done")
 
     person.turn_to("Jog")
     person.wait_for("No real robot is connected to this window, and none moves.")
-    number = person.page.locator('xpath=//label[text()="axis_2 [deg]"]/following::input[@type="text"][1]')
+    number = person.page.locator('xpath=//label[contains(., "axis_2")]/following::input[@type="text"][1]')
     number.fill("40")
     number.press("Enter")
     jog = next(page for page in person.studio.window.pages if isinstance(page, JogPage))
@@ -155,6 +155,12 @@ def test_from_an_empty_folder_to_a_corrected_program_by_clicking(
     assert (folder / "recorded.csv").read_text().splitlines()[1].startswith("P1,0.0,40.0,")
     person.picture("jog")
     jog.scene.show_arrows("errors", None)
+
+    person.turn_to("Plan")
+    person.page.get_by_label("Candidates").fill("60")
+    person.press("Plan")
+    person.wait_for("Written: plan.csv, plan.html")
+    person.picture("plan")
 
     person.turn_to("Programs")
     person.press("Correct the program")

@@ -219,6 +219,7 @@ class Scene:
             np.asarray(colours, np.uint8),
             point_size=0.012 * self.length,
             point_shape="circle",
+            precision="float32",
         )
         self._parts[name] = [shown]
 

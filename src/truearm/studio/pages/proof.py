@@ -15,6 +15,7 @@ from truearm.results.calibration import RESULT_FILES
 from truearm.studio import words
 from truearm.studio.pages.choices import offer
 from truearm.studio.pages.error_arrows import ErrorArrows
+from truearm.studio.pictures import Picture
 from truearm.studio.window import Window
 
 #: Where the report has the data of its pictures.
@@ -35,8 +36,7 @@ class ProofPage:
         self._shown: tuple[Any, ...] = ()
         self._table = gui.add_html("")
         self._picture = gui.add_dropdown("Picture", ("",), visible=False)
-        self._place = gui.add_folder("Picture", visible=False)
-        self._plot: Any = None
+        self._drawn = Picture(window, "Picture")
         self._files = gui.add_button_group("Download", RESULT_FILES[:3], visible=False)
         self._arrows = ErrorArrows(window)
         self._notices = gui.add_html("")
@@ -51,7 +51,7 @@ class ProofPage:
         if folder is None or not exists(folder / "result.json"):
             self._table.content = words.paragraph("There is no result yet: calibrate first.")
             self._notices.content, self._shown, self._figures = "", (), {}
-            self._picture.visible = self._files.visible = self._place.visible = False
+            self._picture.visible = self._files.visible = self._drawn.place.visible = False
             return
         stat = (folder / "result.json").stat()
         shown = (folder, stat.st_mtime_ns, stat.st_size, project.settings.data, project.settings.dark)
@@ -67,7 +67,7 @@ class ProofPage:
         self._table.content, self._notices.content = shown_figures, told
         self._figures = _report_figures(folder / "report.html")
         self._files.visible = True
-        self._picture.visible = self._place.visible = bool(self._figures)
+        self._picture.visible = self._drawn.place.visible = bool(self._figures)
         if self._figures:
             first = self._picture.value if self._picture.value in self._figures else next(iter(self._figures))
             offer(self._picture, self._figures, first, None)
@@ -86,22 +86,9 @@ class ProofPage:
         return found
 
     def _draw(self) -> None:
-        import plotly.graph_objects as go
-
-        from truearm.reporting.drawing import DARK
-
         drawn = self._figures.get(self._picture.value)
-        if drawn is None:
-            return
-        if self._window.project.settings.dark:
-            drawn = _recoloured(drawn, DARK)
-        layout = {name: value for name, value in drawn["layout"].items() if name not in ("width", "height")}
-        figure = go.Figure(data=drawn["data"], layout=layout, skip_invalid=True)
-        if self._plot is None:
-            with self._place:
-                self._plot = self._window.gui.add_plotly(figure, aspect=1.2)
-        else:
-            self._plot.figure = figure
+        if drawn is not None:
+            self._drawn.show(drawn)
 
     def _download(self) -> None:
         folder = self._window.project.file("result")
@@ -150,12 +137,3 @@ def _report_figures(path: Path) -> dict[str, Any]:
     except (json.JSONDecodeError, RecursionError):
         return {}
     return figures if isinstance(figures, dict) else {}
-
-
-def _recoloured(value: Any, colours: dict[str, str]) -> Any:
-    """Return a picture with other colours, as the report draws it on a dark page."""
-    if isinstance(value, dict):
-        return {name: _recoloured(part, colours) for name, part in value.items()}
-    if isinstance(value, list):
-        return [_recoloured(part, colours) for part in value]
-    return colours.get(value, value) if isinstance(value, str) else value

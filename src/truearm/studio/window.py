@@ -246,7 +246,7 @@ class Window:
         self._stopped.set()
         if self._work is not None:
             self._work.cancel()
-        self.server.stop()  # type: ignore[no-untyped-call]
+        self.server.stop()
 
     # The frame ---------------------------------------------------------------------------------------------------
 

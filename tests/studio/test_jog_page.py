@@ -239,6 +239,7 @@ def test_nominal_and_calibrated_stand_where_the_instrument_saw_the_robot(studio:
     (folder / "calibrated.yaml").write_text(robot_text(found))
     studio.window.refresh()
     assert page.scene.ghost is not None
+    assert np.linalg.norm(studio.window.server.initial_camera.look_at - np.array([1.0, 2.0, 0.5])) < 0.3
     assert page._arm.options == ("nominal", "calibrated")
     q = np.deg2rad([10.0, 20.0, 0.0, 0.0, 30.0, 0.0])
     for slider, value in zip(page._sliders, np.rad2deg(q), strict=True):

@@ -157,7 +157,6 @@ def test_from_an_empty_folder_to_a_corrected_program_by_clicking(
     jog.scene.show_arrows("errors", None)
 
     person.turn_to("Plan")
-    person.page.get_by_label("Candidates").fill("60")
     person.press("Plan")
     person.wait_for("Written: plan.csv, plan.html")
     person.picture("plan")

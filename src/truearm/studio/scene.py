@@ -110,6 +110,7 @@ class Scene:
         self._tip: Any = None
         self._parts: dict[str, list[Any]] = {}
         self._dark = False
+        self._looked: Array | None = None
 
     @property
     def length(self) -> float:
@@ -273,8 +274,18 @@ class Scene:
         # The arm stands a little right of the middle and above it: notices float over the corner below on the left.
         look = np.array(base.translation) + base.rotation @ (self.length * np.array([0.02, -0.05, 0.08]))
         look += base.rotation @ np.array([0.0, 0.0, 0.6 * self.solid.floor])
-        self._server.initial_camera.look_at = look
-        self._server.initial_camera.position = look + base.rotation @ (self.length * np.array([0.85, -1.15, 0.6]))
+        self._look_at(look, look + base.rotation @ (self.length * np.array([0.85, -1.15, 0.6])))
+
+    def _look_at(self, look: Array, place: Array) -> None:
+        """Say from where windows look at first; those that are open follow the robot to another place."""
+        start = self._server.initial_camera
+        start.look_at, start.position = look, place
+        if self._looked is not None and not np.allclose(self._looked, [look, place]):
+            for client in self._server.get_clients().values():
+                with client.atomic():
+                    client.camera.position = place
+                    client.camera.look_at = look
+        self._looked = np.array([look, place])
 
     def _fixture(self, robot: Robot, fixture: Fixture, name: str) -> list[Any]:
         kinematics = robot.fixture_kinematics(fixture.name)

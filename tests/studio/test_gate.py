@@ -509,3 +509,10 @@ def test_many_windows_at_once_are_served(serving: Serving) -> None:
     for thread in threads:
         thread.join()
     assert len(seen) == 8
+
+
+def test_every_list_offers_texts_that_are_not_empty_as_others_would_stop_the_page(serving: Serving) -> None:
+    handles = serving().window.gui._gui_input_handle_from_uuid.values()
+    lists = [handle.options for handle in handles if hasattr(handle, "options")]
+    assert len(lists) > 8
+    assert all(isinstance(option, str) and option for options in lists for option in options)

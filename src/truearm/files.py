@@ -49,6 +49,30 @@ def noted_reads() -> Iterator[dict[Path, list[str]]]:
         _NOTED.reset(token)
 
 
+#: Folders in which files may be read; None for everywhere.
+_CONFINED: Final[ContextVar[tuple[Path, ...] | None]] = ContextVar("confined", default=None)
+
+
+@contextmanager
+def confined_reads(folder: Path) -> Iterator[None]:
+    """Let files be read in one folder and in this package alone, whatever other files name and wherever links lead."""
+    token = _CONFINED.set((folder.resolve(), Path(__file__).parent.resolve()))
+    try:
+        yield
+    finally:
+        _CONFINED.reset(token)
+
+
+def _refuse_outside(path: Path) -> None:
+    confined = _CONFINED.get()
+    if confined is not None and not any(path.resolve().is_relative_to(folder) for folder in confined):
+        raise InputError(
+            "this file is not in the project's folder, and is not read",
+            where=str(path),
+            cure="Copy it into the folder, and name it there.",
+        )
+
+
 def read_bytes(path: Path, most: str = "file_size") -> bytes:
     """Return the content of a file, or refuse with the reason it cannot be read.
 
@@ -58,6 +82,7 @@ def read_bytes(path: Path, most: str = "file_size") -> bytes:
         Name of the limit of its size, see :mod:`truearm.limits`.
     """
     try:
+        _refuse_outside(path)
         state = path.stat()
         if stat.S_ISDIR(state.st_mode):
             raise InputError("this is a folder, a file is needed", where=str(path))

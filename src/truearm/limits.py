@@ -96,6 +96,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "bootstrap": Limit(10_000, "the number is out of range", "fits"),
     "robots": Limit(1_000_000, "there are too many robots", "robots"),
     "workers": Limit(1000, "the number is out of range", "workers"),
+    "upload": Limit(50_000_000, "the file is too large to be taken in", "bytes", "Copy it into the folder yourself."),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
 }
 

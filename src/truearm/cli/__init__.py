@@ -36,6 +36,7 @@ from truearm.cli.poses import poses
 from truearm.cli.simulate import simulate
 from truearm.cli.sphere import sphere
 from truearm.cli.starting import demo, example, new_robot
+from truearm.cli.studio import studio
 from truearm.cli.study import HELP, study
 from truearm.cli.tilting import tilting
 from truearm.cli.tolerance import tolerance
@@ -103,6 +104,7 @@ app.command(help=HELP)(study)
 app.command()(fleet)
 app.command()(example)
 app.command()(demo)
+app.command()(studio)
 
 
 def main() -> None:

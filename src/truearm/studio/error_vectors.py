@@ -1,0 +1,89 @@
+"""The errors that a result's figures are made of, as vectors: where they were read, before and after."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.files import confined_reads
+from truearm.modeling.chain import Array
+from truearm.studio.tasks import Progress
+
+#: Figures of the result and of these vectors are the same within [mm].
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorVectors:
+    """Errors of positions on the configurations that the fit has not seen; of all, if it has seen all.
+
+    Attributes
+    ----------
+    points
+        Where the instrument saw the targets, in its frame [m], ``(readings, 3)``.
+    before, after
+        Predicted minus measured of the nominal robot, placed as well as it can be, and of the calibrated one [m],
+        ``(readings, 3)``; NaN where nothing was read.
+    held_out
+        Whether the fit has not seen them.
+    """
+
+    points: Array
+    before: Array
+    after: Array
+    held_out: bool
+
+    def between(self, share: float) -> Array:
+        """Return the errors on the way from before, 0, to after, 1."""
+        return (1.0 - share) * self.before + share * self.after
+
+
+def error_vectors(folder: Path, robot: str, data: str, result: str, progress: Progress, **options: Any) -> ErrorVectors:
+    """Return the errors of a result in the project.
+
+    Parameters
+    ----------
+    result
+        Folder of the result.
+    options
+        Of :func:`truearm.calibrate`, those that say what it trains on and what the robot carries.
+
+    Raises
+    ------
+    InputError
+        If the result is of other measurements, or they were split otherwise.
+    """
+    from truearm.jobs.calibrate import calibrate
+    from truearm.library import load_robot
+    from truearm.measurement.statistics import errors_of
+
+    os.chdir(folder)
+    with confined_reads(folder):
+        progress("placing the nominal robot")
+        given = {name: value for name, value in options.items() if value is not None}
+        placed = calibrate(robot, data, model="frames", **given)
+        seen = placed.held_out if len(placed.held_out) else placed.training
+        part = placed.data.of_configurations(seen)
+        after = errors_of(load_robot(Path(result) / "calibrated.yaml"), part)
+        figures = json.loads((Path(result) / "result.json").read_text(encoding="utf-8"))
+    said = figures["validation" if len(placed.held_out) else "train"]
+    rms = None if said is None else (said.get("position_mm") or {}).get("rms")
+    found = after.position
+    if found is None:
+        raise InputError("no positions were read, so there are no errors of them to draw", where=data)
+    if rms is None or abs(rms - found.rms * 1e3) > _SAME:
+        raise InputError(
+            "the result is of other measurements than those that are chosen, or they were split otherwise",
+            where=result,
+            cure="Calibrate again, and draw the errors then.",
+        )
+    before = placed.nominal.position_errors
+    if before.shape != after.position_errors.shape:
+        before = np.full(after.position_errors.shape, np.nan)
+    return ErrorVectors(part.position, before, after.position_errors, bool(len(placed.held_out)))

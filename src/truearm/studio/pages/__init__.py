@@ -1,0 +1,17 @@
+"""The pages of the window, in the order of the work."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from truearm.studio.page import Page
+from truearm.studio.pages.calibrate import CalibratePage
+from truearm.studio.pages.cell import CellPage
+from truearm.studio.pages.check import CheckPage
+from truearm.studio.pages.jog import JogPage
+from truearm.studio.pages.plan import PlanPage
+from truearm.studio.pages.programs import ProgramsPage
+from truearm.studio.pages.proof import ProofPage
+
+#: One tab each.
+PAGES: Final[tuple[type[Page], ...]] = (CellPage, JogPage, PlanPage, CheckPage, CalibratePage, ProofPage, ProgramsPage)

@@ -1,0 +1,83 @@
+"""From measurements to a calibrated robot."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Final
+
+from truearm.errors import InputError
+from truearm.identification.choosing.choice import AUTO
+from truearm.identification.solving.losses import LOSSES
+from truearm.identification.solving.models import FRAMES, MODELS
+from truearm.studio import words
+from truearm.studio.pages.check import data_of
+from truearm.studio.pages.choices import NONE, chosen, offer
+from truearm.studio.tasks import Outcome, calibrate
+from truearm.studio.window import Window
+
+_MODELS: Final = (*(model.name for model in MODELS), AUTO, FRAMES.name)
+
+
+class CalibratePage:
+    """Chooses the model and runs :func:`truearm.calibrate`; the result stands in the project as the command's does."""
+
+    title: ClassVar[str] = "Calibrate"
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        gui, settings = window.gui, window.project.settings
+        self._data = gui.add_dropdown("Measurements", (NONE,))
+        self._model = gui.add_dropdown("Model", _MODELS, initial_value=AUTO)
+        self._train: Any = gui.add_text("Train on", "", hint="configurations, or all; empty for 70 %")
+        self._seed: Any = gui.add_text("Seed", str(settings.seed), hint="of the split, a whole number from 0 on")
+        self._loss = gui.add_dropdown("Loss", tuple(LOSSES))
+        self._run = gui.add_button("Calibrate")
+        self._said = gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))
+        self._data.on_update(window.action(lambda: window.edit(data=chosen(self._data))))
+        self._model.on_update(window.action(lambda: window.edit(model=self._model.value)))
+        self._train.on_update(window.settled(lambda: window.edit(train=_train(self._train.value))))
+        self._seed.on_update(window.settled(lambda: window.edit(seed=_whole(self._seed.value, "seed"))))
+        self._loss.on_update(window.action(lambda: window.edit(loss=self._loss.value)))
+        self._run.on_click(window.action(self._calibrate))
+
+    def refresh(self) -> None:
+        """Show the settings."""
+        settings = self._window.project.settings
+        offer(self._data, self._window.project.names(".csv"), settings.data)
+        offer(self._model, _MODELS, settings.model, None)
+        offer(self._loss, LOSSES, settings.loss, None)
+        self._train.value = "" if settings.train is None else str(settings.train)
+        self._seed.value = str(settings.seed)
+
+    def _calibrate(self) -> None:
+        window, settings = self._window, self._window.project.settings
+        window.start(
+            "Calibrate",
+            calibrate,
+            self._done,
+            folder=window.project.folder,
+            robot=settings.robot,
+            data=data_of(window),
+            out=settings.result,
+            model=settings.model,
+            train=settings.train,
+            seed=settings.seed or None,
+            loss=None if settings.loss == "linear" else settings.loss,
+            payload=settings.payload,
+        )
+
+    def _done(self, outcome: Outcome) -> None:
+        written = f"Written to {self._window.project.settings.result}: {', '.join(outcome.files)}"
+        self._said.content = words.lines([*outcome.lines, written])
+
+
+def _train(text: str) -> int | str | None:
+    """Return what a text says of the training part: a number, all, or nothing."""
+    text = text.strip()
+    return text or None if not text or text == "all" else _whole(text, "train")
+
+
+def _whole(text: str, parameter: str) -> int:
+    try:
+        return int(text)
+    except ValueError as error:
+        raise InputError("a whole number belongs here", parameter=parameter, came=text) from error

@@ -1,0 +1,56 @@
+"""The robot, what it carries, and the files of the project."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from truearm.errors import InputError
+from truearm.jobs.show import show
+from truearm.library import library
+from truearm.studio import words
+from truearm.studio.pages.choices import offer
+from truearm.studio.window import Window
+
+
+class CellPage:
+    """Chooses the robot of the library or of a file, says what is known of it, and takes files into the project."""
+
+    title: ClassVar[str] = "Cell"
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        gui = window.gui
+        self._robot = gui.add_dropdown("Robot", (window.project.settings.robot,))
+        self._payload: Any = gui.add_text(
+            "Payload", "", hint="mass and place of its centre, such as 2.7kg,50mm,25mm,100mm"
+        )
+        self._upload = gui.add_upload_button("Take a file into the project", hint="a robot, measurements, a program")
+        with gui.add_folder("Files of the project"):
+            self._files = gui.add_html("")
+        with gui.add_folder("What is known of the robot", expand_by_default=False):
+            self._about = gui.add_html("")
+        self._robot.on_update(window.action(lambda: window.edit(robot=self._robot.value)))
+        self._payload.on_update(window.settled(self._weigh))
+        self._upload.on_upload(window.action(self._take_in))
+
+    def refresh(self) -> None:
+        """Show the robot of the settings, and the files of the folder."""
+        window, settings = self._window, self._window.project.settings
+        files = window.project.names(".yaml", ".yml", ".urdf", ".xacro", ".xml")
+        offer(self._robot, [*library(), *files], settings.robot, None)
+        self._payload.value = settings.payload or ""
+        names = window.project.names()
+        self._files.content = words.lines(names) if names else words.paragraph("None yet: take one in.")
+        try:
+            self._about.content = words.lines(show(window.robot()).lines())
+        except InputError as error:
+            self._about.content = words.paragraph(words.refusal(error))
+
+    def _weigh(self) -> None:
+        self._window.edit(payload=self._payload.value.strip() or None)
+
+    def _take_in(self) -> None:
+        file = self._upload.value
+        name = self._window.project.take_in(file.name, file.content)
+        self._window.tell_lines(f"Taken into the project: {name}", [f"{len(file.content)} bytes"])
+        self._window.refresh()

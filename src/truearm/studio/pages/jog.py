@@ -1,0 +1,324 @@
+"""Jogging: joints, poses, a handle in the scene, branches; configurations recorded and played."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any, ClassVar, Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.files import exists
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+from truearm.notices import Notice
+from truearm.studio import words
+from truearm.studio.jogging import JOG_FRAMES, Branch, JogFrame, Jogging
+from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
+from truearm.studio.scene import Scene
+from truearm.studio.window import Window
+from truearm.writing import write_text
+
+#: What the flange is called among the targets, and the branch that is taken if none is chosen.
+_FLANGE: Final = "flange"
+_NEAREST: Final = "nearest"
+#: Who counts the joints, as the commands say it.
+_WHOSE: Final = ("controller", "model")
+#: Of a motion that is played, a picture so often [s].
+_PICTURE: Final = 0.04
+_SAFE: Final = "This moves a drawing. No real robot is connected to this window, and none moves."
+
+
+class JogPage:
+    """Moves the drawn arm."""
+
+    title: ClassVar[str] = "Jog"
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        self.scene = Scene(window.server)
+        self.jogging: Jogging | None = None
+        self._arms: dict[str, Robot] = {}
+        self._branches: list[Branch] = []
+        self._latest: dict[str, int] = {}
+        self._playing: threading.Event | None = None
+        gui = window.gui
+        gui.add_html(words.notice(_no_robot()))
+        self._arm: Any = gui.add_dropdown(
+            "Arm", ("nominal",), hint="whose parameters and joint effects poses are found with"
+        )
+        self._ghost = gui.add_checkbox("Calibrated arm as a shadow", True)
+        self._whose: Any = gui.add_dropdown(
+            "Numbers of", _WHOSE, initial_value="model", hint="as the pendant shows joints, or the model's"
+        )
+        self._joints = gui.add_folder("Joints")
+        self._sliders: list[Any] = []
+        self._said = gui.add_html("")
+        with gui.add_folder("Pose"):
+            self._tip: Any = gui.add_dropdown("Tip", (_FLANGE,))
+            self._frame: Any = gui.add_dropdown(
+                "Axes of", JOG_FRAMES, initial_value="base", hint="tool: by how much to move from here"
+            )
+            self._place: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.1)
+            self._turns: Any = gui.add_vector3(
+                "rx, ry, rz [deg]",
+                (0.0, 0.0, 0.0),
+                step=0.1,
+                hint="about the fixed axes x, y and z, one after the other",
+            )
+            self._go = gui.add_button("Go to this pose")
+            self._handle_on = gui.add_checkbox("Handle to drag in the scene", True)
+            self._find = gui.add_button("Find all branches")
+            self._branch: Any = gui.add_dropdown("Branch", (_NEAREST,))
+        with gui.add_folder("Recorded configurations"):
+            self._list = gui.add_text("File", "recorded.csv")
+            self._record = gui.add_button_group("Pose", ("record", "remove last"))
+            self._recorded = gui.add_html("")
+            self._speed = gui.add_number("Speed [deg/s, mm/s]", 45.0, min=0.1, max=1000.0, step=1.0)
+            self._play = gui.add_button_group("Motion", ("play", "stop"))
+        self._handle: Any = None
+        self._callbacks()
+
+    # What the window asks for ------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Show the robots as they are now."""
+        window = self._window
+        nominal, calibrated = window.robot(), window.calibrated()
+        same_arm = calibrated is None or len(calibrated.joints) == len(nominal.joints)
+        ghost = calibrated if same_arm else None
+        if self.scene.show(nominal, ghost, dark=window.project.settings.dark) or self.jogging is None:
+            assert self.scene.solid is not None
+            self._stop()
+            self._arms = {"nominal": self.scene.solid.robot}
+            if ghost is not None:
+                self._arms["calibrated"] = ghost
+            self._arm.options = tuple(self._arms)
+            self._ghost.disabled = ghost is None
+            self._take("calibrated" if self._arm.value == "calibrated" and ghost is not None else "nominal")
+        self._show_recorded()
+
+    # Elements ----------------------------------------------------------------------------------------------------
+
+    def _callbacks(self) -> None:
+        window = self._window
+        self._arm.on_update(window.action(lambda: self._take(self._arm.value)))
+        self._ghost.on_update(window.action(lambda: self.scene.show_ghost(self._ghost.value)))
+        self._whose.on_update(window.action(self._count_otherwise))
+        self._tip.on_update(window.action(self._other_tip))
+        self._frame.on_update(window.action(self._shown))
+        self._go.on_click(window.action(self._go_to_numbers))
+        self._handle_on.on_update(window.action(self._show_handle))
+        self._find.on_click(window.action(self._find_branches))
+        self._branch.on_update(window.action(self._take_branch))
+        self._list.on_update(window.action(self._show_recorded))
+        self._record.on_click(window.action(lambda: self._recording(self._record.value)))
+        self._play.on_click(window.action(lambda: self._start() if self._play.value == "play" else self._stop()))
+
+    def _newest(self, name: str, do: Callable[[], None]) -> Callable[[Any], None]:
+        """Return a callback of an element that is dragged: of events that wait for each other the last is done."""
+        act = self._window.action(do)
+
+        def called(event: Any) -> None:
+            if getattr(event, "client", None) is None:
+                return
+            number = self._latest[name] = self._latest.get(name, 0) + 1
+            with self._window.lock:
+                if self._latest[name] == number:
+                    act(event)
+
+        return called
+
+    def _take(self, name: str) -> None:
+        """Jog one of the arms, from where the other was."""
+        before = self.jogging
+        self.jogging = arm = Jogging(self._arms[name], None if before is None else before.joints)
+        known = arm.robot.controller.counts_known
+        self._whose.disabled = not known
+        if before is not None and known and len(before.joints) == len(arm.joints):
+            arm.whose = before.whose
+        self._arm.value, self._whose.value = name, arm.whose
+        tips = (_FLANGE, *(target.name for target in arm.robot.targets))
+        self._tip.options = tips
+        if before is not None and before.tip in tips:
+            arm.tip = before.tip
+        self._tip.value = arm.tip or _FLANGE
+        for slider in self._sliders:
+            slider.remove()
+        self._sliders = []
+        with self._joints:
+            for k, (joint, unit) in enumerate(zip(arm.robot.joints, arm.units, strict=True)):
+                low, high = arm.ranges()[k]
+                slider = self._window.gui.add_slider(f"{joint.name} [{unit}]", low, max(high, low + 0.01), 0.01, low)
+                slider.on_update(self._newest(f"joint {k}", partial(self._slid, k)))
+                self._sliders.append(slider)
+        if self._handle is not None:
+            self._handle.remove()
+        self._handle = self._window.server.scene.add_transform_controls(
+            "/handle", scale=0.22 * self.scene.length, line_width=3.0, depth_test=False, visible=self._handle_on.value
+        )
+        self._handle.on_update(self._newest("handle", self._dragged))
+        self._moved()
+
+    def _slid(self, joint: int) -> None:
+        arm = self._jogged()
+        arm.set_number(joint, float(self._sliders[joint].value))
+        self._moved()
+
+    def _dragged(self) -> None:
+        arm = self._jogged()
+        try:
+            arm.drag_to(np.array(self._handle.position), rotation_from_quaternion(np.array(self._handle.wxyz)))
+        except InputError as error:
+            self._said.content = words.paragraph(words.refusal(error))
+            return
+        self._moved(handle=False)
+
+    def _go_to_numbers(self) -> None:
+        frame: JogFrame = self._frame.value
+        self._jogged().go_to_numbers(frame, self._place.value, self._turns.value)
+        self._moved()
+
+    def _find_branches(self) -> None:
+        self._branches = self._jogged().branches()
+        names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
+        self._branch.options = (_NEAREST, *names)
+
+    def _take_branch(self) -> None:
+        names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
+        if self._branch.value in names:
+            branch = self._branches[names.index(self._branch.value)]
+            if not branch.status.usable:
+                raise InputError("the arm cannot go there", came=branch.name, cure=branch.status.advice)
+            self._jogged().go(branch.joints)
+            self._moved(branches=False)
+
+    def _other_tip(self) -> None:
+        self._jogged().tip = None if self._tip.value == _FLANGE else self._tip.value
+        self._moved()
+
+    def _count_otherwise(self) -> None:
+        self._jogged().whose = self._whose.value
+        self._shown()
+        self._show_recorded()
+
+    # What follows from where the arm is --------------------------------------------------------------------------
+
+    def _jogged(self) -> Jogging:
+        self._stop()
+        if self.jogging is None:
+            raise InputError("there is no robot to move", cure="Choose one on the page Cell.")
+        return self.jogging
+
+    def _moved(self, *, handle: bool = True, branches: bool = True) -> None:
+        """Draw the arm where it is, and everything that follows."""
+        arm = self.jogging
+        assert arm is not None
+        self.scene.move(arm.at, arm.robot)
+        if branches and self._branches:
+            self._branches = []
+            self._branch.options, self._branch.value = (_NEAREST,), _NEAREST
+        self._shown(handle=handle)
+
+    def _shown(self, *, handle: bool = True) -> None:
+        arm = self.jogging
+        if arm is None:
+            return
+        position, rotation = arm.pose("world")
+        with self._window.server.atomic():
+            self.scene.show_tip(position, rotation)
+            if handle and self._handle is not None:
+                self._handle.position, self._handle.wxyz = position, quaternion_from_rotation(rotation)
+            for slider, number, (low, high) in zip(self._sliders, arm.numbers, arm.ranges(), strict=True):
+                high = max(high, low + 0.01)
+                if slider.min != low or slider.max != high:
+                    slider.min, slider.max = min(low, slider.value), max(high, slider.value)
+                    slider.value = min(max(number, low), high)
+                    slider.min, slider.max = low, high
+                elif slider.value != number:
+                    slider.value = min(max(number, low), high)
+            self._place.value, self._turns.value = arm.pose_numbers(self._frame.value)
+            self._said.content = "".join(words.paragraph(text) for text in arm.words())
+
+    def _show_handle(self) -> None:
+        self._handle.visible = self._handle_on.value
+        self._shown()
+
+    # Recorded configurations -------------------------------------------------------------------------------------
+
+    def _file(self) -> Any:
+        name = self._list.value.strip()
+        if not name.lower().endswith(".csv"):
+            raise InputError(
+                "a table of configurations belongs here", parameter="File", came=name, allowed="a CSV file"
+            )
+        return self._window.project.path(name, "File")
+
+    def _read(self) -> Recorded | None:
+        arm, file = self.jogging, self._file()
+        if arm is None or not exists(file):
+            return None
+        return read_recorded(file, arm.robot)
+
+    def _recording(self, what: str) -> None:
+        arm, file = self._jogged(), self._file()
+        known = self._read() or Recorded((), np.zeros((0, len(arm.joints))), arm.whose)
+        if exists(file) and file.read_text(encoding="utf-8") != known.text(arm.robot):
+            raise InputError(
+                "this file was not recorded here, and is not changed", where=file.name, cure="Record into another one."
+            )
+        if what == "record":
+            known = known.with_one(arm.joints)
+        elif len(known.labels) > 1:
+            known = known.without_last()
+        else:
+            raise InputError("the only configuration of a file is not removed", where=file.name)
+        write_text(file, known.text(arm.robot))
+        self._window.project.look()
+        self._show_recorded()
+
+    def _show_recorded(self) -> None:
+        try:
+            known = self._read()
+        except InputError as error:
+            self._recorded.content = words.paragraph(words.refusal(error))
+            return
+        text = "Nothing recorded yet." if known is None else f"Recorded: {labels_text(known.labels)}"
+        self._recorded.content = words.paragraph(text)
+
+    def _start(self) -> None:
+        """Play the configurations of the file, from where the arm is."""
+        arm, known = self._jogged(), self._read()
+        if known is None:
+            raise InputError("there is nothing to play", parameter="File", came=self._list.value, cure="Record a pose.")
+        for joints in known.joints:
+            Jogging(arm.robot).go(joints)
+        motion = Motion.through(np.concatenate([arm.joints[None], known.joints]), float(self._speed.value), arm.robot)
+        self._playing = over = threading.Event()
+        threading.Thread(target=self._run, args=(motion, over), daemon=True).start()
+
+    def _run(self, motion: Motion, over: threading.Event) -> None:
+        began = time.monotonic()
+        while True:
+            passed = time.monotonic() - began
+            with self._window.lock:
+                if over.is_set() or self._window.stopped or self.jogging is None:
+                    return
+                self.jogging.go(motion.at(passed))
+                self._moved()
+                if passed >= motion.duration:
+                    over.set()
+                    return
+            over.wait(_PICTURE)
+
+    def _stop(self) -> None:
+        if self._playing is not None:
+            self._playing.set()
+            self._playing = None
+
+
+def _no_robot() -> Notice:
+    return Notice("no-real-robot", _SAFE, "note")

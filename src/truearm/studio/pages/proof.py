@@ -1,0 +1,139 @@
+"""What the calibration is worth, on configurations that the fit has not seen."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+from truearm.errors import InputError
+from truearm.files import exists, read_text
+from truearm.notices import Notice
+from truearm.results.calibration import RESULT_FILES
+from truearm.studio import words
+from truearm.studio.pages.choices import NONE, offer
+from truearm.studio.pages.error_arrows import ErrorArrows
+from truearm.studio.pictures import Picture
+from truearm.studio.window import Window
+
+#: Where the report has the data of its pictures.
+_FIGURES: Final = re.compile(r'<script type="application/json" id="figures">(.*?)</script>', re.S)
+_PARTS: Final = (("nominal", "before"), ("validation", "after, held out"), ("train", "after, training"))
+_KINDS: Final = (("position_mm", "mm"), ("length_mm", "mm"), ("orientation_mrad", "mrad"))
+
+
+class ProofPage:
+    """Shows what stands in the folder of results, whoever wrote it: figures, notices and the report's pictures."""
+
+    title: ClassVar[str] = "Proof"
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        gui = window.gui
+        self._figures: dict[str, Any] = {}
+        self._shown: tuple[Any, ...] = ()
+        self._table = gui.add_html("")
+        self._picture = gui.add_dropdown("Picture", (NONE,), visible=False)
+        self._drawn = Picture(window, "Picture")
+        self._files = gui.add_button_group("Download", RESULT_FILES[:3], visible=False)
+        self._arrows = ErrorArrows(window)
+        self._notices = gui.add_html("")
+        self._picture.on_update(window.action(self._draw))
+        self._files.on_click(window.action(self._download))
+
+    def refresh(self) -> None:
+        """Show the result that stands in the folder."""
+        project = self._window.project
+        self._arrows.refresh()
+        folder = project.file("result")
+        if folder is None or not exists(folder / "result.json"):
+            self._table.content = words.paragraph("There is no result yet: calibrate first.")
+            self._notices.content, self._shown, self._figures = "", (), {}
+            self._picture.visible = self._files.visible = self._drawn.place.visible = False
+            return
+        stat = (folder / "result.json").stat()
+        shown = (folder, stat.st_mtime_ns, stat.st_size, project.settings.data, project.settings.dark)
+        if shown == self._shown:
+            return
+        result = _read_result(folder / "result.json")
+        try:
+            shown_figures = words.lines([f"Status: {result['status']}"]) + figures_table(result)
+            told = words.notices(self._told(result))
+            told += words.lines(f"Next: {step['message']}" for step in result.get("next", ()))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise _no_result(folder / "result.json") from error
+        self._table.content, self._notices.content = shown_figures, told
+        self._figures = _report_figures(folder / "report.html")
+        self._files.visible = True
+        self._picture.visible = self._drawn.place.visible = bool(self._figures)
+        if self._figures:
+            first = self._picture.value if self._picture.value in self._figures else next(iter(self._figures))
+            offer(self._picture, self._figures, first, None)
+            self._draw()
+        self._shown = shown
+
+    def _told(self, result: dict[str, Any]) -> list[Notice]:
+        """Return the notices of the result, and one if it is of other data than those that are chosen."""
+        found = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
+        data = self._window.project.file("data")
+        if data is not None and exists(data):
+            digest = hashlib.sha256(data.read_bytes()).hexdigest()[:12]
+            if f"sha256 {digest}" not in str(result.get("history", "")):
+                text = f"This result is of other measurements than {self._window.project.settings.data} as it is now."
+                found.append(Notice("other-measurements", text, "warning"))
+        return found
+
+    def _draw(self) -> None:
+        drawn = self._figures.get(self._picture.value)
+        if drawn is not None:
+            self._drawn.show(drawn)
+
+    def _download(self) -> None:
+        folder = self._window.project.file("result")
+        if folder is not None:
+            self._window.download(folder / self._files.value)
+
+
+def figures_table(result: dict[str, Any]) -> str:
+    """Return the errors of a result as a table of each kind, with as many digits as the command prints."""
+    shown = ""
+    for kind, unit in _KINDS:
+        rows = []
+        for part, name in _PARTS:
+            spread = (result.get(part) or {}).get(kind)
+            if spread is not None:
+                figures = [f"{spread[what]:.3f}" for what in ("mean", "rms", "p95", "max")]
+                rows.append([f"{name} ({result[part]['configurations']})", *figures])
+        if rows:
+            heads = [f"{what} [{unit}]" for what in ("mean", "rms", "95 %", "max")]
+            shown += words.table([f"{kind.partition('_')[0]} (configurations)", *heads], rows)
+    return shown
+
+
+def _read_result(path: Path) -> dict[str, Any]:
+    """Return a file result.json, or refuse what is none."""
+    try:
+        result = json.loads(read_text(path))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise _no_result(path) from error
+    if not isinstance(result, dict) or not str(result.get("truearm")).startswith("truearm-result/"):
+        raise _no_result(path)
+    return result
+
+
+def _no_result(path: Path) -> InputError:
+    return InputError("this is no result of a calibration", where=str(path), cure="Calibrate again.")
+
+
+def _report_figures(path: Path) -> dict[str, Any]:
+    """Return the pictures of a report by their names; none if it has none."""
+    if not exists(path):
+        return {}
+    found = _FIGURES.search(read_text(path))
+    try:
+        figures = json.loads(found[1]) if found else {}
+    except (json.JSONDecodeError, RecursionError):
+        return {}
+    return figures if isinstance(figures, dict) else {}

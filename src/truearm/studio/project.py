@@ -1,0 +1,364 @@
+"""A project: a folder of plain files, and one small file that says which of them are meant."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from truearm.errors import InputError, refusals_at, refusals_of
+from truearm.files import exists, path_argument, read_bytes, read_yaml
+from truearm.limits import refuse_beyond
+from truearm.manifest import MANIFEST, hash_of
+from truearm.printable import is_one_line
+from truearm.schemas import validated
+from truearm.writing import put_back_old, writable_folder, write_files, write_text
+
+#: What makes a folder a project.
+PROJECT_FILE: Final = "truearm-studio.yaml"
+#: So many edits can be undone.
+_KEPT: Final = 100
+
+_Name = Annotated[str, Field(min_length=1)]
+
+
+class Settings(BaseModel):
+    """Schema ``truearm-studio/1``: what the studio's pages say.
+
+    Attributes
+    ----------
+    robot
+        A library id, or a file of the folder.
+    data
+        File of measurements; None for none yet.
+    payload
+        What the robot carried, as a text such as ``2.7kg,50mm,25mm,100mm``.
+    model, train, loss, seed
+        As for :func:`truearm.calibrate`.
+    result
+        Folder of the calibration's results, in the project's.
+    program
+        File of a robot program.
+    cell
+        File that says where tools and frames are; None for what the program says.
+    taught
+        As for :func:`truearm.compensate`; None if that was not said.
+    controller_kinematics
+        Likewise.
+    corrected
+        Folder of the corrected program.
+    dark
+        Whether the window is dark.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    truearm: Literal["truearm-studio/1"] = "truearm-studio/1"
+    robot: _Name = "irb120"
+    data: _Name | None = None
+    payload: _Name | None = None
+    model: _Name = "geometric"
+    train: Annotated[int, Field(strict=True, ge=1)] | Literal["all"] | None = None
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    loss: _Name = "linear"
+    result: _Name = "result"
+    program: _Name | None = None
+    cell: _Name | None = None
+    taught: tuple[_Name, ...] | None = None
+    controller_kinematics: _Name | None = None
+    corrected: _Name = "result/corrected"
+    dark: bool = False
+
+    def text(self) -> str:
+        """Return the file."""
+        from ruamel.yaml import YAML
+        from ruamel.yaml.compat import StringIO
+
+        stream, yaml = StringIO(), YAML()
+        yaml.default_flow_style = False
+        said = {name: list(value) if isinstance(value, tuple) else value for name, value in self if value is not None}
+        yaml.dump(said, stream)
+        return str(stream.getvalue())
+
+
+#: Settings that name a file of the folder, or a folder in it.
+_PATHS: Final = ("data", "result", "program", "cell", "corrected")
+
+
+@dataclass(frozen=True)
+class ChangedFile:
+    """A file of the project that another program has changed, made or removed.
+
+    Attributes
+    ----------
+    name
+        In the folder.
+    how
+        ``changed``, ``new`` or ``gone``.
+    """
+
+    name: str
+    how: Literal["changed", "new", "gone"]
+
+
+class Project:
+    """A folder with its settings, their history, and what the files were like when they were last looked at.
+
+    Not safe for several threads: the studio holds its lock around every call.
+
+    Attributes
+    ----------
+    folder
+        Its absolute path, links followed.
+    settings
+        What holds now; it is what the file says.
+    """
+
+    def __init__(self, folder: Path, settings: Settings) -> None:
+        self.folder, self.settings = folder, settings
+        self._undone: list[Settings] = []
+        self._before: list[Settings] = []
+        self._written = self._stamp_of_file()
+        self._seen = self._stamps()
+
+    def path(self, name: str, parameter: str | None = None) -> Path:
+        """Return the path of a file or folder of the project by its name.
+
+        Raises
+        ------
+        InputError
+            If the name leads out of the folder, by ``..``, as a whole path or over links.
+        """
+        parts = PurePosixPath(name.replace("\\", "/"))
+        inside = is_one_line(name.replace(" ", "x")) and not parts.is_absolute() and ".." not in parts.parts
+        path = self.folder / parts
+        try:
+            inside = inside and ":" not in name[:2] and path.resolve().is_relative_to(self.folder)
+        except (OSError, RuntimeError, ValueError):
+            inside = False
+        if not inside:
+            raise InputError(
+                "this is no place in the project's folder",
+                parameter=parameter,
+                came=name,
+                allowed="the name of a file in the folder, also one below it",
+            )
+        return path
+
+    def relative(self, path: Path) -> str:
+        """Return the name of a path in the project."""
+        return path.relative_to(self.folder).as_posix()
+
+    def robot_source(self) -> str | Path:
+        """Return the robot's library id, or the path of its file in the folder."""
+        from truearm.library import library
+
+        name = self.settings.robot
+        return name if name in library() else self.path(name, "robot")
+
+    def file(self, setting: str) -> Path | None:
+        """Return the path that a setting names; None if it names none."""
+        name = getattr(self.settings, setting)
+        return None if name is None else self.path(name, setting)
+
+    def edit(self, **changes: Any) -> bool:
+        """Change settings and write the file; return whether anything changed.
+
+        Raises
+        ------
+        InputError
+            For a value that cannot be, or if another program has changed the file: it is not overwritten.
+        """
+        content = {**self.settings.model_dump(mode="json"), **changes}
+        new = validated(content, Settings, PROJECT_FILE)
+        _check_paths(self, new)
+        if new == self.settings:
+            return False
+        self._write(new)
+        self._before = [*self._before, self.settings][-_KEPT:]
+        self._undone.clear()
+        self.settings = new
+        return True
+
+    @property
+    def undoable(self) -> bool:
+        """Whether there is an edit to undo."""
+        return bool(self._before)
+
+    @property
+    def redoable(self) -> bool:
+        """Whether an undone edit can be done again."""
+        return bool(self._undone)
+
+    def undo(self) -> None:
+        """Take back the last edit of the settings; nothing if there is none."""
+        if self._before:
+            self._write(self._before[-1])
+            self._undone.append(self.settings)
+            self.settings = self._before.pop()
+
+    def redo(self) -> None:
+        """Do an undone edit again; nothing if there is none."""
+        if self._undone:
+            self._write(self._undone[-1])
+            self._before.append(self.settings)
+            self.settings = self._undone.pop()
+
+    def reload(self) -> None:
+        """Take the settings from the file as it is now; edits before are no longer undone."""
+        settings = read_yaml(self.folder / PROJECT_FILE, Settings)
+        with refusals_at(str(self.folder / PROJECT_FILE)):
+            _check_paths(self, settings)
+        self.settings, self._before, self._undone = settings, [], []
+        self._written = self._stamp_of_file()
+        self.look()
+
+    def look(self, *names: str) -> None:
+        """Take note of files as they are now, those of some names and in folders of these; without names, of all.
+
+        The studio itself has written them.
+        """
+        now = self._stamps()
+
+        def meant(name: str) -> bool:
+            return any(name == one or name.startswith(f"{one}/") for one in names)
+
+        if names:
+            stay = {name: stamp for name, stamp in self._seen.items() if not meant(name)}
+            now = stay | {name: stamp for name, stamp in now.items() if meant(name)}
+        self._seen = now
+
+    def changes(self) -> tuple[ChangedFile, ...]:
+        """Return which files other programs have changed since the last look."""
+        now, seen = self._stamps(), self._seen
+        found = [ChangedFile(name, "new") for name in now if name not in seen]
+        found += [ChangedFile(name, "gone") for name in seen if name not in now]
+        found += [ChangedFile(name, "changed") for name, stamp in now.items() if name in seen and seen[name] != stamp]
+        return tuple(sorted(found, key=lambda one: one.name))
+
+    def names(self, *suffixes: str) -> list[str]:
+        """Return the names of files of the project, those of some endings, three folders deep."""
+        found = [name for name in self._stamps() if not suffixes or name.lower().endswith(suffixes)]
+        return sorted(name for name in found if name != PROJECT_FILE and name.rpartition("/")[2] != MANIFEST)
+
+    def take_in(self, name: str, content: bytes) -> str:
+        """Write an uploaded file into the folder and return its name there.
+
+        Raises
+        ------
+        InputError
+            If the name has folders in it or is one that truearm writes itself, if the file is too large, or if another
+            file of that name stands there.
+        """
+        plain = PurePosixPath(name.replace("\\", "/"))
+        if plain.name != name or name.startswith(".") or name in (PROJECT_FILE, MANIFEST):
+            raise InputError("a file cannot be taken in under this name", came=name, cure="Rename it.")
+        path = self.path(name)
+        refuse_beyond("file_size", len(content), where=name)
+        if exists(path) and read_bytes(path) != content:
+            raise InputError(
+                "another file of this name stands in the project, and is not overwritten",
+                where=name,
+                cure="Rename the one or the other.",
+            )
+        write_files(path.parent, {path.name: content})
+        self.look(name)
+        return name
+
+    def _write(self, settings: Settings) -> None:
+        """Write the file, unless it is not as this project has left it."""
+        if self._stamp_of_file() != self._written:
+            raise InputError(
+                "another program has changed this file, and it is not overwritten",
+                where=PROJECT_FILE,
+                cure="Reload the project, and make the edit again.",
+            )
+        write_text(self.folder / PROJECT_FILE, settings.text())
+        self._written = self._stamp_of_file()
+        self.look(PROJECT_FILE)
+
+    def _stamp_of_file(self) -> str | None:
+        path = self.folder / PROJECT_FILE
+        return hash_of(path.read_bytes()) if path.is_file() else None
+
+    def _stamps(self) -> dict[str, tuple[int, int]]:
+        """Return size and time of the last change of every file that is no hidden one, three folders deep."""
+        found: dict[str, tuple[int, int]] = {}
+        for place, folders, files in os.walk(self.folder):
+            here = Path(place)
+            depth = len(here.relative_to(self.folder).parts)
+            folders[:] = [name for name in folders if not name.startswith(".") and depth < 2]
+            for name in files:
+                if name.startswith(".") or not is_one_line(name.replace(" ", "x")):
+                    continue
+                try:
+                    known = (here / name).stat()
+                except OSError:
+                    continue
+                found[self.relative(here / name)] = (known.st_size, known.st_mtime_ns)
+        return found
+
+
+def open_project(folder: object, first: Mapping[str, Any] | None = None) -> Project:
+    """Open a project's folder; a new one is made of an empty folder, or of one that is missing.
+
+    Parameters
+    ----------
+    first
+        Settings of a new project.
+
+    Raises
+    ------
+    InputError
+        If the folder holds other things and no project, or its file cannot be read.
+    """
+    with refusals_of("folder"):
+        path = writable_folder(path_argument(folder, "folder"))
+        is_new = refuse_no_project(path)
+        if is_new:
+            path.mkdir(parents=True, exist_ok=True)
+        path = path.resolve()
+        put_back_old(path)
+        if not exists(path / PROJECT_FILE):
+            settings = validated(dict(first or {"truearm": "truearm-studio/1"}), Settings, PROJECT_FILE)
+            write_text(path / PROJECT_FILE, settings.text())
+        settings = read_yaml(path / PROJECT_FILE, Settings)
+        project = Project(path, settings)
+        with refusals_at(str(path / PROJECT_FILE)):
+            _check_paths(project, settings)
+        return project
+
+
+def refuse_no_project(path: Path) -> bool:
+    """Refuse a folder that holds other things and is no project; return whether there is nothing there yet."""
+    if not path.is_dir():
+        return True
+    if exists(path / PROJECT_FILE):
+        return False
+    there = sorted(entry.name for entry in path.iterdir() if not entry.name.startswith("."))
+    if there:
+        raise InputError(
+            "this folder holds other things and is no project of the studio",
+            where=str(path),
+            came=there[0],
+            allowed=f"a folder with a {PROJECT_FILE}, an empty folder, or a new name",
+            cure="Name another folder, and take your files in from there.",
+        )
+    return True
+
+
+def _check_paths(project: Project, settings: Settings) -> None:
+    """Refuse settings that lead out of the folder."""
+    from truearm.library import library
+
+    for name in _PATHS:
+        value = getattr(settings, name)
+        if value is not None:
+            project.path(value, name)
+    if settings.robot not in library():
+        project.path(settings.robot, "robot")
+    if settings.controller_kinematics not in (None, "nominal", "proprietary", "unknown"):
+        project.path(str(settings.controller_kinematics), "controller_kinematics")

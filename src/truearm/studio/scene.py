@@ -1,0 +1,328 @@
+"""The scene: robots, frames, fixtures, boxes, points and arrows, drawn with viser.
+
+Everything is uploaded once. What moves is moved by the places of its links.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array
+from truearm.modeling.fixtures import Fixture
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, quaternion_from_rotation
+from truearm.studio.arrows import Arrows
+from truearm.studio.robot_shape import link_poses, robot_shape
+from truearm.studio.solids import frame_about
+
+Colour = tuple[int, int, int]
+#: One colour for all, or one each.
+Colours = NDArray[np.uint8] | Colour
+#: Links and joints of the solid robot, and of the ghost.
+_SOLID: Final[tuple[Colour, Colour]] = ((222, 225, 230), (84, 96, 114))
+_GHOST: Final[tuple[Colour, Colour]] = ((70, 130, 180), (40, 90, 140))
+_SEE_THROUGH: Final = 0.35
+_BOX: Final[Colour] = (214, 140, 60)
+_FIXTURE: Final[Colour] = (46, 139, 87)
+#: Lines of the floor on white, and on dark grey.
+_LINES: Final[dict[bool, tuple[Colour, Colour]]] = {
+    False: ((222, 226, 230), (173, 181, 189)),
+    True: ((52, 58, 64), (90, 98, 106)),
+}
+#: Of a triad and of the half of a plane that is drawn, by the length of the arm.
+_TRIAD, _PLANE = 0.12, 0.25
+_FLOOR: Final = 4.0
+
+
+class DrawnRobot:
+    """A robot whose links can be moved.
+
+    Attributes
+    ----------
+    robot
+        As it is drawn.
+    length
+        Of the arm along its links [m].
+    floor
+        Where it stands in its base frame: 0, or below where its base frame is in its shoulder [m].
+    """
+
+    def __init__(self, scene: viser.SceneApi, name: str, robot: Robot, *, ghost: bool = False) -> None:
+        self.robot = robot
+        shape = robot_shape(robot)
+        self.length, self.floor = shape.layout.length, -shape.layout.pedestal
+        self._root = scene.add_frame(name, show_axes=False)
+        self._links: list[Any] = []
+        colours, opacity = (_GHOST, _SEE_THROUGH) if ghost else (_SOLID, None)
+        for link in shape.links:
+            self._links.append(scene.add_frame(f"{name}/{link.name}", show_axes=False))
+            for part, mesh, colour in zip(("body", "joints"), (link.bodies, link.joints), colours, strict=True):
+                if len(mesh.faces):
+                    scene.add_mesh_simple(
+                        f"{name}/{link.name}/{part}",
+                        mesh.vertices,
+                        mesh.faces,
+                        color=colour,
+                        opacity=opacity,
+                        cast_shadow=not ghost,
+                        receive_shadow=not ghost,
+                    )
+
+    def move(self, at: Array | Postures) -> None:
+        """Show it at joint positions ``(1, joints)`` [rad or m], or a posture, bent as it would be."""
+        positions, quaternions = link_poses(self.robot, at)
+        for link, position, quaternion in zip(self._links, positions[0], quaternions[0], strict=True):
+            link.position, link.wxyz = position, quaternion
+
+    def show(self, visible: bool) -> None:
+        """Show or hide it."""
+        self._root.visible = visible
+
+    def remove(self) -> None:
+        """Take it away."""
+        self._root.remove()
+
+
+class Scene:
+    """What all windows of a project see.
+
+    Attributes
+    ----------
+    solid, ghost
+        The nominal and the calibrated robot, at the place of the latter; None where there is none.
+    joints
+        Joint positions of both, of the model [rad or m], ``(joints,)``.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server, self._scene = server, server.scene
+        self._scene.set_up_direction("+z")
+        self._scene.world_axes.visible = False
+        self.solid: DrawnRobot | None = None
+        self.ghost: DrawnRobot | None = None
+        self.joints: Array = np.zeros(0)
+        self._tip: Any = None
+        self._parts: dict[str, list[Any]] = {}
+        self._dark = False
+        self._looked: Array | None = None
+
+    @property
+    def length(self) -> float:
+        """Of the arm along its links [m]; 1 m without one."""
+        return 1.0 if self.solid is None else self.solid.length
+
+    def show(self, nominal: Robot | None, calibrated: Robot | None, *, dark: bool) -> bool:
+        """Draw robots; return whether they are others than before.
+
+        A calibrated robot stands where the instrument has found it. The nominal one is put there, too, so that they
+        can be compared and both stand right to what was measured.
+        """
+        if nominal is not None and calibrated is not None:
+            nominal = standing_at(nominal, calibrated)
+        before = [None if one is None else one.robot for one in (self.solid, self.ghost)]
+        other_arm = before != [nominal, calibrated]
+        if not other_arm and dark == self._dark:
+            return False
+        self._dark = dark
+        with self._server.atomic():
+            if other_arm:
+                self._draw_robots(nominal, calibrated)
+            if nominal is not None:
+                self._surroundings(nominal if calibrated is None else calibrated)
+        return other_arm
+
+    def move(self, at: Postures, of: Robot) -> None:
+        """Show the robots at joint positions.
+
+        Parameters
+        ----------
+        at, of
+            A posture, and the robot whose loads are known there; another robot bends in its own way.
+        """
+        self.joints = at.joints[0].copy()
+        with self._server.atomic():
+            for robot in (self.solid, self.ghost):
+                if robot is not None:
+                    robot.move(at if robot.robot is of else at.joints)
+
+    def show_tip(self, position: Array, rotation: Array) -> None:
+        """Show the frame of the tip that is moved, in the world [m]."""
+        if self._tip is None:
+            size = _TRIAD * self.length
+            self._tip = self._scene.add_frame("/tip", axes_length=size, axes_radius=0.04 * size)
+        self._tip.position, self._tip.wxyz = position, quaternion_from_rotation(rotation)
+
+    def show_ghost(self, visible: bool) -> None:
+        """Show or hide the calibrated robot."""
+        if self.ghost is not None:
+            self.ghost.show(visible)
+
+    def show_boxes(self, boxes: Mapping[str, tuple[Array, Array]]) -> None:
+        """Draw boxes to keep clear of: lowest and highest corners in the base frame [m], by name."""
+        self._clear("boxes")
+        if self.solid is None:
+            return
+        base = self.solid.robot.base
+        far = 2.0 * self.length
+        for number, (low, high) in enumerate(boxes.values()):
+            low, high = (np.clip(corner, -far, far) for corner in (low, high))
+            self._parts["boxes"].append(
+                self._scene.add_box(
+                    f"/boxes/{number}",
+                    color=_BOX,
+                    dimensions=tuple((high - low).tolist()),
+                    opacity=_SEE_THROUGH,
+                    cast_shadow=False,
+                    position=base.rotation @ ((low + high) / 2.0) + base.translation,
+                    wxyz=base.quaternion,
+                )
+            )
+
+    def show_arrows(self, name: str, arrows: Arrows | None) -> None:
+        """Draw arrows in one upload, with the words that say how much they are magnified; None takes them away."""
+        self._clear(name)
+        if arrows is None or not len(arrows.segments):
+            return
+        width = 0.004 * self.length
+        shown = self._scene.add_arrows(
+            f"/{name}/arrows",
+            arrows.segments.astype(np.float32),
+            arrows.colours,
+            shaft_radius=width,
+            head_radius=2.4 * width,
+            head_length=6.0 * width,
+        )
+        top = arrows.segments.reshape(-1, 3).max(axis=0)
+        middle = arrows.segments[:, 0].mean(axis=0)
+        place = (float(middle[0]), float(middle[1]), float(top[2]) + 0.1 * self.length)
+        self._parts[name] = [shown, self._scene.add_label(f"/{name}/words", arrows.words, position=place)]
+
+    def show_points(self, name: str, points: Array | None, colours: Colours = (70, 130, 180)) -> None:
+        """Draw points ``(n, 3)`` [m] in the world in one upload; None takes them away.
+
+        Parameters
+        ----------
+        colours
+            One for all, or one each ``(n, 3)`` from 0 to 255.
+        """
+        self._clear(name)
+        if points is None or not len(points):
+            return
+        shown = self._scene.add_point_cloud(
+            f"/{name}",
+            points.astype(np.float32),
+            np.asarray(colours, np.uint8),
+            point_size=0.012 * self.length,
+            point_shape="circle",
+            precision="float32",
+        )
+        self._parts[name] = [shown]
+
+    # -- parts ---------------------------------------------------------------------------------------------
+
+    def _draw_robots(self, nominal: Robot | None, calibrated: Robot | None) -> None:
+        for robot in (self.solid, self.ghost):
+            if robot is not None:
+                robot.remove()
+        if self._tip is not None:
+            self._tip.remove()
+            self._tip = None
+        self.solid = None if nominal is None else DrawnRobot(self._scene, "/nominal", nominal)
+        self.ghost = None if calibrated is None else DrawnRobot(self._scene, "/calibrated", calibrated, ghost=True)
+
+    def _surroundings(self, robot: Robot) -> None:
+        """Draw frames, floor and fixtures around a robot, and say from where it is looked at first."""
+        assert self.solid is not None
+        self._clear("frames")
+        base, size = robot.base, _TRIAD * self.length
+        for name, place in (("world", Transform()), ("base", base)):
+            if name == "world" and place == base:
+                continue
+            triad = self._scene.add_frame(
+                f"/frames/{name}",
+                axes_length=1.6 * size,
+                axes_radius=0.05 * size,
+                position=place.translation,
+                wxyz=place.quaternion,
+            )
+            self._parts["frames"] += [triad, self._scene.add_label(f"/frames/{name}/name", name)]
+        thin, thick = _LINES[self._dark]
+        floor = np.array(base.translation) + base.rotation @ np.array([0.0, 0.0, self.solid.floor])
+        wide = _FLOOR * self.length
+        self._parts["frames"].append(
+            self._scene.add_grid(
+                "/frames/floor",
+                width=wide,
+                height=wide,
+                cell_size=0.1,
+                section_size=0.5,
+                cell_color=thin,
+                section_color=thick,
+                position=floor,
+                wxyz=base.quaternion,
+            )
+        )
+        self._clear("fixtures")
+        for number, fixture in enumerate(robot.fixtures):
+            self._parts["fixtures"] += self._fixture(robot, fixture, f"/fixtures/{number}")
+        # The arm stands a little right of the middle and above it: notices float over the corner below on the left.
+        look = np.array(base.translation) + base.rotation @ (self.length * np.array([0.02, -0.05, 0.08]))
+        look += base.rotation @ np.array([0.0, 0.0, 0.6 * self.solid.floor])
+        self._look_at(look, look + base.rotation @ (self.length * np.array([0.85, -1.15, 0.6])))
+
+    def _look_at(self, look: Array, place: Array) -> None:
+        """Say from where windows look at first; those that are open follow the robot to another place."""
+        start = self._server.initial_camera
+        start.look_at, start.position = look, place
+        if self._looked is not None and not np.allclose(self._looked, [look, place]):
+            for client in self._server.get_clients().values():
+                with client.atomic():
+                    client.camera.position = place
+                    client.camera.look_at = look
+        self._looked = np.array([look, place])
+
+    def _fixture(self, robot: Robot, fixture: Fixture, name: str) -> list[Any]:
+        kinematics = robot.fixture_kinematics(fixture.name)
+        position, turned = kinematics.position[:, 0], kinematics.matrix()[0]
+        size = _TRIAD * self.length
+        label = self._scene.add_label(f"{name}/name", fixture.name, position=position)
+        if fixture.kind == "frame":
+            quaternion = quaternion_from_rotation(turned)
+            return [
+                self._scene.add_frame(
+                    name, axes_length=size, axes_radius=0.05 * size, position=position, wxyz=quaternion
+                ),
+                label,
+            ]
+        if fixture.kind == "point":
+            return [self._scene.add_icosphere(name, radius=0.15 * size, color=_FIXTURE, position=position), label]
+        half = _PLANE * self.length
+        plane = self._scene.add_box(
+            name,
+            color=_FIXTURE,
+            dimensions=(2.0 * half, 2.0 * half, 0.002),
+            opacity=_SEE_THROUGH,
+            position=position,
+            wxyz=quaternion_from_rotation(frame_about(turned[:, 2])),
+        )
+        return [plane, label]
+
+    def _clear(self, name: str) -> None:
+        for part in reversed(self._parts.get(name, [])):
+            part.remove()
+        self._parts[name] = []
+
+
+def standing_at(nominal: Robot, calibrated: Robot) -> Robot:
+    """Return the nominal robot at the place and with the targets of a calibrated one."""
+    targets: dict[str, Any] = {}
+    for target in calibrated.targets:
+        place = calibrated.tool_place(target.name)
+        targets[target.name] = place if target.quaternion is not None else place.translation
+    return nominal.with_frames(calibrated.base, targets)

@@ -1,0 +1,116 @@
+"""What long actions do: each calls one job, as the command of its name does in the project's folder.
+
+They read files of the project alone, and run in a process of their own (:mod:`truearm.studio.work`), whose working
+folder is the project's. So what they write is, to the byte, what the command writes there.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from truearm.files import confined_reads
+from truearm.notices import Notice
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a job said.
+
+    Attributes
+    ----------
+    lines
+        What its command prints.
+    notices
+        What to know about it.
+    files
+        What it wrote, by their names in the project.
+    finished
+        Whether its figures can be believed.
+    """
+
+    lines: tuple[str, ...]
+    notices: tuple[Notice, ...] = ()
+    files: tuple[str, ...] = ()
+    finished: bool = True
+
+
+def check(folder: Path, robot: str, data: str, progress: Progress) -> Outcome:
+    """Say what is wrong with measurements: :func:`truearm.check`."""
+    from truearm.jobs.check import check as job
+
+    os.chdir(folder)
+    progress("comparing the readings with the robot")
+    with confined_reads(folder):
+        found = job(robot, data)
+    return Outcome(tuple(found.lines()), found.warnings)
+
+
+def calibrate(folder: Path, robot: str, data: str, out: str, progress: Progress, **options: Any) -> Outcome:
+    """Calibrate and write the result: :func:`truearm.calibrate`.
+
+    Parameters
+    ----------
+    options
+        Of the job, by its names of parameters; None where nothing is said.
+    """
+    from truearm.jobs.calibrate import calibrate as job
+
+    os.chdir(folder)
+    given = {name: value for name, value in options.items() if value is not None}
+    command = calibrate_command(robot, data, given)
+    with confined_reads(folder):
+        found = job(robot, data, out=out, command=command, progress=progress, **given)
+    return Outcome(tuple(found.lines()), found.warnings, found.files, found.finished)
+
+
+def calibrate_command(robot: str, data: str, options: dict[str, Any]) -> str:
+    """Return the command that does the same in the project's folder, as the report shows it."""
+    named = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
+    return shlex.join(["truearm", "calibrate", robot, data, *named, "--out", "DIR"])
+
+
+def compensate(
+    folder: Path,
+    robot: str,
+    program: str,
+    out: str,
+    cell: str | None,
+    taught: Sequence[str] | None,
+    controller_kinematics: str | None,
+    progress: Progress,
+) -> Outcome:
+    """Correct a program and write it: :func:`truearm.compensate`."""
+    from truearm.jobs.compensate import compensate as job
+
+    os.chdir(folder)
+    with confined_reads(folder):
+        made = job(
+            robot,
+            [program],
+            out=out,
+            tools=cell,
+            frames=cell,
+            taught=taught,
+            controller_kinematics=controller_kinematics,
+            command=compensate_command(robot, program, cell, taught, controller_kinematics),
+            progress=progress,
+        )
+    return Outcome(tuple(made.lines()), made.warnings, tuple(one.name for one in made.files))
+
+
+def compensate_command(
+    robot: str, program: str, cell: str | None, taught: Sequence[str] | None, controller_kinematics: str | None
+) -> str:
+    """Return the command that does the same in the project's folder, as the report shows it."""
+    words = ["truearm", "compensate", robot, program]
+    words += [] if cell is None else ["--tools", cell, "--frames", cell]
+    words += [] if controller_kinematics is None else ["--controller-kinematics", controller_kinematics]
+    words += [] if taught is None else ["--taught", ",".join(taught)]
+    return shlex.join([*words, "--out", "DIR"])

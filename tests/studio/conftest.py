@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+viser = pytest.importorskip("viser", reason="the extra studio is not installed")
+
+from truearm.studio.serving import Studio, serve  # noqa: E402
+
+Serving = Callable[..., Studio]
+
+
+@pytest.fixture
+def serving(tmp_path: Path) -> Iterator[Serving]:
+    """Serve projects, each on a free port, until the test ends: ``serving(token="...")``."""
+    served: list[Studio] = []
+
+    def start(folder: Path = tmp_path / "project", **how: Any) -> Studio:
+        studio = serve(folder, **{"port": 0, **how})
+        served.append(studio)
+        return studio
+
+    yield start
+    for studio in served:
+        studio.stop()
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """A browser without a screen, its WebGL by SwiftShader; without one the tests in it are skipped, and say so."""
+    place = os.environ.get("CHROME") or next(
+        (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
+    )
+    if place is None:
+        pytest.skip("no Chromium on PATH, and none named in CHROME: the studio was not tried in a browser")
+    playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(
+            executable_path=place,
+            args=["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"],
+        )
+        yield browser
+        browser.close()

@@ -1,0 +1,73 @@
+"""A window's end of the line, without a browser: what one sends, and what nobody should."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+import viser
+from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
+from websockets.typing import Subprotocol
+
+from truearm.studio.serving import Studio
+
+#: What a window sends first: where it looks from.
+CAMERA: dict[str, Any] = {
+    "type": "ViewerCameraMessage",
+    "wxyz": [1.0, 0.0, 0.0, 0.0],
+    "position": [3.0, 3.0, 3.0],
+    "fov": 1.3,
+    "near": 0.01,
+    "far": 1000.0,
+    "image_height": 600,
+    "image_width": 800,
+    "look_at": [0.0, 0.0, 0.0],
+    "up_direction": [0.0, 0.0, 1.0],
+}
+
+
+def answer(studio: Studio, request: str | bytes, seconds: float = 5.0) -> bytes:
+    """Send bytes to the port of a studio, and return what comes back."""
+    content = request if isinstance(request, bytes) else request.replace("\n", "\r\n").encode("latin-1")
+    with socket.create_connection(("127.0.0.1", studio.access.port), timeout=seconds) as line:
+        line.sendall(content)
+        got = b""
+        try:
+            while part := line.recv(1 << 16):
+                got += part
+        except (TimeoutError, ConnectionResetError):
+            pass
+    return got
+
+
+def get(studio: Studio, path: str = "/", **headers: str) -> tuple[int, dict[str, str], bytes]:
+    """Ask for a page; headers beside or in place of those of a browser on this machine."""
+    said = {"Host": f"127.0.0.1:{studio.access.port}", **{k.replace("_", "-"): v for k, v in headers.items()}}
+    lines = "".join(f"{name}: {value}\n" for name, value in said.items())
+    head, _, body = answer(studio, f"GET {path} HTTP/1.1\n{lines}\n").partition(b"\r\n\r\n")
+    first, *rest = head.decode("latin-1").split("\r\n")
+    return int(first.split()[1]), dict(line.split(": ", 1) for line in rest), body
+
+
+def window(
+    studio: Studio, *, origin: str | None = "", subprotocols: Sequence[str] = (), headers: Mapping[str, str] = {}
+) -> ClientConnection:
+    """Open a window's connection, from its own page unless another origin is named."""
+    place = f"127.0.0.1:{studio.access.port}"
+    return connect(
+        f"ws://{place}/",
+        origin=f"http://{place}" if origin == "" else origin,  # type: ignore[arg-type]
+        subprotocols=[Subprotocol(f"viser-v{viser.__version__}"), *map(Subprotocol, subprotocols)],
+        additional_headers=dict(headers),
+        max_size=None,
+        compression=None,
+        proxy=None,
+    )
+
+
+def send(line: Connection, **message: Any) -> None:
+    """Send a message as the page does."""
+    line.send(msgspec.msgpack.encode(message))

@@ -1,0 +1,372 @@
+"""The page Jog and its scene, without a browser: what a user does, and what is then drawn and written."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.studio.conftest import Serving
+
+from truearm.errors import InputError
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.plan import plan
+from truearm.jobs.simulate import simulate
+from truearm.library import load_robot
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
+from truearm.notices import Notice
+from truearm.studio import words
+from truearm.studio.arrows import Arrows, coloured, error_arrows
+from truearm.studio.pages.jog import JogPage
+from truearm.studio.pages.plan import PlanPage
+from truearm.studio.pages.proof import ProofPage
+from truearm.studio.serving import Studio
+
+#: An event of a user; those of the studio itself have no client.
+BY_A_USER = SimpleNamespace(client=object())
+
+
+@pytest.fixture
+def studio(serving: Serving) -> Studio:
+    return serving()
+
+
+@pytest.fixture
+def page(studio: Studio) -> JogPage:
+    return next(page for page in studio.window.pages if isinstance(page, JogPage))
+
+
+def act(element: Any, value: Any = None) -> None:
+    """Do with an element what a user does: give it a value, or press it."""
+    if value is not None:
+        element._impl.value = value
+    for callback in element._impl.update_cb:
+        callback(BY_A_USER)
+
+
+def drag(page: JogPage, position: Any, rotation: Any) -> None:
+    page._handle._impl.position = np.asarray(position, float)
+    page._handle._impl.wxyz = quaternion_from_rotation(rotation)
+    for callback in page._handle._impl_aux.update_cb:
+        callback(BY_A_USER)
+
+
+def eventually(true: Callable[[], bool]) -> bool:
+    end = time.monotonic() + 10.0
+    while time.monotonic() < end:
+        if true():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def flange_drawn(page: JogPage) -> tuple[Any, Any]:
+    assert page.scene.solid is not None
+    names = [link._impl.name for link in page.scene.solid._links]
+    link = page.scene.solid._links[names.index("/nominal/flange")]
+    return link.position, rotation_from_quaternion(link.wxyz)
+
+
+def test_it_says_that_no_real_robot_moves(serving: Serving, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str] = []
+
+    def noted(notice: Notice) -> str:
+        shown.append(f"{notice.code}: {notice.message}")
+        return ""
+
+    monkeypatch.setattr(words, "notice", noted)
+    serving()
+    assert any(text.startswith("no-real-robot: ") and "none moves" in text for text in shown)
+
+
+def test_a_slider_moves_the_arm_its_numbers_and_its_handle(page: JogPage) -> None:
+    act(page._sliders[0], 40.0)
+    act(page._sliders[2], -20.0)
+    joints = np.deg2rad([40.0, 0.0, -20.0, 0.0, 0.0, 0.0])
+    assert page.jogging is not None
+    assert page.jogging.joints == pytest.approx(joints)
+    p, R = load_robot("irb120").forward(joints, frame="world")
+    drawn, turned = flange_drawn(page)
+    assert drawn == pytest.approx(p[0], abs=1e-12)
+    assert turned == pytest.approx(R[0], abs=1e-9)
+    assert page._handle.position == pytest.approx(p[0])
+    assert page._place.value == pytest.approx((p[0] * 1e3).tolist(), abs=1e-5)
+
+
+def test_meshes_are_sent_once(page: JogPage, studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[str] = []
+    monkeypatch.setattr(
+        studio.window.server.scene, "_queue_scene_message", lambda message: sent.append(type(message).__name__)
+    )
+    for k in range(6):
+        act(page._sliders[k], 10.0 + k)
+    assert "SetPositionMessage" in sent
+    assert not [name for name in sent if "Mesh" in name]
+
+
+def test_a_slider_beyond_a_limit_stops_there(page: JogPage) -> None:
+    act(page._sliders[2], 500.0)
+    assert page.jogging is not None
+    assert np.rad2deg(page.jogging.joints[2]) == pytest.approx(70.0)
+    assert page._sliders[2].value == pytest.approx(70.0)
+    assert "axis_3 is at its limit" in page._said.content
+
+
+def test_a_pose_in_numbers_and_by_the_handle(page: JogPage) -> None:
+    page._place._impl.value, page._turns._impl.value = (350.0, 50.0, 600.0), (0.0, 90.0, 0.0)
+    act(page._go)
+    drawn, _ = flange_drawn(page)
+    assert drawn == pytest.approx([0.35, 0.05, 0.6], abs=1e-9)
+    _, turned = flange_drawn(page)
+    drag(page, drawn + np.array([0.01, -0.02, 0.0]), turned)
+    assert flange_drawn(page)[0] == pytest.approx([0.36, 0.03, 0.6], abs=1e-9)
+    act(page._frame, "tool")
+    assert page._place.value == (0.0, 0.0, 0.0)
+    page._place._impl.value = (0.0, 0.0, 10.0)
+    act(page._go)
+    assert np.linalg.norm(flange_drawn(page)[0] - [0.36, 0.03, 0.6]) == pytest.approx(0.01)
+
+
+def test_out_of_reach_is_said_where_the_user_drags_and_the_arm_stays(page: JogPage) -> None:
+    before, turned = flange_drawn(page)
+    drag(page, [4.0, 0.0, 0.0], turned)
+    assert "cannot go to this pose" in page._said.content
+    assert flange_drawn(page)[0] == pytest.approx(before)
+
+
+def test_branches_are_offered_and_taken(page: JogPage) -> None:
+    for slider, value in zip(page._sliders, (10.0, 20.0, -15.0, 30.0, 40.0, -50.0), strict=True):
+        act(slider, value)
+    before, _ = flange_drawn(page)
+    act(page._find)
+    offered = page._branch.options
+    assert len(offered) == 9
+    assert offered[1] == "front-up-noflip (reached)"
+    other = next(name for name in offered[2:] if name.endswith("(reached)"))
+    act(page._branch, other)
+    assert page.jogging is not None
+    assert np.abs(np.rad2deg(page.jogging.joints) - [10.0, 20.0, -15.0, 30.0, 40.0, -50.0]).max() > 20.0
+    assert flange_drawn(page)[0] == pytest.approx(before, abs=1e-9)
+    act(page._sliders[0], 0.0)
+    assert page._branch.options == ("nearest",)
+
+
+def test_numbers_of_the_controller(serving: Serving, tmp_path: Path) -> None:
+    folder = tmp_path / "fanuc"
+    folder.mkdir()
+    (folder / "truearm-studio.yaml").write_text("truearm: truearm-studio/1\nrobot: lrmate200ic\n")
+    page = next(p for p in serving(folder).window.pages if isinstance(p, JogPage))
+    assert page._whose.value == "controller"
+    act(page._sliders[1], 30.0)
+    assert page.jogging is not None
+    assert np.rad2deg(page.jogging.joints[1:3]) == pytest.approx([30.0, -30.0])
+    act(page._whose, "model")
+    assert page._sliders[2].value == pytest.approx(-30.0)
+
+
+def test_configurations_are_recorded_and_played(page: JogPage, studio: Studio) -> None:
+    file = studio.window.project.folder / "recorded.csv"
+    act(page._sliders[0], 40.0)
+    act(page._record, "record")
+    act(page._sliders[0], -40.0)
+    act(page._record, "record")
+    assert file.read_text().splitlines()[1:] == ["P1,40.0,0.0,0.0,0.0,0.0,0.0", "P2,-40.0,0.0,0.0,0.0,0.0,0.0"]
+    assert studio.window.project.changes() == ()
+    assert "P1, P2" in page._recorded.content
+    page._speed._impl.value = 1000.0
+    act(page._play, "play")
+    assert page.jogging is not None
+    arm, playing = page.jogging, page._playing
+    assert playing is not None
+    assert eventually(playing.is_set)
+    assert np.rad2deg(arm.joints[0]) == pytest.approx(-40.0)
+    act(page._record, "remove last")
+    assert len(file.read_text().splitlines()) == 2
+
+
+def test_a_motion_ends_where_the_user_moves_the_arm(page: JogPage) -> None:
+    act(page._sliders[0], 40.0)
+    act(page._record, "record")
+    act(page._sliders[0], -40.0)
+    page._speed._impl.value = 5.0
+    act(page._play, "play")
+    playing = page._playing
+    act(page._sliders[1], 10.0)
+    assert playing is not None
+    assert playing.is_set()
+    assert page.jogging is not None
+    where = page.jogging.joints
+    time.sleep(0.2)
+    assert np.array_equal(page.jogging.joints, where)
+
+
+@pytest.mark.parametrize("name", ["../recorded.csv", "/etc/passwd.csv", "recorded.txt", "a\nb.csv"])
+def test_no_other_file_is_recorded_into(page: JogPage, studio: Studio, name: str, tmp_path: Path) -> None:
+    page._list._impl.value = name
+    act(page._record, "record")
+    assert "Refused" in _notices(studio) or "refused" in _notices(studio)
+    assert sorted(p.name for p in studio.window.project.folder.iterdir()) == ["truearm-studio.yaml"]
+
+
+def test_files_of_others_are_not_recorded_into(page: JogPage, studio: Studio) -> None:
+    file = studio.window.project.folder / "plan.csv"
+    headings = ",".join(f"joint_{k} [deg]" for k in range(1, 7))
+    file.write_text(f"configuration,{headings},reads\nc1,1,2,3,4,5,6,x\n")
+    before = file.read_text()
+    act(page._list, "plan.csv")
+    act(page._record, "record")
+    assert "was not recorded here" in _notices(studio)
+    assert file.read_text() == before
+    act(page._play, "play")
+    assert page._playing is not None
+
+
+def _notices(studio: Studio) -> str:
+    return "".join(studio.window._told)
+
+
+def test_nominal_and_calibrated_stand_where_the_instrument_saw_the_robot(studio: Studio, page: JogPage) -> None:
+    base = Transform((1.0, 2.0, 0.5), (0.0, 0.0, 0.0, 1.0))
+    robot = load_robot("irb120").with_frames(base, {"b'><i>": (0.0, 0.0, 0.1)})
+    found = robot.with_values({"a_3": 0.2712, "theta_offset_2": -1.565})
+    folder = studio.window.project.folder / "result"
+    folder.mkdir()
+    (folder / "calibrated.yaml").write_text(robot_text(found))
+    studio.window.refresh()
+    assert page.scene.ghost is not None
+    assert np.linalg.norm(studio.window.server.initial_camera.look_at - np.array([1.0, 2.0, 0.5])) < 0.3
+    assert page._arm.options == ("nominal", "calibrated")
+    q = np.deg2rad([10.0, 20.0, 0.0, 0.0, 30.0, 0.0])
+    for slider, value in zip(page._sliders, np.rad2deg(q), strict=True):
+        act(slider, float(value))
+    for drawn, arm in ((page.scene.solid, robot), (page.scene.ghost, found)):
+        assert drawn is not None
+        assert drawn._links[-1].position == pytest.approx(arm.forward(q, frame="world")[0][0], abs=1e-9)
+    act(page._arm, "calibrated")
+    assert page.jogging is not None
+    assert page.jogging.joints == pytest.approx(q)
+    act(page._tip, "b'><i>")
+    assert page._handle.position == pytest.approx(found.forward(q, frame="world", target="b'><i>")[0][0], abs=1e-9)
+    act(page._ghost, False)
+    assert not page.scene.ghost._root.visible
+
+
+def test_another_robot_is_drawn_anew_and_fixtures_beside_it(studio: Studio, page: JogPage) -> None:
+    robot = load_robot("katana450").with_fixtures(
+        {
+            "ball": ("point", Transform((0.2, 0.0, 0.1))),
+            "wall": ("plane", Transform((0.3, 0.0, 0.0), (0.7071067811865476, 0.0, 0.7071067811865476, 0.0))),
+            "nest": ("frame", Transform((0.1, 0.2, 0.0))),
+        }
+    )
+    (studio.window.project.folder / "arm.yaml").write_text(robot_text(robot))
+    studio.window.edit(robot="arm.yaml")
+    assert len(page._sliders) == 5
+    assert len(page.scene._parts["fixtures"]) == 6
+    page.scene.show_boxes({"table": (np.array([-np.inf, 0.1, -0.2]), np.array([np.inf, 0.5, 0.0]))})
+    assert len(page.scene._parts["boxes"]) == 1
+    studio.window.edit(dark=True)
+    assert page.scene.solid is not None
+    assert page.scene.solid.robot.name == "katana450"
+
+
+def test_errors_are_magnified_and_the_factor_is_said(page: JogPage) -> None:
+    points = np.array([[0.1, 0.0, 0.2], [0.3, 0.1, 0.2], [np.nan, 0.0, 0.0]])
+    errors = np.array([[1e-4, 0.0, 0.0], [0.0, -5e-4, 0.0], [0.0, 0.0, 0.0]])
+    made = error_arrows(points, errors, 500.0)
+    assert made.segments[:, 1] - made.segments[:, 0] == pytest.approx(500.0 * errors[:2])
+    assert made.words == "errors x 500, largest 0.5 mm"
+    assert made.colours.shape == (2, 3)
+    page.scene.show_arrows("proof", made)
+    assert page.scene._parts["proof"][1].text == "errors x 500, largest 0.5 mm"
+    page.scene.show_arrows("proof", None)
+    assert page.scene._parts["proof"] == []
+    page.scene.show_arrows("none", error_arrows(points[2:], errors[2:], 1.0))
+    assert page.scene._parts["none"] == []
+    for factor in (0.5, 2001.0, float("nan")):
+        with pytest.raises(InputError):
+            error_arrows(points, errors, factor)
+
+
+def test_many_points_go_in_one_upload(page: JogPage, studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[str] = []
+    queue = studio.window.server.scene._queue_scene_message
+
+    def noted(message: Any) -> None:
+        sent.append(type(message).__name__)
+        queue(message)
+
+    monkeypatch.setattr(studio.window.server.scene, "_queue_scene_message", noted)
+    rng = np.random.default_rng(0)
+    cloud = rng.normal(size=(5000, 3))
+    page.scene.show_points("candidates", cloud, coloured(cloud[:, 2], -1.0, 1.0))
+    page.scene.show_arrows("errors", error_arrows(cloud[:500], 1e-4 * cloud[:500], 1000.0))
+    assert sent.count("PointCloudMessage") == 1
+    assert sent.count("ArrowMessage") == 1
+    assert isinstance(page.scene._parts["candidates"], list)
+    assert isinstance(error_arrows(cloud, cloud, 1.0), Arrows)
+
+
+def test_colours_go_from_dark_to_light() -> None:
+    colours = coloured(np.array([-1.0, 0.0, 0.5, 1.0, 2.0]), 0.0, 1.0).astype(int)
+    assert np.array_equal(colours[0], colours[1])
+    assert np.array_equal(colours[3], colours[4])
+    assert (np.diff(colours[1:4].sum(axis=1)) > 0).all()
+    assert np.array_equal(coloured(np.array([3.0]), 1.0, 1.0)[0], colours[0])
+
+
+def test_errors_of_a_result_are_drawn_from_before_to_after(studio: Studio, page: JogPage) -> None:
+    window, folder = studio.window, studio.window.project.folder
+    simulate("irb120", truth="random", poses=60, noise=5e-5, seed=1, out=folder / "data.csv")
+    found = calibrate("irb120", folder / "data.csv", model="geometric", seed=3, out=folder / "result")
+    window.project.look()
+    window.edit(data="data.csv", seed=3)
+    arrows = next(page._arrows for page in window.pages if isinstance(page, ProofPage))
+    act(arrows._draw)
+    assert window.wait(60.0)
+    assert eventually(lambda: bool(page.scene._parts.get("errors")))
+    assert found.validation is not None
+    largest = found.validation.position_norms.max() * 1e3
+    assert page.scene._parts["errors"][1].text == f"errors x 200, largest {largest:.3g} mm"
+    act(arrows._share, 0.0)
+    act(arrows._factor, 50.0)
+    largest = found.nominal.position_norms.max() * 1e3
+    assert page.scene._parts["errors"][1].text == f"errors x 50, largest {largest:.3g} mm"
+    # Of another split the figures would be others than those of the result.
+    window.edit(seed=4)
+    act(arrows._draw)
+    assert window.wait(60.0)
+    assert eventually(lambda: "split otherwise" in _notices(studio))
+    act(arrows._hide)
+    assert page.scene._parts["errors"] == []
+    assert arrows._factor.disabled
+
+
+def test_a_plan_is_the_commands_and_drawn_in_space(studio: Studio, page: JogPage, tmp_path: Path) -> None:
+    window = studio.window
+    planning = next(page for page in window.pages if isinstance(page, PlanPage))
+    planning._poses._impl.value, planning._candidates._impl.value = "30", 60
+    act(planning._run)
+    assert window.wait(60.0)
+    assert eventually(lambda: bool(page.scene._parts.get("chosen")))
+    made = plan("irb120", poses=30, candidates=60, noise=1e-4, out=tmp_path / "plan.csv")
+    assert (window.project.folder / "plan.csv").read_bytes() == (tmp_path / "plan.csv").read_bytes()
+    assert len(page.scene._parts["chosen"][0].points) == 30
+    assert made.made.robot.forward(made.joints, frame="world")[0] == pytest.approx(
+        page.scene._parts["chosen"][0].points, abs=1e-6
+    )
+    assert made.answer[0].split(".")[0] in planning._said.content
+    act(planning._cloud, False)
+    assert page.scene._parts["chosen"] == page.scene._parts["predicted"] == []
+    planning._poses._impl.value = "many"
+    act(planning._run)
+    assert "a number of poses belongs here" in _notices(studio)
+    # What it wrote is a list of configurations that can be played.
+    page._list._impl.value = "plan.csv"
+    page._show_recorded()
+    assert page._recorded.content.count(", ") == 6

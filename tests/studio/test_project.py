@@ -1,0 +1,199 @@
+"""A project's folder: what is one, what its file says, and that nothing of it is lost or overwritten."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from tests.killing import killed, leftovers, operations
+
+from truearm.errors import InputError
+from truearm.files import confined_reads, read_bytes, read_yaml
+from truearm.studio.project import PROJECT_FILE, Project, Settings, open_project
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Project:
+    return open_project(tmp_path / "cell")
+
+
+def test_a_missing_and_an_empty_folder_become_projects(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    for folder in (tmp_path / "new" / "deep", tmp_path / "empty"):
+        made = open_project(folder)
+        assert [path.name for path in folder.iterdir()] == [PROJECT_FILE]
+        assert made.settings == Settings()
+        assert open_project(folder).settings == made.settings
+
+
+def test_a_folder_with_other_things_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / "letter.txt").write_text("dear")
+    with pytest.raises(InputError, match="holds other things and is no project") as refused:
+        open_project(tmp_path)
+    assert refused.value.came == "letter.txt"
+    assert [path.name for path in tmp_path.iterdir()] == ["letter.txt"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "is empty"),
+        ("truearm: truearm-studio/2\n", "not known"),
+        ("truearm: truearm-studio/1\ncolour: red\n", "this entry is not known here"),
+        ("truearm: truearm-studio/1\ndata: ../secret.csv\n", "no place in the project's folder"),
+        ("truearm: truearm-studio/1\nrobot: /etc/passwd\n", "no place in the project's folder"),
+        ("truearm: truearm-studio/1\ncontroller_kinematics: ../c.conf\n", "no place in the project's folder"),
+        ("truearm: truearm-studio/1\nseed: -1\n", "too small"),
+        ("truearm: truearm-studio/1\nseed: true\n", "whole number"),
+        ("a: [", "not valid YAML"),
+        ("&a [*a]", "holds itself"),
+    ],
+)
+def test_a_project_file_that_cannot_be_used_is_refused_and_stays(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / PROJECT_FILE).write_text(text)
+    with pytest.raises(InputError, match=said):
+        open_project(tmp_path)
+    assert (tmp_path / PROJECT_FILE).read_text() == text
+
+
+def test_edits_are_on_disk_at_once_and_undone_and_done_again(project: Project) -> None:
+    def on_disk() -> Settings:
+        return read_yaml(project.folder / PROJECT_FILE, Settings)
+
+    assert project.edit(robot="kr5", payload="2kg,1mm,2mm,3mm", train=40, taught=["tools", "frames"], dark=True)
+    assert not project.edit(robot="kr5")
+    assert project.edit(train="all", taught=["none"])
+    assert on_disk() == project.settings == open_project(project.folder).settings
+    project.undo()
+    assert (on_disk().train, on_disk().taught) == (40, ("tools", "frames"))
+    project.undo()
+    assert on_disk() == Settings()
+    assert not project.undoable
+    project.undo()
+    project.redo()
+    project.redo()
+    project.redo()
+    assert on_disk().train == "all"
+    project.undo()
+    project.edit(seed=3)
+    assert not project.redoable
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"data": "../a.csv"},
+        {"program": "/etc/passwd"},
+        {"result": "a/../../b"},
+        {"cell": "..\\..\\b"},
+        {"corrected": "C:\\x"},
+        {"robot": "a\x1bb.yaml"},
+        {"train": 0},
+        {"seed": "x"},
+        {"nonsense": 1},
+        {"model": ""},
+    ],
+)
+def test_settings_that_cannot_be_are_refused_and_change_nothing(project: Project, changes: dict[str, object]) -> None:
+    before = (project.folder / PROJECT_FILE).read_bytes()
+    with pytest.raises(InputError):
+        project.edit(**changes)
+    assert (project.folder / PROJECT_FILE).read_bytes() == before
+    assert project.settings == Settings()
+    assert not project.undoable
+
+
+def test_links_lead_nowhere_outside(project: Project, tmp_path: Path) -> None:
+    (tmp_path / "secret.csv").write_text("x")
+    (project.folder / "link.csv").symlink_to(tmp_path / "secret.csv")
+    (project.folder / "up").symlink_to(tmp_path)
+    for name in ("link.csv", "up/secret.csv", "up"):
+        with pytest.raises(InputError, match="no place in the project's folder"):
+            project.path(name)
+    assert "up/secret.csv" not in project.names(".csv")
+    with confined_reads(project.folder):
+        with pytest.raises(InputError, match="not in the project's folder, and is not read"):
+            read_bytes(project.folder / "link.csv")
+        assert read_bytes(project.folder / PROJECT_FILE)
+    assert read_bytes(project.folder / "link.csv") == b"x"
+
+
+def test_another_programs_edit_is_told_never_overwritten_and_taken_by_reloading(project: Project) -> None:
+    (project.folder / "a.csv").write_text("1")
+    project.look()
+    assert project.changes() == ()
+    file = project.folder / PROJECT_FILE
+    file.write_text("truearm: truearm-studio/1\nrobot: ur5\n")
+    os.utime(file, ns=(1, 1))
+    (project.folder / "a.csv").unlink()
+    (project.folder / "b.csv").write_text("2")
+    found = [(one.name, one.how) for one in project.changes()]
+    assert found == [("a.csv", "gone"), ("b.csv", "new"), (PROJECT_FILE, "changed")]
+    before = file.read_bytes()
+    with pytest.raises(InputError, match="another program has changed this file"):
+        project.edit(robot="kr5")
+    assert file.read_bytes() == before
+    project.reload()
+    assert project.settings.robot == "ur5"
+    assert project.changes() == ()
+    assert project.edit(robot="kr5")
+    file.unlink()
+    with pytest.raises(InputError, match="another program has changed"):
+        project.undo()
+    assert not file.exists()
+
+
+def test_the_studios_own_writing_hides_no_change_of_another_program(project: Project) -> None:
+    (project.folder / "a.csv").write_text("1")
+    project.edit(robot="kr5")
+    project.take_in("b.csv", b"2")
+    (project.folder / "result").mkdir()
+    (project.folder / "result" / "c.yaml").write_text("3")
+    project.look("result")
+    assert [(one.name, one.how) for one in project.changes()] == [("a.csv", "new")]
+    project.look()
+    assert project.changes() == ()
+
+
+def test_files_taken_in_replace_nothing(project: Project) -> None:
+    assert project.take_in("a b.csv", b"1") == "a b.csv"
+    assert project.take_in("a b.csv", b"1") == "a b.csv"
+    with pytest.raises(InputError, match="stands in the project, and is not overwritten"):
+        project.take_in("a b.csv", b"2")
+    for name in (
+        "../a.csv",
+        "x/a.csv",
+        "/a.csv",
+        "..",
+        ".hidden",
+        "",
+        PROJECT_FILE,
+        "truearm.manifest.json",
+        "a\nb",
+        "x\\y",
+    ):
+        with pytest.raises(InputError):
+            project.take_in(name, b"1")
+    assert sorted(path.name for path in project.folder.iterdir()) == ["a b.csv", PROJECT_FILE]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="a process cannot copy itself here")
+def test_a_process_killed_at_any_moment_leaves_the_old_or_the_new_project(tmp_path: Path) -> None:
+    folder = tmp_path / "cell"
+
+    def work() -> None:
+        open_project(folder).edit(robot="kr5", dark=True)
+
+    seen = set()
+    for number in range(operations(lambda: open_project(tmp_path / "other").edit(robot="kr5", dark=True), tmp_path)):
+        folder.mkdir(exist_ok=True)
+        (folder / PROJECT_FILE).unlink(missing_ok=True)
+        killed(work, tmp_path, number)
+        again = open_project(folder)
+        seen.add(again.settings.robot)
+        assert again.settings in (Settings(), Settings(robot="kr5", dark=True))
+        work()
+        assert open_project(folder).settings.robot == "kr5"
+        assert leftovers(folder) == []
+    assert seen == {"irb120", "kr5"}

@@ -1,0 +1,245 @@
+"""The whole work by clicking, in a browser: from an empty folder to a calibrated robot and a corrected program."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.cli.conftest import Truearm
+from tests.cli.conftest import truearm as truearm
+
+from truearm.studio.pages.jog import JogPage
+from truearm.studio.project import PROJECT_FILE
+from truearm.studio.serving import Studio, serve
+
+#: Sizes at which pages are pictured.
+_SIZES = ((1366, 768), (1920, 1080))
+
+
+class Person:
+    """Looks at a page and clicks on it."""
+
+    def __init__(self, page: Any, studio: Studio, pictures: Path) -> None:
+        self.page, self.studio, self.pictures = page, studio, pictures
+        self.faults: list[str] = []
+        page.on("pageerror", lambda error: self.faults.append(str(error)))
+        page.on("console", lambda said: self.faults.append(said.text) if said.type == "error" else None)
+        page.on("request", lambda asked: self._asked(asked.url))
+        page.goto(studio.access.entrance)
+        page.get_by_role("tab", name="Cell").wait_for()
+
+    def _asked(self, url: str) -> None:
+        if not url.startswith((self.studio.access.address, "data:", "blob:")):
+            self.faults.append(f"asked for {url}")
+
+    def turn_to(self, name: str) -> None:
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def press(self, name: str) -> None:
+        self.page.get_by_role("button", name=name, exact=True).click()
+
+    def write(self, label: str, text: str) -> None:
+        """Type into the field behind a label, and wait for it to be taken."""
+        self.page.locator(f"xpath=//*[normalize-space(text())='{label}']/following::input[1]").fill(text)
+        self.page.wait_for_timeout(900)
+
+    def wait_for(self, text: str) -> None:
+        self.page.get_by_text(text).first.wait_for(timeout=30_000)
+
+    def shown(self) -> str:
+        """Return all that the window shows, with single blanks."""
+        return re.sub(r"\s+", " ", str(self.page.evaluate("document.body.innerText")))
+
+    def picture(self, name: str, sizes: Sequence[tuple[int, int]] = _SIZES[:1]) -> None:
+        """Keep a picture of what is shown, at some sizes; nothing stands out of the window's right edge."""
+        for width, height in sizes:
+            self.page.set_viewport_size({"width": width, "height": height})
+            self.page.wait_for_timeout(250)
+            self.page.screenshot(path=self.pictures / f"{name}-{width}.png")
+            beyond = self.page.evaluate(_BEYOND)
+            assert beyond == [], f"{name} at {width}: {beyond}"
+        if len(sizes) > 1:
+            self.page.set_viewport_size({"width": _SIZES[0][0], "height": _SIZES[0][1]})
+
+
+#: The texts of elements that reach beyond the window, or are wider than what holds them.
+_BEYOND = """() => [...document.querySelectorAll("button, input, label, p, pre, td, th")]
+  .filter((e) => e.offsetParent !== null && e.getBoundingClientRect().width > 0)
+  .filter((e) => e.getBoundingClientRect().right > innerWidth + 1 || e.scrollWidth > e.clientWidth + 2
+    && ["P", "PRE", "TD", "TH"].includes(e.tagName))
+  .map((e) => e.tagName + " " + e.innerText.slice(0, 60))"""
+
+
+@pytest.fixture(scope="module")
+def demonstration(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
+    """The studio of an empty folder that it fills itself."""
+    studio = serve(tmp_path_factory.mktemp("studio") / "project", port=0, demo=True)
+    yield studio
+    studio.stop()
+
+
+@pytest.fixture(scope="module")
+def person(demonstration: Studio, chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Person]:
+    """Who sits before it; the pictures stay in the folder of the test run."""
+    page = chromium.new_page(viewport={"width": 1366, "height": 768}, accept_downloads=True)
+    yield Person(page, demonstration, tmp_path_factory.mktemp("pictures"))
+    page.close()
+
+
+def test_from_an_empty_folder_to_a_corrected_program_by_clicking(
+    person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    folder = person.studio.window.project.folder
+    person.picture("cell")
+    assert "measurements.csv" in person.shown()
+
+    person.turn_to("Check")
+    person.press("Check the measurements")
+    person.wait_for("Check: done")
+    monkeypatch.chdir(folder)
+    for line in (
+        truearm("check", "irb120", "measurements.csv").out.replace("--model elastic", "model=elastic").splitlines()
+    ):
+        assert " ".join(line.split()) in person.shown()
+    person.picture("check")
+
+    person.turn_to("Calibrate")
+    person.press("Calibrate")
+    person.page.get_by_role("button", name="Cancel").wait_for()
+    person.wait_for("Written to result: ")
+    said = person.shown()
+    person.picture("calibrate")
+    words = ["calibrate", "irb120", "measurements.csv", "--model", "elastic", "--payload", "2.7kg,50mm,25mm,100mm"]
+    printed = truearm(*words, "--out", tmp_path / "by-command").out
+    for line in printed.splitlines()[:-1]:
+        figures = re.findall(r"\d+\.\d+ ?(?:mm|deg|%)?", line)
+        assert all(figure in said for figure in figures), line
+    for name in ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf"):
+        assert (folder / "result" / name).read_bytes() == (tmp_path / "by-command" / name).read_bytes(), name
+
+    person.turn_to("Proof")
+    person.page.locator(".js-plotly-plot").first.wait_for()
+    result = json.loads((folder / "result" / "result.json").read_text())
+    said = person.shown()
+    for part in ("nominal", "validation", "train"):
+        assert " ".join(f"{result[part]['position_mm'][k]:.3f}" for k in ("mean", "rms", "p95", "max")) in said
+    assert all(f"({one['code']})" in said for one in result["warnings"])
+    person.picture("proof", _SIZES)
+    with person.page.expect_download() as came:
+        person.press("report.html")
+    assert Path(came.value.path()).read_bytes() == (folder / "result" / "report.html").read_bytes()
+
+    person.press("Draw the errors")
+    person.wait_for("Draw the errors: done")
+
+    person.turn_to("Jog")
+    person.wait_for("No real robot is connected to this window, and none moves.")
+    number = person.page.locator('xpath=//label[contains(., "axis_2")]/following::input[@type="text"][1]')
+    number.fill("40")
+    number.press("Enter")
+    jog = next(page for page in person.studio.window.pages if isinstance(page, JogPage))
+    for _ in range(100):
+        person.page.wait_for_timeout(50)
+        if jog.jogging is not None and jog.jogging.joints[1] > 0.69:
+            break
+    assert jog.jogging is not None
+    assert jog.jogging.numbers[1] == 40.0
+    assert jog.scene.ghost is not None
+    person.press("record")
+    person.wait_for("Recorded: P1")
+    assert (folder / "recorded.csv").read_text().splitlines()[1].startswith("P1,0.0,40.0,")
+    person.picture("jog")
+    jog.scene.show_arrows("errors", None)
+
+    person.turn_to("Plan")
+    person.press("Plan")
+    person.wait_for("Written: plan.csv, plan.html")
+    person.picture("plan")
+
+    person.turn_to("Programs")
+    person.press("Correct the program")
+    person.wait_for("Written to result/corrected: ")
+    person.picture("programs")
+    assert (folder / "result/corrected/plate.mod").read_bytes() == (folder / "corrected/plate.mod").read_bytes()
+
+    person.press("light / dark")
+    for name in ("Proof", "Programs"):
+        person.turn_to(name)
+        person.picture(f"{name.lower()}-dark")
+    assert person.faults == []
+
+
+def test_refusals_stand_where_one_acts_and_edits_are_undone(person: Person) -> None:
+    project = person.studio.window.project
+    person.turn_to("Calibrate")
+    person.write("Seed", "x")
+    person.wait_for("seed: a whole number belongs here; got 'x'.")
+    assert project.settings.seed == 0
+    person.write("Seed", "7")
+    person.page.wait_for_timeout(300)
+    assert project.settings.seed == 7
+    person.press("undo")
+    person.page.wait_for_timeout(300)
+    assert project.settings.seed == 0
+    person.page.keyboard.press("Control+Shift+Z")
+    person.page.wait_for_timeout(300)
+    assert project.settings.seed == 7
+    person.press("undo")
+    person.page.wait_for_timeout(300)
+    assert project.settings.seed == 0
+
+
+def test_what_another_program_changes_is_told_and_taken_on_request(person: Person) -> None:
+    project = person.studio.window.project
+    file = project.folder / PROJECT_FILE
+    name = "<img src=x onerror=document.title='broken'>.csv"
+    (project.folder / name.replace("/", "")).write_text("x")
+    file.write_text(file.read_text().replace("seed: 0", "seed: 5"))
+    person.wait_for("Another program has changed files")
+    person.turn_to("Calibrate")
+    person.write("Seed", "9")
+    person.wait_for("another program has changed this file, and it is not overwritten")
+    person.press("reload")
+    person.page.wait_for_timeout(300)
+    assert project.settings.seed == 5
+    person.turn_to("Cell")
+    assert "onerror=document.title" in person.shown()
+    assert person.page.title() != "broken"
+    (project.folder / name).unlink()
+
+
+def test_a_calibration_is_cancelled_and_leaves_the_old_result(person: Person) -> None:
+    project = person.studio.window.project
+    before = (project.folder / "result" / "result.json").read_bytes()
+    person.turn_to("Calibrate")
+    person.press("Calibrate")
+    person.press("Cancel")
+    person.wait_for("Calibrate was cancelled; nothing was written.")
+    assert (project.folder / "result" / "result.json").read_bytes() == before
+    assert not person.studio.window.busy
+
+
+def test_reopened_it_shows_what_it_showed(person: Person, chromium: Any, tmp_path: Path) -> None:
+    folder = shutil.copytree(person.studio.window.project.folder, tmp_path / "copy")
+    again = serve(folder, port=0)
+    try:
+        assert again.window.project.settings == person.studio.window.project.settings
+        proof, other = (
+            next(page for page in studio.window.pages if page.title == "Proof") for studio in (again, person.studio)
+        )
+        assert "before (60)" in proof._table.content  # type: ignore[attr-defined]
+        assert proof._table.content == other._table.content  # type: ignore[attr-defined]
+        assert proof._notices.content == other._notices.content  # type: ignore[attr-defined]
+        page = chromium.new_page(viewport={"width": 800, "height": 600})
+        one = Person(page, again, tmp_path)
+        one.turn_to("Proof")
+        one.wait_for("after, held out (60)")
+        assert one.faults == []
+        page.close()
+    finally:
+        again.stop()

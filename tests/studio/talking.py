@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import viser
 from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
 from websockets.typing import Subprotocol
 
 from truearm.studio.serving import Studio
@@ -67,6 +68,6 @@ def window(
     )
 
 
-def send(line: ClientConnection, **message: Any) -> None:
+def send(line: Connection, **message: Any) -> None:
     """Send a message as the page does."""
     line.send(msgspec.msgpack.encode(message))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hmac
 import json
 import socket
 import threading
@@ -154,7 +155,7 @@ def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -
         compared.append((one, other))
         return one == other
 
-    monkeypatch.setattr(module.hmac, "compare_digest", compare)
+    monkeypatch.setattr(hmac, "compare_digest", compare)
     access = Access("127.0.0.1", 1, TOKEN, frozenset())
     assert [access.admits(one) for one in (TOKEN, None, "x", "\udcff")] == [True, False, False, False]
     assert len(compared) == 4
@@ -300,7 +301,7 @@ def test_only_the_value_of_an_element_can_be_changed(serving: Serving) -> None:
         assert eventually(lambda: studio.window.project.settings.robot == "kr5")
         for count, value in enumerate(("../../etc/passwd", "/etc/passwd", "C:\\x", "a\nb"), 1):
             send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": value})
-            assert eventually(lambda wanted=count: studio.window._notices.content.count("no place") == wanted)  # type: ignore[misc]
+            assert eventually(lambda wanted=count: studio.window._notices.content.count("no place") == wanted)
         send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": "<script>alert(1)</script>"})
         assert eventually(lambda: "script" in studio.window.project.settings.robot)
     shown = [getattr(one, "content", "") for one in studio.window.gui._gui_input_handle_from_uuid.values()]
@@ -395,7 +396,7 @@ def test_the_same_refusal_is_said_once_in_a_second(monkeypatch: pytest.MonkeyPat
     said: list[str] = []
     gate = Gate(Access("127.0.0.1", 1, None, frozenset()), said.append)
     now = [0.0]
-    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
     for moment in (0.0, 0.5, 1.5):
         now[0] = moment
         gate._tell("refused: it")
@@ -508,3 +509,10 @@ def test_many_windows_at_once_are_served(serving: Serving) -> None:
     for thread in threads:
         thread.join()
     assert len(seen) == 8
+
+
+def test_every_list_offers_texts_that_are_not_empty_as_others_would_stop_the_page(serving: Serving) -> None:
+    handles = serving().window.gui._gui_input_handle_from_uuid.values()
+    lists = [handle.options for handle in handles if hasattr(handle, "options")]
+    assert len(lists) > 8
+    assert all(isinstance(option, str) and option for options in lists for option in options)

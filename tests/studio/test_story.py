@@ -224,7 +224,7 @@ def test_a_calibration_is_cancelled_and_leaves_the_old_result(person: Person) ->
     assert not person.studio.window.busy
 
 
-def test_reopened_it_shows_what_it_showed(person: Person, tmp_path: Path) -> None:
+def test_reopened_it_shows_what_it_showed(person: Person, chromium: Any, tmp_path: Path) -> None:
     folder = shutil.copytree(person.studio.window.project.folder, tmp_path / "copy")
     again = serve(folder, port=0)
     try:
@@ -235,5 +235,11 @@ def test_reopened_it_shows_what_it_showed(person: Person, tmp_path: Path) -> Non
         assert "before (60)" in proof._table.content  # type: ignore[attr-defined]
         assert proof._table.content == other._table.content  # type: ignore[attr-defined]
         assert proof._notices.content == other._notices.content  # type: ignore[attr-defined]
+        page = chromium.new_page(viewport={"width": 800, "height": 600})
+        one = Person(page, again, tmp_path)
+        one.turn_to("Proof")
+        one.wait_for("after, held out (60)")
+        assert one.faults == []
+        page.close()
     finally:
         again.stop()

@@ -1,7 +1,7 @@
 """What long actions do: each calls one job, as the command of its name does in the project's folder.
 
-They read files of the project alone, and run in a process of their own (:mod:`truearm.studio.work`), whose working folder is the project's. So what they
-write is, to the byte, what the command writes there.
+They read files of the project alone, and run in a process of their own (:mod:`truearm.studio.work`), whose working
+folder is the project's. So what they write is, to the byte, what the command writes there.
 """
 
 from __future__ import annotations

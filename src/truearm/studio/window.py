@@ -95,7 +95,7 @@ class Window:
         return called
 
     def settled(self, do: Callable[[], None]) -> Callable[[Any], None]:
-        """Return a callback as :meth:`action` does, for a text that somebody types: `do` waits for the typing to rest."""
+        """Return a callback as :meth:`action` does, for a text that somebody types: it waits for the typing to rest."""
         act, waiting = self.action(do), list[threading.Timer]()
 
         def called(event: Any) -> None:
@@ -246,7 +246,7 @@ class Window:
         self._stopped.set()
         if self._work is not None:
             self._work.cancel()
-        self.server.stop()  # type: ignore[no-untyped-call]
+        self.server.stop()
 
     # The frame ---------------------------------------------------------------------------------------------------
 

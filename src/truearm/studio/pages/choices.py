@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Final
 
-#: What stands in a list where nothing is chosen.
+#: What stands in a list where nothing is chosen: an empty text would stop the whole page.
 NONE: Final = "(none)"
 
 

@@ -32,7 +32,9 @@ class PlanPage:
         gui = window.gui
         self._poses: Any = gui.add_text("Poses", "60", hint="how many to choose, or auto")
         self._model: Any = gui.add_dropdown("Model", tuple(model.name for model in MODELS), initial_value="geometric")
-        self._device: Any = gui.add_dropdown("Instrument", (NONE, *DEVICES), hint="none: all targets everywhere")
+        self._device: Any = gui.add_dropdown(
+            "Instrument", (NONE, *(device.name for device in DEVICES)), hint="none: all targets everywhere"
+        )
         self._noise: Any = gui.add_number("Noise [mm]", 0.1, min=0.0001, max=10.0, step=0.01)
         self._candidates: Any = gui.add_number("Candidates", 1000, min=10, max=20000, step=10)
         self._seed: Any = gui.add_number("Seed", 0, min=0, step=1)

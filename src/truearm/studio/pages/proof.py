@@ -13,7 +13,7 @@ from truearm.files import exists, read_text
 from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES
 from truearm.studio import words
-from truearm.studio.pages.choices import offer
+from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.error_arrows import ErrorArrows
 from truearm.studio.pictures import Picture
 from truearm.studio.window import Window
@@ -35,7 +35,7 @@ class ProofPage:
         self._figures: dict[str, Any] = {}
         self._shown: tuple[Any, ...] = ()
         self._table = gui.add_html("")
-        self._picture = gui.add_dropdown("Picture", ("",), visible=False)
+        self._picture = gui.add_dropdown("Picture", (NONE,), visible=False)
         self._drawn = Picture(window, "Picture")
         self._files = gui.add_button_group("Download", RESULT_FILES[:3], visible=False)
         self._arrows = ErrorArrows(window)

@@ -181,3 +181,14 @@ def test_a_misspelt_target_is_told() -> None:
     assert "B is there twice at 7, and A not at all" in found["target-misspelt"].message
     other = renamed(data, first_of[3:5], "spare-marker")
     assert "target-misspelt" not in {n.code for n in check(None, other).warnings}
+
+
+def test_positions_that_a_controller_computed_are_told() -> None:
+    robot = load_robot(ROBOT)
+    joints = honest().joints
+    positions = np.round(robot.forward(joints)[0], 5)
+    found = {n.code: n for n in check(ROBOT, Dataset.of(joints, positions)).warnings}
+    assert found["positions-computed"].level == "warning"
+    assert "computes such positions from its joints" in found["positions-computed"].message
+    few = Dataset.of(joints[:9], positions[:9])
+    assert "positions-computed" not in {n.code for n in check(ROBOT, few).warnings}

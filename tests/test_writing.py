@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from truearm.errors import InputError
-from truearm.manifest import MANIFEST
+from truearm.manifest import MANIFEST, UNFINISHED
 from truearm.writing import output_folder, write_files, write_text
 
 
@@ -82,3 +82,19 @@ def test_a_file_in_the_folder_that_was_not_written_there_by_us_is_not_replaced(t
     (tmp_path / "report.html").write_text("mine")
     with pytest.raises(InputError, match=r"report\.html: this exists already, was not written here by truearm"):
         output_folder(tmp_path, ["a", "b", "report.html"], ours=True)
+
+
+def test_an_interrupt_behind_the_mark_puts_back_the_old_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a").write_text("old")
+    right = os.fsync
+
+    def fails(handle: int) -> None:
+        if (tmp_path / UNFINISHED).exists() and not (tmp_path / MANIFEST).exists():
+            monkeypatch.undo()
+            raise KeyboardInterrupt
+        right(handle)
+
+    monkeypatch.setattr(os, "fsync", fails)
+    with pytest.raises(KeyboardInterrupt):
+        write_files(tmp_path, {"a": "new", "b": "new"})
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "old"}

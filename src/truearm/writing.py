@@ -315,10 +315,12 @@ def _replace(folder: Path, contents: Mapping[Path, bytes], command: str | None) 
                 staged[mark] = _temporary(mark)
                 _write(staged[mark], unfinished_text(Unfinished(_file_set(folder, contents, command), *names)).encode())
                 _synchronise(contents)
-                staged[mark].replace(mark)
-                del staged[mark]
-                _synchronise([mark])
         try:
+            if mark in staged:
+                with _refusals_at(mark):
+                    staged[mark].replace(mark)
+                    del staged[mark]
+                    _synchronise([mark])
             for target, temporary in staged.items():
                 with _refusals_at(target):
                     temporary.replace(target)

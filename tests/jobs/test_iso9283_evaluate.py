@@ -254,9 +254,10 @@ def test_times_may_be_in_other_units_that_the_header_names(small: Arguments, tmp
             cells[place] = repr(1e3 * float(cells[place])) if cells[place] else ""
             made.append(",".join(cells))
         (tmp_path / f"{name}-ms.csv").write_text("\n".join(made) + "\n")
-        first: Arguments = {name: small[name], "alignment": small["alignment"]}
-        second: Arguments = {**first, name: tmp_path / f"{name}-ms.csv"}
-        one, other = (truearm.iso9283_evaluate(small["plan"], **given) for given in (first, second))
+        one, other = (
+            truearm.iso9283_evaluate(**{"plan": small["plan"], "alignment": small["alignment"], name: file})
+            for file in (small[name], tmp_path / f"{name}-ms.csv")
+        )
         assert [value.value for value in one.values] == pytest.approx([v.value for v in other.values], nan_ok=True)
 
 

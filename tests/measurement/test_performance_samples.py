@@ -173,3 +173,24 @@ def test_too_many_samples_and_empty_files_are_refused(
     assert "the file is empty" in refused(empty)
     empty.write_bytes(HEADER.encode() + b"\nAT,line,1,0,1,2,3\nAT,li\xff")
     assert "line 3: the file is not UTF-8 text" in refused(empty)
+
+
+def test_lines_that_end_in_a_carriage_return_alone_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "paths.csv"
+    path.write_bytes("\r".join([HEADER, *ROWS, ""]).encode())
+    samples = read_path_samples(path)
+    assert samples.line.tolist() == [2, 3, 4, 5]
+    assert samples.time.tolist() == [0.0, 0.001, 0.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("AT,line,1,0.002,1\r5,2,3,\r", "line 3: the cells of the row cannot be read; got a carriage return within it"),
+        ('AT,"' + 140_000 * "x" + '",1,0.002,1,2,3', "line 3: the cells of the row cannot be read; got field larger"),
+    ],
+)
+def test_cells_that_cannot_be_read_are_refused_with_their_line(tmp_path: Path, row: str, said: str) -> None:
+    path = tmp_path / "paths.csv"
+    path.write_bytes("\n".join([HEADER, ROWS[0], row, ""]).encode())
+    assert said in refused(path)

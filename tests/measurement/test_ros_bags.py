@@ -128,6 +128,37 @@ def test_wild_samples_are_set_aside_and_told(tmp_path: Path) -> None:
     np.testing.assert_allclose(read.data.position, places, atol=2e-5)
 
 
+def test_wild_samples_of_a_slow_camera_are_set_aside(tmp_path: Path) -> None:
+    times, joints, seen, positions, turns = recorded(pose_rate=7.0, stand=3.0)
+    positions[[8, 12]] += [0.3, 0.0, 0.0]
+    bag = write_ros2(tmp_path / "two", [*joint_messages(times, joints), *target_messages(seen, positions, turns)])
+    assert "2 samples set aside" in str(truearm.import_ros(bag).lines())
+    positions[[5, 7, 9]] += [0.0, 0.3, 0.0]
+    bag = write_ros2(tmp_path / "five", [*joint_messages(times, joints), *target_messages(seen, positions, turns)])
+    assert refused(bag, "too many samples of a standstill are wild")
+
+
+def test_pauses_that_are_no_standstills_are_said(tmp_path: Path) -> None:
+    assert refused(write_ros2(tmp_path / "all", [*OF_JOINTS, *OF_TARGET]), "never stands still", hold=2.5)
+    start = 4 * 3.0
+    creeping = JOINTS + np.where((TIMES > 2.95) & (TIMES < 5.05), np.radians(0.05) * (TIMES - 2.95), 0.0)[:, None]
+    hidden = (TIMES < 8.5) | (start < TIMES)
+    messages = joint_messages(TIMES[hidden], creeping[hidden])
+    read = truearm.import_ros(write_ros2(tmp_path / "some", [*messages, *OF_TARGET]))
+    assert read.data.labels == ("1", "3", "5")
+    assert read.data.approach is not None
+    np.testing.assert_array_equal(read.data.approach, 0.0)
+    assert "2 pauses without a standstill, at 2.9 s, 8.5 s" in str(read.lines())
+    slow = (
+        np.radians(0.1)
+        * np.cumsum(np.abs(np.diff(JOINTS[:, :1], axis=0, prepend=JOINTS[:1, :1])) < 1e-4)[:, None]
+        / 100
+    )
+    crept = JOINTS + np.where(TIMES[:, None] < 10.0, slow, slow[1000])
+    bag = write_ros2(tmp_path / "most", [*joint_messages(TIMES, crept), *OF_TARGET])
+    assert refused(bag, "most pauses of the robot are no standstills").parameter == "hold"
+
+
 def test_clocks_that_differ_are_told(tmp_path: Path) -> None:
     for late in (0.8, -0.7, 1.6):
         _, _, seen, positions, turns = recorded(late=late)

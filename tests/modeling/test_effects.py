@@ -258,6 +258,7 @@ NAMED_ELSEWHERE = {
     "results/tilting.py": "what the method with inclinometers finds, in words",
     "reporting/tilting_report.py": "and its pictures",
     "studies/": "a study chooses models as its document does",
+    "planning/driving/": "a stop of a tour is called like an effect",
     "planning/iso9283/": "a criterion of ISO 9283 is called like an effect",
     "validation/iso9283/": "and its value",
     "measurement/performance/": "and what is measured for it",

@@ -44,7 +44,7 @@ def rows(
     test: str, pose: list[str], cycle: list[int], position: Array, rotation: Array | None = None, **more: list[str]
 ) -> AttainedPoses:
     n = len(pose)
-    texts = {name: Names.of(more.get(name, [""] * n)) for name in ("robot", "approach")}
+    robot, approach = (Names.of(more.get(name, [""] * n)) for name in ("robot", "approach"))
     return AttainedPoses(
         criterion=Names.of([test] * n),
         pose=Names.of(pose),
@@ -56,7 +56,8 @@ def rows(
         rotation=rotation,
         line=np.arange(2, n + 2),
         source="poses.csv",
-        **texts,
+        robot=robot,
+        approach=approach,
     )
 
 

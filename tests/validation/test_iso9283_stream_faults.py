@@ -129,6 +129,7 @@ def test_a_record_that_jumps_and_stays_there_is_to_be_measured_again() -> None:
     samples = runs()
     text = refusal_of_path(moved(samples, slice(60, int((samples.cycle == 1).sum())), 0.03))
     assert "lines 61 and 62: cycle 1 of AT on line jumps" in text
+    assert "Check that times are in seconds." in text
     assert "measure the cycle again" in text
 
 

@@ -7,9 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, get_args
 
-import numpy as np
-
-from truearm.errors import refusals_of
+from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
     command_argument,
@@ -20,17 +18,22 @@ from truearm.jobs.arguments import (
     progress_argument,
     python_call,
 )
+from truearm.manifest import written_differently
 from truearm.measurement.readers.performance_poses import read_attained_poses, read_pushes
 from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
 from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.planning.poses.iso9283 import Cube
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
 from truearm.results.iso9283_notices import copied_notices, cube_notices, cycle_notices, row_notices
 from truearm.validation.iso9283.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.copied import copied_blocks
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
+from truearm.validation.iso9283.said_of_drift import said_of_drift
+from truearm.validation.iso9283.said_of_pushes import said_of_pushes
+from truearm.validation.iso9283.said_of_rounding import said_of_rounding
 from truearm.validation.iso9283.said_of_streams import said_of_streams
 from truearm.validation.iso9283.values import Component, Instrument
 
@@ -110,12 +113,16 @@ def iso9283_evaluate(
         with refusals_of(name):
             read[name] = _READERS[name](file)
     if tie is not None and read:
-        positions = np.concatenate([one.position for one in read.values()])
-        with refusals_of("alignment"):
-            refuse_implausible(tie, planned.cube, positions, str(tie_path))
+        _refuse_far_files(tie, planned.cube, read, str(tie_path))
     instrument = Instrument(sigma, sigma_rot)
     found = evaluated(planned, Measurements(**read), tie, instrument, progress)
-    made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(planned, found, read), inputs)
+    warnings = (
+        *_warnings(planned, found, read, instrument),
+        *_of_plan(plan_path),
+        *said_of_pushes(planned, found.pushes, instrument),
+        *said_of_drift(planned, found.drift),
+    )
+    made = Iso9283Evaluation(planned, found, instrument, None, call, warnings, inputs)
     if other is not None:
         with refusals_of("compare"):
             made = replace(made, comparison=compared(made.summary(), other))
@@ -124,6 +131,30 @@ def iso9283_evaluate(
         progress("writing the report")
         made.save(folder)
     return made
+
+
+def _refuse_far_files(tie: Alignment, cube: Cube, read: Mapping[str, Any], where: str) -> None:
+    """Refuse a tie with which every file lies far from the cube, and a file that alone does so."""
+    far: dict[str, InputError] = {}
+    for name, one in read.items():
+        try:
+            with refusals_of("alignment"):
+                refuse_implausible(tie, cube, one.position, where)
+        except InputError as refusal:
+            far[name] = refusal
+    if not far:
+        return
+    name, first = next(iter(far.items()))
+    if len(far) == len(read):
+        raise first
+    raise InputError(
+        "this file lies far from the cube of the tests, where others do not",
+        parameter=name,
+        where=read[name].source,
+        came=first.came,
+        allowed=first.allowed,
+        cure="Check the units in its header, and that it was read in the same frame as the others.",
+    )
 
 
 _COMPONENTS: Final = get_args(Component)
@@ -135,7 +166,9 @@ _READERS: Final[Mapping[str, Callable[[Path], object]]] = {
 }
 
 
-def _warnings(plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any]) -> tuple[Notice, ...]:
+def _warnings(
+    plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any], instrument: Instrument
+) -> tuple[Notice, ...]:
     notices: list[Notice] = []
     if not found.alignment.is_standard:
         notices.append(
@@ -167,16 +200,48 @@ def _warnings(plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any])
                 "They say more about the measurement than about the robot.",
             )
         )
-    return (*notices, *said_of_streams(found))
+    return (*notices, *said_of_streams(found), *said_of_rounding(found, instrument))
 
 
-def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
-    if made.comparison is None or not made.comparison.left_out:
+def _of_plan(path: Path) -> tuple[Notice, ...]:
+    """Return that a plan was changed since truearm wrote it, where its manifest says so."""
+    try:
+        if not written_differently(path):
+            return ()
+    except InputError:  # what stands beside it is no manifest of truearm
         return ()
     return (
         Notice(
-            "alignment-differs",
-            f"The two results were tied to the base in different ways: {', '.join(made.comparison.left_out)} are not "
-            "compared.",
+            "plan-changed",
+            f"{path.name} was changed since truearm wrote it, and programs and sheet beside it are not those of this "
+            "plan. Values are held against what it says now.",
+            "note",
         ),
     )
+
+
+def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
+    beside = made.comparison
+    if beside is None:
+        return ()
+    notices = []
+    if beside.left_out:
+        notices.append(
+            Notice(
+                "alignment-differs",
+                f"The two results were tied to the base in different ways: {', '.join(beside.left_out)} are not "
+                "compared.",
+            )
+        )
+    if beside.unlike:
+        told = "; ".join(f"{', '.join(ids)}: {why}" for why, ids in beside.unlike.items())
+        notices.append(Notice("plan-differs", f"Values that are not alike are not compared. {told}."))
+    if beside.unknown_plan:
+        notices.append(
+            Notice(
+                "plan-unknown",
+                "The other result does not say what was planned, as it was written by an older version: whether poses, "
+                "paths, tip and limit band were the same cannot be told. Evaluate its files again.",
+            )
+        )
+    return tuple(notices)

@@ -96,7 +96,7 @@ def _table(found: Recording) -> Figures:
     )
     rows = [
         (
-            str(number),
+            found.data.labels[number - 1],
             f"{still.start:.2f}",
             f"{still.end:.2f}",
             target.target,

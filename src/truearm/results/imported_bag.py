@@ -13,7 +13,7 @@ from truearm.measurement.bags.recording import Recording
 from truearm.measurement.bags.standstills import Sighting
 from truearm.measurement.dataset import Dataset
 from truearm.results.record import Record, joints_lines
-from truearm.shown import counted
+from truearm.shown import counted, listed
 from truearm.writing import output_file, write_files
 
 #: What the page beside the measurements ends with.
@@ -64,6 +64,7 @@ class ImportedBag(Record):
                 for target, row in zip(found.targets, found.sightings, strict=True)
             ],
             "standstills_s": [[still.start, still.end] for still in found.standstills],
+            "missed_pauses_s": list(found.missed),
             "declares_sigma": found.declares_sigma,
         }
 
@@ -85,6 +86,12 @@ class ImportedBag(Record):
                 text.append(f"    {counted(aside, 'sample')} set aside, far from the others of their standstill")
             if target.lost:
                 text.append(f"    {counted(target.lost, 'message')} without numbers")
+        if found.missed:
+            when = listed([f"{at:.1f} s" for at in found.missed])
+            text.append(
+                f"  {counted(len(found.missed), 'pause')} without a standstill, at {when}: too short, creeping, or"
+            )
+            text.append("  the joints were not recorded. Each takes a number: the way to the next one is not known.")
         if not found.declares_sigma:
             text.append("  No deviations are declared: in a standstill all samples are the same.")
         return [*text, *joints_lines("controller" if self.data.joints_are == "controller" else "model")]

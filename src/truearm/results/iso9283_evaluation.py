@@ -14,6 +14,7 @@ from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_table import HEADING, UNITS, conditions_summary, counted_criteria, worst_places
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted
+from truearm.validation.iso9283.comparable import plan_summary
 from truearm.validation.iso9283.comparison import Comparison
 from truearm.validation.iso9283.evaluation import Evaluation
 from truearm.validation.iso9283.values import Conditions, Instrument, Value
@@ -77,6 +78,7 @@ class Iso9283Evaluation(Record):
                 "sigma_rot_deg": None if self.instrument.sigma_rot is None else math.degrees(self.instrument.sigma_rot),
             },
             "rated": {"load_kg": self.plan.rated_load, "velocity_mm_s": self.plan.rated_velocity * 1e3},
+            "plan": plan_summary(self.plan),
             "criteria": [value_summary(value) for value in self.values],
             **self._drawn(),
             **({} if self.comparison is None else {"comparison": self.comparison.summary()}),

@@ -65,6 +65,19 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
                 "may not hold. Look for play, or for something that changed during the test.",
             )
         )
+    if found.unusual.alike:
+        told = "; ".join(
+            f"{one.test}, {100 * one.velocity:g} %, load {100 * one.load:g} % (correlation {one.correlation:.2f}, of "
+            f"independent cycles up to {2 * one.usual:.2f})"
+            for one in found.unusual.alike[:_TOLD_PLACES]
+        )
+        notices.append(
+            Notice(
+                "cycles-alike",
+                f"Each cycle is like the one before it: {told}. Intervals assume that cycles are independent, and are "
+                "too narrow here. Let the robot warm up longer, and see whether robot or instrument creeps.",
+            )
+        )
     turned = [v for v in found.values if v.id == "AP" and v.quantity == "angle" and abs(v.value) > _FAR_TURNED]
     if turned:
         worst = max(turned, key=lambda value: abs(value.value))

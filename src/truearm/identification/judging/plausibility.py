@@ -15,7 +15,7 @@ from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.joint_rounding import check_rounding
 from truearm.identification.judging.slips import off_by, slips_by_fit, slips_in_lengths, slips_in_positions
 from truearm.identification.judging.wrong_robot import check_robot, other_robot
-from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.fit import Fit, identify, place
 from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
 from truearm.identification.start_values.from_readings import start_from_readings
@@ -48,6 +48,10 @@ _LIKE: Final = 0.75
 _MOST_TARGETS: Final = 40
 #: A fit whose median reading is off by less than this needs no explanation [m].
 _FITTED_WITHIN: Final = 3e-4
+#: No uncalibrated arm is as good as this, and no instrument at an arm's distance [m].
+_COMPUTED_WITHIN: Final = 2e-5
+#: Fewer configurations say nothing of that.
+_LEAST_COMPUTED: Final = 10
 #: Configurations whose joint positions are looked for among the others'.
 _MOST_LOOKED_AT: Final = 50
 #: What is said of a fixture is doubted beyond this many deviations.
@@ -102,10 +106,34 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
             *_often_off(data, off),
             *_one_point(fit, data),
             *check_rounding(fit, data),
+            *_computed(robot, data, off),
         ],
         suspects,
         fit,
     )
+
+
+def _computed(robot: Robot, data: Dataset, off: Array) -> list[Notice]:
+    """Return a notice if the uncalibrated robot fits better than any arm is: somebody computed the positions.
+
+    Parameters
+    ----------
+    off
+        By how much each reading is off after a calibration [m].
+    """
+    if robot.proof is not None or data.configurations < _LEAST_COMPUTED or np.nanmedian(off) > _COMPUTED_WITHIN:
+        return []
+    spread = errors_of(place(robot, data), data).position
+    if spread is None or spread.rms > _COMPUTED_WITHIN:
+        return []
+    return [
+        Notice(
+            "positions-computed",
+            f"{robot.name} misses the readings by {spread.rms * 1e3:.2g} mm before any calibration (root mean square). "
+            "No real arm and no instrument is as good: a controller computes such positions from its joints. Give "
+            "what an instrument measured.",
+        )
+    ]
 
 
 def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:

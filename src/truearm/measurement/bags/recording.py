@@ -9,11 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.bags.standstills import Sighting, Standstill, find_standstills, seen_at
+from truearm.errors import InputError
+from truearm.measurement.bags.standstills import Sighting, Standstill, find_standstills, missed_pauses, seen_at
 from truearm.measurement.bags.streams import JointStream, TargetStream
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of
 from truearm.modeling.controller import JointsOf
+from truearm.shown import counted, listed
 
 #: A smaller deviation is none: all samples are the same [m or rad].
 _EXACT: Final = 1e-8
@@ -29,6 +31,8 @@ class Recording:
         Its topics.
     standstills
         In order, one a configuration.
+    missed
+        When the robot paused, or may have, without a standstill that can be used [s].
     sightings
         Of each target in each standstill.
     data
@@ -38,6 +42,7 @@ class Recording:
     joints: JointStream
     targets: tuple[TargetStream, ...]
     standstills: tuple[Standstill, ...]
+    missed: tuple[float, ...]
     sightings: tuple[tuple[Sighting, ...], ...]
     data: Dataset
 
@@ -61,6 +66,8 @@ def found_in(
 ) -> Recording:
     """Return the standstills of a bag as measurements, numbered in the order of measurement.
 
+    A pause that is no standstill takes a number too: where the robot came from is not known after it.
+
     Parameters
     ----------
     bag
@@ -78,6 +85,17 @@ def found_in(
         :func:`~truearm.measurement.bags.standstills.seen_at`.
     """
     stills = find_standstills(joints, still, hold)
+    missed = missed_pauses(joints, stills)
+    if len(missed) > len(stills):
+        raise InputError(
+            "most pauses of the robot are no standstills",
+            parameter="hold",
+            where=f"{bag}, topic {joints.topic}",
+            came=f"{counted(len(stills), 'standstill')} and {counted(len(missed), 'other pause')}, at "
+            f"{listed([f'{at:.1f} s' for at in missed])}",
+            cure="They are shorter than `hold`, a joint moves more than `still` in them, or the joints were not "
+            "recorded. Allow more if these were the stops, or wait longer.",
+        )
     sightings = tuple(seen_at(stills, target, settle) for target in targets)
     rows = [
         (place, target, row[place])
@@ -104,7 +122,7 @@ def found_in(
         else None,
     )
     kinds = tuple("prismatic" if name in prismatic else "revolute" for name in joints.names)
-    labels = tuple(str(number) for number in range(1, len(stills) + 1))
+    labels = tuple(str(n + sum(at < s.start for at in missed)) for n, s in enumerate(stills, 1))
     positions = np.array([still.joints for still in stills])
     data = dataset_of(readings, Configurations(labels, positions, kinds, readings.configuration, joints_are))
-    return Recording(joints, tuple(targets), stills, sightings, data)
+    return Recording(joints, tuple(targets), stills, missed, sightings, data)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.bags.streams import JointStream, TargetStream
@@ -18,8 +19,9 @@ from truearm.modeling.chain import Array
 _FAR: Final = 6.0
 #: What is nearer to it than this always is one [m].
 _NEAR: Final = 2e-5
-#: More of them, as a share, and the target moved.
-_SET_ASIDE: Final = 0.05
+#: More of them at the ends, as a share, and the target moved; more of them anywhere, and they are no wild ones.
+_MOVED: Final = 0.05
+_SET_ASIDE: Final = 0.2
 _LEAST_SAMPLES: Final = 5
 #: A scatter above this share of the moves between standstills is motion.
 _MOVES: Final = 0.1
@@ -27,6 +29,9 @@ _MOVES: Final = 0.1
 _STANDS: Final = 1e-3
 #: In a whole standstill a joint may move so many times further than in its shortest part.
 _CREEP: Final = 3.0
+#: Slower than this share of the fast motions is a pause, if it lasts so long [s].
+_PAUSE: Final = 0.05
+_SHORTEST: Final = 0.3
 #: A part of the stream that takes so many times longer than its number of samples tells has a gap.
 _GAP: Final = 1.5
 
@@ -149,6 +154,24 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
     return tuple(found)
 
 
+def missed_pauses(stream: JointStream, stills: Sequence[Standstill]) -> tuple[float, ...]:
+    """Return when the robot paused without standing still: too short, creeping, or the joints were not recorded [s].
+
+    A pause is slower than a twentieth of the fast motions for 0.3 s and longer. A gap in the recording counts as one,
+    because nobody knows what the robot did in it.
+    """
+    times, positions = stream.times, stream.positions
+    usual = float(np.median(np.diff(times)))
+    span = max(round(_SHORTEST / 3.0 / usual), 1)
+    pace = np.abs(positions[span:] - positions[:-span]).max(axis=1) / np.maximum(times[span:] - times[:-span], usual)
+    slow = np.concatenate([[False], pace < _PAUSE * np.quantile(pace, 0.95), [False]])
+    begin, end = (np.flatnonzero(np.diff(slow.astype(int)) == step) for step in (1, -1))
+    pauses = [(float(times[i]), float(times[j - 1 + span])) for i, j in zip(begin, end, strict=True)]
+    missed = [a for a, b in pauses if b - a >= _SHORTEST and not any(s.start < b and a < s.end for s in stills)]
+    holes = np.flatnonzero(np.diff(times) > max(_SHORTEST, 10.0 * usual))
+    return tuple(sorted({*missed, *times[holes].tolist()}))
+
+
 def seen_at(stills: Sequence[Standstill], stream: TargetStream, settle: float) -> tuple[Sighting, ...]:
     """Return what was seen of a target in each standstill, its first and last `settle` seconds left out.
 
@@ -176,7 +199,7 @@ def seen_at(stills: Sequence[Standstill], stream: TargetStream, settle: float) -
 
 
 def _refuse_motion(
-    stills: Sequence[Standstill], stream: TargetStream, parts: Sequence[tuple[Array, Array | None, Array]]
+    stills: Sequence[Standstill], stream: TargetStream, parts: Sequence[tuple[Array, Array | None, NDArray[np.bool_]]]
 ) -> None:
     whole = [number for number, (part, _, _) in enumerate(parts) if len(part) >= _LEAST_SAMPLES]
     if not whole:
@@ -192,20 +215,35 @@ def _refuse_motion(
     moves = float(np.median(np.linalg.norm(np.diff(centres, axis=0), axis=1))) if len(whole) > 1 else 0.0
     for number in whole:
         part, _, far = parts[number]
-        off = float(far.mean())
         scatter = float(np.linalg.norm(part.std(axis=0)))
-        if off > max(_SET_ASIDE, 1.5 / len(far)) or (moves > _STANDS and scatter > _MOVES * moves):
+        inner = np.flatnonzero(~far)
+        at_ends = 1.0 - (inner[-1] - inner[0] + 1) / len(far)
+        moved = at_ends > max(_MOVED, 1.5 / len(far)) or (moves > _STANDS and scatter > _MOVES * moves)
+        if not moved and float(far.mean()) <= max(_SET_ASIDE, 1.5 / len(far)):
+            continue
+        where = (
+            f"topic {stream.topic}, standstill {number + 1}, {stills[number].start:.2f} s to "
+            f"{stills[number].end:.2f} s after the first message of the joints"
+        )
+        came = f"{100 * far.mean():.0f} % of the samples far from the others, which are scattered by "
+        came += f"{1e3 * scatter:.3g} mm"
+        if not moved:
             raise InputError(
-                "the target moves while the joints stand still",
-                parameter="times",
-                where=f"topic {stream.topic}, standstill {number + 1}, {stills[number].start:.2f} s to "
-                f"{stills[number].end:.2f} s after the first message of the joints",
-                came=f"{100 * off:.0f} % of the samples far from the others, the rest scattered by "
-                f"{1e3 * scatter:.3g} mm",
-                cure="If the clocks of the two topics differ, take the recorder's times: `times=bag`. If the arm "
-                "still shakes, leave out more of each standstill (`settle`). Record it again if somebody "
-                "touched the target.",
+                "too many samples of a standstill are wild",
+                where=where,
+                came=came,
+                allowed=f"{100 * _SET_ASIDE:.0f} %",
+                cure="See what the instrument took for the target, and record that configuration again.",
             )
+        raise InputError(
+            "the target moves while the joints stand still",
+            parameter="times",
+            where=where,
+            came=came,
+            cure="If the clocks of the two topics differ, take the recorder's times: `times=bag`. If the arm "
+            "still shakes, leave out more of each standstill (`settle`). Record it again if somebody "
+            "touched the target.",
+        )
 
 
 def _correlation_time(parts: Sequence[Array]) -> float:

@@ -72,6 +72,10 @@ class AttainedPoses:
         In the file, ``(n,)``.
     source
         The file, for messages.
+    resolution
+        Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
+    resolution_rot
+        The same of the components of quaternions.
     """
 
     criterion: Names
@@ -86,6 +90,8 @@ class AttainedPoses:
     rotation: Array | None
     line: NDArray[np.intp]
     source: str
+    resolution: float = 0.0
+    resolution_rot: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +118,8 @@ class Samples:
         In the file, ``(n,)``.
     source
         The file, for messages.
+    resolution
+        Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
     """
 
     criterion: Names
@@ -124,6 +132,7 @@ class Samples:
     rotation: Array | None
     line: NDArray[np.intp]
     source: str
+    resolution: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +153,8 @@ class Pushes:
         In the file, ``(n,)``.
     source
         The file, for messages.
+    resolution
+        Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
     """
 
     direction: Names
@@ -152,3 +163,4 @@ class Pushes:
     position: Array
     line: NDArray[np.intp]
     source: str
+    resolution: float = 0.0

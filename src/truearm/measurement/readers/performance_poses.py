@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.performance.records import AttainedPoses, Names, Pushes
+from truearm.measurement.performance.resolution import resolution_of
 from truearm.measurement.readers.cells import Cells
 from truearm.measurement.readers.columns import Columns, named_columns, read_named
 from truearm.measurement.readers.rows import unit_quaternions
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_from_quaternion
-from truearm.units import LENGTH_UNITS, TIME_UNITS
+from truearm.units import LENGTH_UNITS, TIME_UNITS, from_si
 
 #: Of drift, whose groups have the same cycles again.
 DRIFT: Final = "dAP"
@@ -66,9 +67,12 @@ def read_attained_poses(path: Path) -> AttainedPoses:
     time = np.full(len(cells.lines), np.nan)
     if "time" in columns:
         time = cells.numbers(*columns["time"], missing=True)
-    rotation = None
+    names = (criterion, robot, pose, approach)
+    group = _groups(*(one.code for one in names), velocity, load)
+    rotation, resolution_rot = None, 0.0
     if "qw" in columns:
         parts = np.column_stack([cells.numbers(*columns[part]) for part in _QUATERNION])
+        resolution_rot = resolution_of(parts, group)
         rotation = rotation_from_quaternion(unit_quaternions(parts, str(path), cells.lines))
     read = AttainedPoses(
         criterion=criterion,
@@ -83,6 +87,8 @@ def read_attained_poses(path: Path) -> AttainedPoses:
         rotation=rotation,
         line=np.array(cells.lines, dtype=np.intp),
         source=str(path),
+        resolution=_resolution(cells, columns, group),
+        resolution_rot=resolution_rot,
     )
     _refuse_repeated(read)
     return read
@@ -117,14 +123,31 @@ def read_pushes(path: Path) -> Pushes:
     _refuse_first(
         cells, columns, "force", force < 0, "the force is below zero", "0 N or more", "Its sense is the direction's."
     )
+    names = Names.of(directions)
     return Pushes(
-        direction=Names.of(directions),
+        direction=names,
         force=force,
         cycle=_cycles(cells, columns),
         position=_positions(cells, columns),
         line=np.array(cells.lines, dtype=np.intp),
         source=str(path),
+        resolution=_resolution(cells, columns, names.code),
     )
+
+
+def _groups(*columns: Array | NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return rows that are alike in some columns as numbers, ``(n,)``."""
+    number = np.unique(np.column_stack(columns), axis=0, return_inverse=True)[1]
+    return np.asarray(number, dtype=np.intp).ravel()
+
+
+def _resolution(cells: Cells, columns: Columns, group: NDArray[np.intp]) -> float:
+    """Return the step to which positions were rounded [m]."""
+    units = {columns[axis][1] for axis in _POSITION}
+    if len(units) > 1:
+        return 0.0
+    unit = units.pop()
+    return resolution_of(_positions(cells, columns) * from_si(1.0, unit), group) / from_si(1.0, unit)
 
 
 def _positions(cells: Cells, columns: Columns) -> Array:

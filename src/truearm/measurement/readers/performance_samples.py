@@ -18,12 +18,14 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, Words, nearest_names
 from truearm.files import read_bytes
 from truearm.limits import refuse_beyond
 from truearm.measurement.performance.records import Names, Samples
+from truearm.measurement.performance.resolution import resolution_of
 from truearm.measurement.readers.canonical import refuse_other_separators
 from truearm.measurement.readers.rows import unit_quaternions
+from truearm.measurement.readers.sample_times import refuse_out_of_order
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_from_quaternion
 from truearm.printable import is_one_line
@@ -105,6 +107,8 @@ def read_settling_samples(path: Path) -> Samples:
 
 def _read(path: Path, place: Place) -> Samples:
     content = read_bytes(path, "samples_size")
+    if b"\n" not in content:  # lines of old Macs end in a carriage return alone
+        content = content.replace(b"\r", b"\n")
     source = str(path)
     header, start = _header(content, source, place)
     refuse_beyond("samples_read", content.count(b"\n") - header.line, where=source)
@@ -216,7 +220,15 @@ def _not_utf8(source: str, line: int) -> InputError:
 
 def _cells(text: str, line: int, header: _Header) -> list[str]:
     """Return the cells of one row, quotes removed."""
-    cells = [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
+    try:
+        cells = [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
+    except csv.Error as error:
+        raise InputError(
+            "the cells of the row cannot be read",
+            where=f"{header.source}, line {line}",
+            came=Words("a carriage return within it" if "\r" in text.rstrip() else str(error)),
+            cure="Separate them by commas, end every line with a line feed, and close quotes.",
+        ) from error
     if len(cells) != header.count:
         raise InputError(
             "the row does not have as many cells as the header",
@@ -358,7 +370,7 @@ def _samples(
         q = unit_quaternions(numbers[:, [of[part] for part in _QUATERNION]], header.source, lines.tolist())
         rotation = rotation_from_quaternion(q)
     order = np.argsort(code, kind="stable")
-    _refuse_out_of_order(header, time, code, order, lines)
+    refuse_out_of_order(header.source, time, code, order, lines)
     labels = {name: [key[number] for key in keys] for number, name in enumerate(header.labels)}
 
     def column(name: str) -> Names:
@@ -381,25 +393,14 @@ def _samples(
         rotation=rotation,
         line=lines,
         source=header.source,
+        resolution=_resolution(header, numbers),
     )
 
 
-def _refuse_out_of_order(
-    header: _Header, time: Array, code: NDArray[np.intp], order: NDArray[np.intp], lines: NDArray[np.intp]
-) -> None:
-    """Refuse samples of one cycle, or of one stream, of which a later one has no later time."""
-    step = np.diff(time[order])
-    wrong = np.flatnonzero((np.diff(code[order]) == 0) & (step <= 0.0))
-    if not len(wrong):
-        return
-    before, after = order[wrong[0]], order[wrong[0] + 1]
-    twice = time[before] == time[after]
-    raise InputError(
-        "two samples of a cycle have the same time" if twice else "samples of a cycle are out of order",
-        where=f"{header.source}, lines {lines[before]} and {lines[after]}",
-        came=f"{time[before]:.9g} s, then {time[after]:.9g} s",
-        allowed="times that increase within a cycle, and within a stream without cycles",
-        cure="Remove the sample that was written twice."
-        if twice
-        else "Sort the rows by time, or give another cycle another number.",
-    )
+def _resolution(header: _Header, numbers: Array) -> float:
+    """Return the step to which positions were rounded [m]."""
+    units = {header.columns[axis][1] for axis in _POSITION}
+    if len(units) > 1:
+        return 0.0
+    columns = numbers[:, [header.numbers.index(axis) for axis in _POSITION]]
+    return resolution_of(columns, np.zeros(len(columns), dtype=np.intp)) / from_si(1.0, units.pop())

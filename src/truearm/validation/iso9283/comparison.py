@@ -13,7 +13,16 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from truearm.errors import InputError, Words
 from truearm.files import read_text
+from truearm.planning.iso9283.criteria import TEST_OF
 from truearm.printable import shortened
+from truearm.validation.iso9283.comparable import (
+    PlanOfResult,
+    Rated,
+    same_place,
+    unlike_bandwidths,
+    unlike_plans,
+    unlike_rated,
+)
 
 Verdict = Literal["smaller", "larger", "not told apart", "no interval"]
 
@@ -82,6 +91,10 @@ class Comparison:
         All values that both have.
     left_out
         Ids of criteria that were not compared, because the two were tied to the base in different ways.
+    unlike
+        Ids of criteria of which values were not compared, by why they were planned or read otherwise.
+    unknown_plan
+        Whether the other one does not say what was planned, as those of older versions.
     curves, offsets
         What is drawn of the other one: deviations along paths, and how far barycentres are from their commands [mm].
         Empty where it was written by an older version, or is tied in another way.
@@ -90,6 +103,8 @@ class Comparison:
     other: str
     rows: tuple[Compared, ...]
     left_out: tuple[str, ...] = ()
+    unlike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    unknown_plan: bool = False
     curves: Mapping[Key, Course] = field(default_factory=dict)
     offsets: Mapping[Key, tuple[float, ...]] = field(default_factory=dict)
 
@@ -99,6 +114,8 @@ class Comparison:
             "other": self.other,
             "values": [vars(row) for row in self.rows],
             "left_out": list(self.left_out),
+            "unlike": {why: list(ids) for why, ids in self.unlike.items()},
+            "unknown_plan": self.unknown_plan,
         }
 
     def lines(self) -> list[str]:
@@ -128,6 +145,7 @@ class _Entry(BaseModel):
     interval_95: tuple[float, float] | None
     conditions: dict[str, float | str]
     status: str
+    bandwidth_hz: Annotated[float, Field(allow_inf_nan=False, gt=0)] | None = None
 
 
 class _Tie(BaseModel):
@@ -157,6 +175,8 @@ class _Result(BaseModel):
     truearm: Literal["truearm-iso9283-result/1"]
     robot: str
     alignment: _Tie
+    rated: Rated | None = None
+    plan: PlanOfResult | None = None
     criteria: tuple[_Entry, ...]
     curves: tuple[_Curve, ...] = ()
     offsets: tuple[_Offset, ...] = ()
@@ -182,7 +202,7 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
     Raises
     ------
     InputError
-        If the file is no such result, or one of another robot, or both have no value of the same kind.
+        If the file is no such result, or one of another robot or another tip, or both have no value of the same kind.
     """
     text = read_text(other)
     try:
@@ -194,16 +214,31 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
         raise InputError(
             "the other result is of another robot", where=str(other), came=second.robot, allowed=first.robot
         )
+    if first.plan is not None and second.plan is not None and not same_place(first.plan.tip, second.plan.tip):
+        raise InputError(
+            "the other result is of another tip",
+            where=str(other),
+            came=Words(_tip_words(second.plan)),
+            allowed=_tip_words(first.plan),
+            cure="Compare results of one plan.",
+        )
     same_tie = first.alignment.kind == second.alignment.kind
     known = {_key(entry): entry for entry in second.criteria}
     rows: list[Compared] = []
     left: list[str] = []
+    unlike: dict[str, dict[str, None]] = {}
     for entry in first.criteria:
         beside = known.get(_key(entry))
         if beside is None or entry.value is None or beside.value is None:
             continue
         if entry.id in _TIED and not same_tie:
             left.append(entry.id)
+            continue
+        why = _unlike(first, second, entry.id, entry.where, entry.conditions)
+        if why is None and entry.id == "FV":
+            why = unlike_bandwidths(entry.bandwidth_hz, beside.bandwidth_hz)
+        if why is not None:
+            unlike.setdefault(why, {})[entry.id] = None
             continue
         under = ", ".join(_shown(name, value) for name, value in entry.conditions.items())
         verdict = _verdict(entry.value, entry.interval_95, beside.value, beside.interval_95)
@@ -214,15 +249,39 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
         raise InputError(
             "the two results have no value of the same kind",
             where=str(other),
-            cure="Evaluate the same criteria of both.",
+            came="; ".join(f"{', '.join(ids)}: {why}" for why, ids in unlike.items()) or None,
+            cure="Compare results of one plan." if unlike else "Evaluate the same criteria of both.",
         )
     curves = {
         key_of(one.id, one.where, one.conditions): Course(_numbers(one.along_mm), _numbers(one.distance_mm))
         for one in second.curves
+        if _unlike(first, second, one.id, one.where, one.conditions) is None
     }
-    offsets = {key_of(one.id, one.where, one.conditions): _numbers(one.offset_mm) for one in second.offsets}
+    offsets = {
+        key_of(one.id, one.where, one.conditions): _numbers(one.offset_mm)
+        for one in second.offsets
+        if _unlike(first, second, one.id, one.where, one.conditions) is None
+    }
     drawn = (curves, offsets) if same_tie else ({}, {})
-    return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)), *drawn)
+    told = {why: tuple(ids) for why, ids in unlike.items()}
+    return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)), told, second.plan is None, *drawn)
+
+
+def _unlike(first: _Result, second: _Result, id_: str, where: str, conditions: Mapping[str, float | str]) -> str | None:
+    """Return why a value of the two was planned otherwise, None if it was not, or that is not told."""
+    if id_ not in TEST_OF:
+        return None
+    why = None
+    if first.rated is not None and second.rated is not None:
+        why = unlike_rated(id_, conditions, first.rated, second.rated)
+    if why is None and first.plan is not None and second.plan is not None:
+        why = unlike_plans(id_, where, first.plan, second.plan)
+    return why
+
+
+def _tip_words(plan: PlanOfResult) -> str:
+    place = ", ".join(f"{value:.6g}" for value in plan.tip.points_mm[0]) if plan.tip.points_mm else "nothing"
+    return f"{place} mm in the flange frame"
 
 
 def _numbers(lengths: Sequence[float | None]) -> tuple[float, ...]:

@@ -2,7 +2,8 @@
 
 Public descriptions of ISO 9283:1998: the tip is pushed and pulled along each base axis in steps of a tenth of the rated
 load, and the displacement is given per force. Here it is the slope of a straight line through the steps of each cycle,
-along the force, so that the place of the unloaded tip and play at its first steps do not count as compliance.
+along the force, so that the place of the unloaded tip does not count. Play that the first step takes up is a part of
+the displacement, and of the slope: 20 um at the first of eleven steps to 29 N add 0.3 um/N.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ class PushLine:
     displacement
         Along the force, from where the line is without force [m], ``(n,)``.
     slope
-        [m/N].
+        Along the force [m/N].
+    slopes
+        Of all three coordinates in the base frame, ``(3,)`` [m/N].
     line
         Of each push in the file, ``(n,)``.
     """
@@ -54,6 +57,7 @@ class PushLine:
     force: Array
     displacement: Array
     slope: float
+    slopes: Array
     line: NDArray[np.intp]
 
 
@@ -84,10 +88,10 @@ def evaluate_pushes(
         along["xyz".index(direction[1])] = 1.0 if direction[0] == "+" else -1.0
         way = pushes.position @ (turn.T @ along)
         mine = pushes.direction.are(direction)
-        found = [
-            _line(pushes, direction, int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle)), way, instrument.sigma)
-            for cycle in np.unique(pushes.cycle[mine])
+        chosen = [
+            (int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle))) for cycle in np.unique(pushes.cycle[mine])
         ]
+        found = [_line(pushes, direction, cycle, rows, way, turn, instrument.sigma) for cycle, rows in chosen]
         slopes = np.array([line.slope for line in found])
         # What a reading leaves open of a slope, as the steps spread over the forces.
         unknown = max((instrument.sigma / _spread(line.force) for line in found), default=0.0)
@@ -116,7 +120,9 @@ def _spread(force: Array) -> float:
     return float(np.linalg.norm(force - force.mean()))
 
 
-def _line(pushes: Pushes, direction: str, cycle: int, rows: NDArray[np.intp], way: Array, sigma: float) -> PushLine:
+def _line(
+    pushes: Pushes, direction: str, cycle: int, rows: NDArray[np.intp], way: Array, turn: Array, sigma: float
+) -> PushLine:
     rows = rows[np.lexsort((way[rows], pushes.force[rows]))]
     force = pushes.force[rows]
     if not _spread(force) > 1e-9 * max(float(force.max()), 1.0):
@@ -139,7 +145,8 @@ def _line(pushes: Pushes, direction: str, cycle: int, rows: NDArray[np.intp], wa
             came=f"{1e3 * slope:.4g} mm/N",
             cure="Check the sign of the direction, and how the instrument was tied to the robot's base.",
         )
-    return PushLine(direction, cycle, force, moved - rest, slope, pushes.line[rows])
+    slopes = about @ (pushes.position[rows] - pushes.position[rows].mean(axis=0)) @ turn.T / (about @ about)
+    return PushLine(direction, cycle, force, moved - rest, slope, slopes, pushes.line[rows])
 
 
 def _check(plan: PerformancePlan, pushes: Pushes, directions: tuple[str, ...]) -> None:

@@ -19,6 +19,7 @@ from truearm.validation.iso9283.runs import Run, runs_of
 from truearm.validation.iso9283.smoothing import local_lines
 from truearm.validation.iso9283.streams import spans_of
 from truearm.validation.iso9283.synchronise import Cycle
+from truearm.validation.iso9283.tops import largest_top
 from truearm.validation.iso9283.values import COARSE, Instrument, Value
 
 #: Up to this share of the side behind it the tip is said to come from the corner.
@@ -64,6 +65,8 @@ class CornerCurves:
         Least distance from that corner [m], ``(cycles,)``.
     sparse
         Whether samples are too far apart for CR, and for CO.
+    noise
+        How far beyond the second side noise alone would seem to go, the most of the cycles [m].
     """
 
     where: str
@@ -79,6 +82,7 @@ class CornerCurves:
     aside: Array
     own: Array
     sparse: tuple[bool, bool]
+    noise: float
 
     @property
     def offset(self) -> float:
@@ -96,6 +100,8 @@ class _Turn:
         Between the samples at the corner [m].
     outside
         So many samples in a row are beyond the side about the one that is furthest.
+    noise
+        How far beyond the side noise alone would seem to go [m].
     """
 
     attained: Array
@@ -107,6 +113,7 @@ class _Turn:
     own: float
     spacing: float
     outside: int
+    noise: float
 
 
 def corner_values(
@@ -120,11 +127,12 @@ def corner_values(
     found: list[CornerCurves] = []
     for run in runs_of(plan, samples, transform, "CR"):
         for number in range(1, len(run.path.vertices) - 1):
-            here = _corner(run, number, max(plan.limit_band, 3 * instrument.sigma))
+            here = _corner(run, number, max(plan.limit_band, 3 * instrument.sigma), instrument.sigma)
             found.append(here)
             for id_, lengths, sparse in zip(("CR", "CO"), (here.rounding, here.overshoot), here.sparse, strict=True):
                 mean = float(lengths.mean())
                 coarse = instrument.sigma > COARSE * mean and (id_ == "CR" or mean > 0.0)
+                coarse |= id_ == "CO" and here.noise > COARSE * mean > 0.0
                 values.append(
                     Value(
                         id_,
@@ -143,12 +151,12 @@ def corner_values(
     return values, found
 
 
-def _corner(run: Run, number: int, band: float) -> CornerCurves:
+def _corner(run: Run, number: int, band: float, sigma: float) -> CornerCurves:
     path = run.path
     at = float(path.starts[number])
     before, after = path.tangents(np.array([at - 1e-6, at + 1e-6]))
     reach = (_AFTER * (at - float(path.starts[number - 1])), _AFTER * (float(path.starts[number + 1]) - at))
-    turns = [_cycle(cycle, run, at, before, after, reach, band) for cycle in run.cycles]
+    turns = [_cycle(cycle, run, at, before, after, reach, band, sigma) for cycle in run.cycles]
     rounding, overshoot = (np.array([getattr(turn, name) for turn in turns]) for name in ("rounding", "overshoot"))
     far = float(np.mean([turn.spacing for turn in turns])) > _SPARSE * float(rounding.mean())
     highest = max(turns, key=lambda turn: turn.overshoot)
@@ -166,11 +174,19 @@ def _corner(run: Run, number: int, band: float) -> CornerCurves:
         np.array([turn.aside for turn in turns]),
         np.array([turn.own for turn in turns]),
         (far, highest.outside < _LEAST_OUTSIDE if highest.overshoot > _NOTHING else far),
+        max(turn.noise for turn in turns),
     )
 
 
 def _cycle(
-    cycle: Cycle, run: Run, at: float, before: Array, after: Array, reach: tuple[float, float], band: float
+    cycle: Cycle,
+    run: Run,
+    at: float,
+    before: Array,
+    after: Array,
+    reach: tuple[float, float],
+    band: float,
+    sigma: float,
 ) -> _Turn:
     """Return a cycle near the corner."""
     near = np.flatnonzero((cycle.along > at - reach[0]) & (cycle.along < at + reach[1]))
@@ -187,7 +203,9 @@ def _cycle(
     aside = away - np.outer(away @ after, after)
     outside = behind & (aside @ before > 0)
     beyond = np.where(outside, np.linalg.norm(aside, axis=1), 0.0)
-    overshoot = float(beyond.max(initial=0.0))
+    raw_aside = position - corner - np.outer((position - corner) @ after, after)
+    first = int(behind.argmax()) if behind.any() else 0
+    overshoot, noise = largest_top(time[first:], raw_aside[first:], outside[first:], sigma)
     highest = [span for span in spans_of(beyond > 0.0) if span[0] <= int(beyond.argmax()) <= span[1]]
     kept = _kept(aside[along > _KEPT * reach[1]])
     kept_before = _kept((away - np.outer(away @ before, before))[along < -_KEPT * reach[0]])
@@ -208,6 +226,7 @@ def _cycle(
         float(_distance(smooth, corner + own).min()),
         max(float(np.median(steps[max(nearest - _ABOUT, 0) : nearest + _ABOUT + 1])), float(steps[nearest])),
         highest[0][1] - highest[0][0] + 1 if highest else 0,
+        noise,
     )
 
 

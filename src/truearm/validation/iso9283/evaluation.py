@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,7 @@ from truearm.validation.iso9283.missing import missing_places
 from truearm.validation.iso9283.paths import PathDeviations, path_values
 from truearm.validation.iso9283.pose_rows import best_fit_of
 from truearm.validation.iso9283.poses import PoseCloud, evaluate
+from truearm.validation.iso9283.read_places import refuse_other_push_place, refuse_other_rests
 from truearm.validation.iso9283.settling import SettlingCurve, settling_values
 from truearm.validation.iso9283.values import Conditions, Instrument, Quantity, Value
 from truearm.validation.iso9283.velocity import VelocityCurves, velocity_values
@@ -75,6 +76,8 @@ class Evaluation:
         Pushes far from the line of the others.
     missing
         Places that have no value in tests that were measured, in words.
+    readings
+        The instrument as its readings stand in each file: by the names of :class:`Measurements`.
     """
 
     values: tuple[Value, ...]
@@ -90,6 +93,7 @@ class Evaluation:
     unusual: UnusualRows = field(default_factory=UnusualRows)
     wild_pushes: tuple[WildPush, ...] = ()
     missing: tuple[str, ...] = ()
+    readings: Mapping[str, Instrument] = field(default_factory=dict)
 
 
 def evaluated(
@@ -142,35 +146,39 @@ def evaluated(
     settling: list[SettlingCurve] = []
     place = alignment.T_base_instrument
     transform: Array = homogeneous(place.rotation[None], np.array(place.translation)[None])[0]
+    readings = _readings(measured, instrument)
     if poses is not None:
         progress("poses")
-        of_poses = evaluate(plan, poses, alignment, instrument)
+        of_poses = evaluate(plan, poses, alignment, readings["poses"])
         values += of_poses.values
         clouds, drift = of_poses.clouds, of_poses.drift
         unusual, missing = of_poses.unusual, of_poses.missing
     if paths is not None:
+        reading = readings["paths"]
         tie = np.sqrt(np.diag(alignment.covariance_at(plan.cube.centre)))
         for test in ("AT", "AT-reorientation"):
             progress(TESTS[test].name)
-            found, courses = path_values(plan, paths, transform, instrument, test, tie, alignment.sigma_rot)
+            found, courses = path_values(plan, paths, transform, reading, test, tie, alignment.sigma_rot)
             values += found
             deviations += courses
         progress(TESTS["CR"].name)
-        found, corners = corner_values(plan, paths, transform, instrument)
+        found, corners = corner_values(plan, paths, transform, reading)
         values += found
         progress(TESTS["AV"].name)
-        found, velocities = velocity_values(plan, paths, transform, instrument)
+        found, velocities = velocity_values(plan, paths, transform, reading)
         values += found
         progress(TESTS["WS"].name)
-        found, weaves = weaving_values(plan, paths, transform, instrument)
+        found, weaves = weaving_values(plan, paths, transform, reading)
         values += found
     if measured.settling is not None:
         progress(TESTS["t"].name)
-        found, settling = settling_values(plan, measured.settling, transform, instrument)
+        found, settling = settling_values(plan, measured.settling, transform, readings["settling"])
+        refuse_other_rests(plan, settling, measured.settling.source)
         values += found
     if measured.forces is not None:
         progress(TESTS["compliance"].name)
-        stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, instrument)
+        refuse_other_push_place(plan, measured.forces, alignment.in_base(measured.forces.position))
+        stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, readings["forces"])
         values += stiff
     absent = missing_places(plan, values)
     values += [
@@ -194,9 +202,19 @@ def evaluated(
         tuple(settling),
         pushes,
         unusual,
-        wild_pushes(pushes, instrument),
+        wild_pushes(pushes, readings.get("forces", instrument)),
         (*missing, *dict.fromkeys(one.words for one in absent)),
+        readings,
     )
+
+
+def _readings(measured: Measurements, instrument: Instrument) -> dict[str, Instrument]:
+    """Return the instrument as its readings stand in each file, by the names of the files."""
+    made = {}
+    if measured.poses is not None:
+        made["poses"] = instrument.reading(measured.poses.resolution, measured.poses.resolution_rot)
+    rest = {"paths": measured.paths, "settling": measured.settling, "forces": measured.forces}
+    return made | {name: instrument.reading(one.resolution) for name, one in rest.items() if one is not None}
 
 
 def _nothing(criterion: str, test: PlannedTest) -> Value:

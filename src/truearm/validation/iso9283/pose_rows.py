@@ -18,6 +18,7 @@ from truearm.planning.iso9283.criteria import TEST_OF, TESTS
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.alignment import Alignment, best_fit
 from truearm.validation.iso9283.copied import refuse_copied_poses
+from truearm.validation.iso9283.drift_order import drift_order
 from truearm.validation.iso9283.orientation_check import refuse_far_orientations
 
 #: How far outside the cube is rounding [m].
@@ -208,8 +209,7 @@ def _name(names: Names, row: int) -> str:
 def _order(readings: AttainedPoses, rows: NDArray[np.intp], *, drift: bool) -> NDArray[np.intp]:
     """Return the order of the rows of a group, or refuse a cycle that it has twice."""
     if drift:
-        time = readings.time[rows]
-        return np.asarray(np.argsort(time, kind="stable") if np.isfinite(time).all() else np.arange(len(rows)))
+        return drift_order(readings, rows)
     order = np.argsort(readings.cycle[rows], kind="stable")
     cycle = readings.cycle[rows][order]
     twice = np.flatnonzero(cycle[1:] == cycle[:-1])

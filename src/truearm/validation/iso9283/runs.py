@@ -12,6 +12,7 @@ from truearm.errors import InputError, nearest_names
 from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.validation.iso9283.clock import clock_of
 from truearm.validation.iso9283.commanded import CommandedPath
 from truearm.validation.iso9283.orientation_check import refuse_far_orientations
 from truearm.validation.iso9283.streams import FoundStream, found_in
@@ -169,10 +170,11 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                     cure="Sample faster, or leave the cycle out.",
                 )
             position = in_base(transform, samples.position[rows])
-            wild = wild_steps(samples.time[rows], position, velocity)
+            clock = clock_of(samples.time[rows])
+            wild = wild_steps(clock.time, position, velocity)
             if wild.single:
-                refuse_wild(samples, rows, position, wild, number)
-            here = found_in(test, path, samples.time[rows], position, velocity)
+                refuse_wild(samples, rows, position, wild, number, clock)
+            here = found_in(test, path, clock.time, position, velocity)
             spans = here.cycles
             if number:
                 if len(spans) > 1:
@@ -200,7 +202,8 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                 place = f"{samples.source}, lines {samples.line[chosen[0]]} to {samples.line[chosen[-1]]}"
                 rotation = None if samples.rotation is None else transform[:3, :3] @ samples.rotation[chosen]
                 along = along_path(path, position[first : last + 1], place)
-                refuse_other_times(path, samples.time[chosen], along, velocity, place)
+                time = clock.time[first : last + 1]
+                refuse_other_times(path, time, along, velocity, place)
                 if rotation is not None:
                     commanded = path.rotations(along)
                     refuse_far_orientations(
@@ -209,12 +212,13 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                 cycles.append(
                     Cycle(
                         number or count,
-                        samples.time[chosen],
+                        time,
                         position[first : last + 1],
                         rotation,
                         along,
                         samples.line[chosen],
+                        clock,
                     )
                 )
-            refuse_wild(samples, rows, position, wild, number)
+            refuse_wild(samples, rows, position, wild, number, clock)
         yield Run(test, path, velocity, part.conditions, tuple(cycles), planned.cycles, found)

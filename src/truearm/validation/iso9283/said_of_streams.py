@@ -32,7 +32,7 @@ _ASIDE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class _Record:
-    """Cycles of one place that are compared with each other: lines, times, positions, and where in the cycle."""
+    """Cycles of one place that are compared with each other: lines, times, positions, where in the cycle, rounding."""
 
     name: str
     numbers: tuple[int, ...]
@@ -40,6 +40,7 @@ class _Record:
     times: tuple[Array, ...]
     positions: tuple[Array, ...]
     places: tuple[Array, ...]
+    rounding: float
 
 
 def said_of_streams(found: Evaluation) -> tuple[Notice, ...]:
@@ -64,6 +65,9 @@ def _runs(found: Evaluation) -> list[Run]:
 
 
 def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
+    of_paths, of_settling = (
+        found.readings[name].rounding if name in found.readings else 0.0 for name in ("paths", "settling")
+    )
     records = []
     for run in runs:
         cycles = run.cycles
@@ -71,7 +75,8 @@ def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
             continue
         numbers, lines = tuple(c.number for c in cycles), tuple(c.lines for c in cycles)
         times, positions = tuple(c.time for c in cycles), tuple(c.position for c in cycles)
-        records.append(_Record(_called(run), numbers, lines, times, positions, tuple(c.along for c in cycles)))
+        places = tuple(c.along for c in cycles)
+        records.append(_Record(_called(run), numbers, lines, times, positions, places, of_paths))
     settling: dict[tuple[object, ...], list[int]] = {}
     for row, curve in enumerate(found.settling):
         settling.setdefault((curve.test, curve.where, curve.conditions), []).append(row)
@@ -87,6 +92,7 @@ def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
                 tuple(c.time for c in curves),
                 tuple(c.position for c in curves),
                 tuple(c.time - begin for c, begin in zip(curves, half, strict=True)),
+                of_settling,
             )
         )
     return records
@@ -104,7 +110,7 @@ def _moving(along: Array, length: float) -> int:
 def _unusual(records: Sequence[_Record]) -> Notice | None:
     named = []
     for record in records:
-        for one in unusual_samples(record.times, record.positions, record.places):
+        for one in unusual_samples(record.times, record.positions, record.places, record.rounding):
             line = int(record.lines[one.cycle][one.sample])
             text = f"line {line} (cycle {record.numbers[one.cycle]} of {record.name}, {1e3 * one.distance:.2g} mm)"
             named.append((one.distance, text))

@@ -17,9 +17,11 @@ from truearm.errors import InputError
 from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.validation.iso9283.clock import Clock, clock_of
 from truearm.validation.iso9283.runs import LEAST_SAMPLES, Part, in_base, parts_of
 from truearm.validation.iso9283.smoothing import local_lines
 from truearm.validation.iso9283.streams import noise_of, spans_of
+from truearm.validation.iso9283.tops import TOP, top_of
 from truearm.validation.iso9283.values import COARSE, Conditions, Instrument, Status, Value
 from truearm.validation.iso9283.wild_samples import refuse_wild, wild_steps
 
@@ -31,9 +33,6 @@ _QUIET = 0.02
 _LEAST_OUTSIDE = 4
 #: Samples that a period of the oscillation has, and the time from the first entry to the final stay, or more.
 _LEAST_SAMPLES = 8
-#: How far an overshoot goes is read from a parabola through the samples within this share of its width at half its
-#: height, a third of a period.
-_TOP = 1 / 6
 #: The begin of a motion is read between these distances, in shares of the band and of the way, and as many standard
 #: deviations of the noise: powers of the time that it may grow with.
 _EARLY, _LATE, _OF_WAY, _ABOVE_NOISE = 0.25, 4.0, 0.15, 5.0
@@ -73,6 +72,8 @@ class SettlingCurve:
         In the base frame [m], ``(n, 3)``.
     lines
         Of the samples in the file, ``(n,)``.
+    clock
+        That of the record.
     """
 
     test: str
@@ -91,6 +92,7 @@ class SettlingCurve:
     sparse: tuple[bool, bool]
     position: Array
     lines: NDArray[np.intp]
+    clock: Clock
 
 
 def settling_values(
@@ -172,10 +174,11 @@ def _cycle(
             allowed=f"{LEAST_SAMPLES} or more",
             cure="Sample faster and longer, or leave the cycle out.",
         )
-    time = samples.time[rows] - samples.time[rows[0]]
+    clock = clock_of(samples.time[rows])
+    time = clock.time - clock.time[0]
     position = in_base(transform, samples.position[rows])
     _refuse_other_times(time, position, at)
-    refuse_wild(samples, rows, position, wild_steps(time, position, None), number)
+    refuse_wild(samples, rows, position, wild_steps(time, position, None), number, clock)
     band = plan.limit_band
     distance = np.asarray(np.linalg.norm(position - _final(position), axis=1))
     outside = _outside(distance, band, sigma)
@@ -205,8 +208,10 @@ def _cycle(
     overshoot, width, open_ = 0.0, np.inf, 0.0
     step = float(np.median(np.diff(time)))
     if outside[entered + 1 :].any():
-        overshoot, width = _top(time, position - _final(position), entered + 1 + int(later.argmax()))
-        window = _window(step, 2 * _TOP * width, sigma, band)
+        # what is before the first entry is the way to the pose, and no part of an excursion
+        since = slice(entered + 1, None)
+        overshoot, width = top_of(time[since], (position - _final(position))[since], int(later.argmax()), sigma)
+        window = _window(step, 2 * TOP * width, sigma, band)
         left = sigma * np.sqrt(step / max(window, step))
         narrow, stay, wide = (_stay(time, position, band + off, sigma, window) for off in (-2 * left, 0.0, 2 * left))
         stay, open_ = max(stay, entry), narrow - wide
@@ -215,9 +220,11 @@ def _cycle(
     speed = (distance[entered] - distance[entered + 1]) / (time[entered + 1] - time[entered])
     start = _start(time, position, band)
     settled = stay - entry
+    rounded = 2.0 * clock.sigma
     posing = stay - start
     if test == "posing-time":
         coarse = sparse = (step > COARSE * posing, False)
+        coarse = (coarse[0] or rounded > COARSE * posing, False)
     else:
         crossing = 2 * band / max(float(speed), 1e-12)
         slow = step > COARSE * crossing if settles else _LEAST_SAMPLES * step > min(settled, 3 * width)
@@ -227,7 +234,10 @@ def _cycle(
         blurred = not settles and overshoot - band < 3 * sigma
         # noise may put an excursion inside the band, or outside of it
         sparse = (slow, slow or few)
-        coarse = (slow or open_ > COARSE * settled, slow or few or blurred)
+        coarse = (
+            slow or blurred or (not settles and rounded > COARSE * settled) or open_ > COARSE * settled,
+            slow or few or blurred,
+        )
     where = part.place
     if test == "posing-time":
         planned = plan.test(test)
@@ -250,6 +260,7 @@ def _cycle(
         sparse,
         position,
         samples.line[rows],
+        clock,
     )
 
 
@@ -280,28 +291,6 @@ def _refuse_away_again(time: Array, distance: Array, band: float, where: str, li
         allowed="one way to the pose in each cycle",
         cure="Give each way a number of its own in the column cycle; remove samples that the instrument read wrongly.",
     )
-
-
-def _top(time: Array, away: Array, peak: int) -> tuple[float, float]:
-    """Return how far an overshoot goes [m], and its width at half its height [s].
-
-    From a parabola through the samples about the largest: noise makes the largest of many too large, and the top may
-    lie between two samples.
-    """
-    along = away @ (away[peak] / np.linalg.norm(away[peak]))
-    half = 0.5 * along[peak]
-    first = int(np.flatnonzero(np.append(True, along[:peak] < half))[-1])
-    below = np.flatnonzero(along[peak:] < half)
-    last = peak + int(below[0]) if len(below) else len(along) - 1
-    first = max(first - 1, 0)
-    width = float(time[last] - time[first] - 0.5 * (time[last] - time[last - 1] + time[first + 1] - time[first]))
-    near = np.flatnonzero(np.abs(time - time[peak]) <= _TOP * width)
-    near = near if len(near) >= 3 else np.arange(max(peak - 1, 0), min(peak + 2, len(time)))
-    t = (time[near] - time[peak]) / max(float(np.abs(time[near] - time[peak]).max()), 1e-12)
-    a, b, c = np.polyfit(t, along[near], 2)
-    if a >= 0 or abs(b) > -2 * a:
-        return float(along[near].mean() if len(near) > 3 else along[peak]), width
-    return float(c - b * b / (4 * a)), width
 
 
 def _final(position: Array) -> Array:

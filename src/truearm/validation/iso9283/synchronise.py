@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
+from truearm.validation.iso9283.clock import Clock
 from truearm.validation.iso9283.commanded import CommandedPath
 
 #: Samples and places of the path that are compared with each other.
@@ -47,6 +48,8 @@ class Cycle:
         Arc length of the foot of each sample on the commanded path [m], ``(n,)``. It swings with the noise.
     lines
         Of the samples in the file, ``(n,)``.
+    clock
+        That of the record in which the cycle is.
     """
 
     number: int
@@ -55,6 +58,7 @@ class Cycle:
     rotation: Array | None
     along: Array
     lines: NDArray[np.intp]
+    clock: Clock
 
     @property
     def line(self) -> int:

@@ -25,6 +25,9 @@ _STRETCH, _LEAST_STRETCH = 3.0, 0.0025
 _GAP = 1.6
 #: Fewer cycles do not show what is usual.
 _LEAST_CYCLES = 3
+#: The place jumps by a step so many times as long as the usual one of so many before and behind it, and by so many
+#: standard deviations of noise besides.
+_JUMP, _ABOUT, _OF_STEP = 1.8, 4, 6.0
 #: What is the same in all cycles is seen at so many places at most.
 _GRID = 4000
 #: Of samples so near to each other the one that lies furthest apart is named.
@@ -48,7 +51,9 @@ class Unusual:
     distance: float
 
 
-def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: Sequence[Array]) -> list[Unusual]:
+def unusual_samples(
+    times: Sequence[Array], positions: Sequence[Array], places: Sequence[Array], rounding: float = 0.0
+) -> list[Unusual]:
     """Return samples that lie apart from those about them, as none does there in half of the cycles.
 
     Each sample is compared with a cubic through the two before it and the two behind it: as it is, and with what is the
@@ -61,6 +66,8 @@ def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: 
         Of each cycle [s], ``(n,)``, and [m], ``(n, 3)``.
     places
         What tells where in the cycle a sample is, such as the arc length of its foot, ``(n,)`` each.
+    rounding
+        What rounding in the file leaves open of each coordinate, as a standard deviation [m]: the noise is no less.
     """
     if len(times) < _LEAST_CYCLES:
         return []
@@ -68,9 +75,10 @@ def unusual_samples(times: Sequence[Array], positions: Sequence[Array], places: 
     if high <= low:
         return []
     stretches = _stretches(places, low, high)
-    noise = float(np.median([scatter_of(position) for position in positions]))
+    noise = max(float(np.median([scatter_of(position) for position in positions])), rounding)
     away, usual = _apart_in_all(times, positions, stretches)
-    other, usual_of_other = _apart_in_all(times, _without_common(positions, places, low, high), stretches)
+    less, compared = _without_common(positions, places, low, high, noise)
+    other, usual_of_other = _apart_in_all(times, less, stretches, compared)
     beyond = [one > np.maximum(_TIMES * there, there + _NOISE * noise) for one, there in zip(away, usual, strict=True)]
     for cycle, (one, there) in enumerate(zip(other, usual_of_other, strict=True)):
         least = np.maximum(_TIMES * there, there + _NOISE * noise)
@@ -97,10 +105,18 @@ def _stretches(places: Sequence[Array], low: float, high: float) -> list[NDArray
 
 
 def _apart_in_all(
-    times: Sequence[Array], values: Sequence[Array], stretches: Sequence[NDArray[np.intp]]
+    times: Sequence[Array],
+    values: Sequence[Array],
+    stretches: Sequence[NDArray[np.intp]],
+    compared: Sequence[NDArray[np.bool_]] | None = None,
 ) -> tuple[list[Array], list[Array]]:
-    """Return how far each sample is apart, and what half of the cycles do not exceed there, ``(n,)`` of each cycle."""
+    """Return how far each sample is apart, and what half of the cycles do not exceed there, ``(n,)`` of each cycle.
+
+    Those that are not `compared` are not apart.
+    """
     away = [_apart(time, value) for time, value in zip(times, values, strict=True)]
+    if compared is not None:
+        away = [np.where(one, far, 0.0) for one, far in zip(compared, away, strict=True)]
     most = np.zeros((len(times), 2 + max(int(stretch.max()) for stretch in stretches)))
     for cycle, stretch in enumerate(stretches):
         np.maximum.at(most[cycle], stretch, away[cycle])
@@ -109,18 +125,55 @@ def _apart_in_all(
     return away, [usual[stretch] for stretch in stretches]
 
 
-def _without_common(positions: Sequence[Array], places: Sequence[Array], low: float, high: float) -> list[Array]:
-    """Return positions less what half of the cycles have at the same place, ``(n, 3)`` of each."""
+def _without_common(
+    positions: Sequence[Array], places: Sequence[Array], low: float, high: float, noise: float
+) -> tuple[list[Array], list[NDArray[np.bool_]]]:
+    """Return positions less what half of the cycles have at the same place, ``(n, 3)``, and where that says something.
+
+    Where the place jumps, as that of the foot does when the tip passes the bisector of a corner on an arc, what is
+    common to the cycles is not known: a sample tells nothing from which the cubic of its neighbours passes a jump of
+    any cycle.
+    """
     grid = np.linspace(low, high, int(np.clip(2 * max(map(len, places)), 100, _GRID)))
     drawn = []
     for position, place in zip(positions, places, strict=True):
         order = np.argsort(place, kind="stable")
         drawn.append([np.interp(grid, place[order], position[order, axis]) for axis in range(3)])
     common = np.median(np.array(drawn), axis=0)
-    return [
+    jumps = np.concatenate([_jumps(place, noise) for place in places])
+    compared = [_beside(place, jumps) for place in places]
+    less = [
         position - np.column_stack([np.interp(place, grid, common[axis]) for axis in range(3)])
         for position, place in zip(positions, places, strict=True)
     ]
+    return less, compared
+
+
+def _jumps(place: Array, noise: float) -> Array:
+    """Return between which places a step along the way is much longer than those about it, ``(k, 2)``."""
+    steps = np.abs(np.diff(place))
+    if len(steps) <= 2 * _ABOUT:
+        return np.empty((0, 2))
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(steps, _ABOUT, mode="edge"), 2 * _ABOUT + 1)
+    usual = np.maximum(np.median(windows, axis=1), 0.1 * float(np.quantile(steps, 0.9)))
+    long = np.flatnonzero(steps > _JUMP * usual + _OF_STEP * noise)
+    return np.sort(np.column_stack([place[long], place[long + 1]]), axis=1)
+
+
+def _beside(place: Array, jumps: Array) -> NDArray[np.bool_]:
+    """Return which samples have neighbours none of which lies in a jump, or behind one, ``(n,)``."""
+    if not len(jumps):
+        return np.ones(len(place), dtype=bool)
+    # how many jumps begin before each sample, and how many end: in a jump there are more of the former
+    begun, ended = (np.searchsorted(np.sort(jumps[:, k]), place, side="right") for k in (0, 1))
+    first = np.searchsorted(np.sort(jumps[:, 0]), place, side="left")
+    inside = first > ended
+    near = np.pad(inside, 2)
+    n = len(place)
+    beside = np.any([near[k : k + n] for k in range(5)], axis=0)
+    far = np.pad(begun + ended, 2, mode="edge")
+    passed = np.ptp(np.array([far[k : k + n] for k in range(5)]), axis=0) > 0
+    return np.asarray(~(beside | passed))
 
 
 def _turns(position: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -84,10 +85,32 @@ class Instrument:
         Standard deviation of each coordinate [m].
     sigma_rot
         Of each angle [rad]; None where no orientation is read.
+    rounding, rounding_rot
+        What rounding in the file leaves open of each coordinate [m], and of each angle [rad], as standard deviations.
     """
 
     sigma: float
     sigma_rot: float | None = None
+    rounding: float = 0.0
+    rounding_rot: float = 0.0
+
+    def reading(self, resolution: float, resolution_rot: float = 0.0) -> Instrument:
+        """Return the same instrument as its readings stand in a file: what rounding leaves open is not known either.
+
+        A number rounded to q is off by q / sqrt(12), and an angle by twice that of the quaternion's components.
+
+        Parameters
+        ----------
+        resolution, resolution_rot
+            Steps to which positions [m] and components of quaternions were rounded.
+        """
+        one, other = resolution / math.sqrt(12.0), 2.0 * resolution_rot / math.sqrt(12.0)
+        turned = self.sigma_rot if self.sigma_rot is None else max(self.sigma_rot, other)
+        return Instrument(max(self.sigma, one), turned, one, other)
+
+    def least_scatter(self, share: float) -> tuple[float, float]:
+        """Return below what no scatter of coordinates [m] and angles [rad] is taken: a share of sigma, or rounding."""
+        return max(share * self.sigma, self.rounding), max(share * (self.sigma_rot or 0.0), self.rounding_rot)
 
 
 #: What is not known of a reading may be this share of a value.

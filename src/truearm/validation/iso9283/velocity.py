@@ -141,6 +141,7 @@ def _cycle(
     """
     time = cycle.time - cycle.time[0]
     step = float(np.median(np.diff(time)))
+    sigma = float(np.hypot(sigma, commanded * cycle.clock.sigma))
     longest = max(_LONGEST_WINDOW * (middle[1] - middle[0]) / commanded, 5 * step)
     # of a least-squares slope over T with samples every dt: sigma sqrt(12 dt / T^3)
     wanted = (12.0 * step * (sigma / (_QUIET * commanded)) ** 2) ** (1 / 3)
@@ -167,8 +168,11 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
     fluctuation = float(ranges.max())
     # the ends of the middle half are read with the noise of a smoothed position
     step = float(np.median(np.diff(curve.time[0])))
-    ends = instrument.sigma * np.sqrt(2.0 * min(1.0, step / float(curve.window.mean())))
-    noise_of_mean = v * ends / (curve.middle[1] - curve.middle[0])
+    clocks = [cycle.clock for cycle in run.cycles]
+    sigma = float(np.hypot(instrument.sigma, v * max(clock.sigma for clock in clocks)))
+    ends = sigma * np.sqrt(2.0 * min(1.0, step / float(curve.window.mean())))
+    pace = max(clock.pace for clock in clocks)
+    noise_of_mean = v * float(np.hypot(ends / (curve.middle[1] - curve.middle[0]), pace))
     coarse = n > 1 and 3 * noise_of_mean > COARSE * max(3 * spread, 1e-300)
     independent = max((curve.middle[1] - curve.middle[0]) / v / float(curve.window.mean()), 2.0)
     noise_range = float(2.0 * curve.noise.mean() * np.sqrt(2.0 * np.log(independent * max(n, 1))))

@@ -10,6 +10,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.performance.records import Samples
@@ -22,8 +23,18 @@ from truearm.validation.iso9283.values import COARSE, Instrument, Value
 
 #: A side is reached beyond this share of half the stroke.
 _SIDE = 0.4
-#: Turns on a side are read from so many samples about the outermost.
+#: A turn is first read over this share of the time that the tip is on its side, before and behind: an eighteenth of the
+#: period of a sine; then over less, until a parabola leaves no more than noise, times this, and what
+#: chance adds to few samples.
+_SHARE, _LEFT = 0.15, 1.0
+#: Median size of a standard normal number.
+_MEDIAN = 0.6745
+#: A turn is sharper than a parabola if its outermost sample is so many standard deviations of noise beyond.
+_SHARPER = 4.0
+#: Sharp turns on a side are read from so many samples about the outermost.
 _ABOUT = 2
+#: A parabola that is checked goes through so many samples or more.
+_LEAST_NEAR = 7
 #: Fewer samples in a period do not show how far it goes.
 _LEAST_SAMPLES = 20
 #: Whole periods that a cycle must have.
@@ -128,6 +139,7 @@ def _read(cycle: Cycle, across: Array, stroke: float, source: str) -> tuple[floa
     sides = state[last]
     turns = sorted([(*span, 1) for span in spans_of(sides == 1)] + [(*span, -1) for span in spans_of(sides == -1)])
     inner = turns[1:-1]
+    noise = float(np.median(np.abs(np.diff(across, n=3)))) / (_MEDIAN * np.sqrt(20.0))
     if len(inner) < 2 * _LEAST_PERIODS:
         raise InputError(
             "the weave has too few whole periods",
@@ -138,8 +150,8 @@ def _read(cycle: Cycle, across: Array, stroke: float, source: str) -> tuple[floa
         )
     outermost: dict[int, list[float]] = {1: [], -1: []}
     for first, final, sign in inner:
-        peak = first + int((sign * across[first : final + 1]).argmax())
-        outermost[sign].append(_top(time, sign * across, peak))
+        side = first + np.flatnonzero(sign * (across[first : final + 1] - middle) > _SIDE * half)
+        outermost[sign].append(_top(time, sign * across, side, noise))
     passages = []
     for (_, final, _), (first, _, _) in itertools.pairwise(turns):
         # sides keep their sign until the other side is reached: from the last sample beyond one to the first beyond
@@ -153,11 +165,40 @@ def _read(cycle: Cycle, across: Array, stroke: float, source: str) -> tuple[floa
     return reached, 1.0 / period, period / step
 
 
-def _top(time: Array, across: Array, peak: int) -> float:
-    """Return the largest value of a parabola through the samples about the largest, or that sample if it is larger.
+def _top(time: Array, across: Array, side: NDArray[np.intp], noise: float) -> float:
+    """Return how far a turn goes.
 
-    The parabola finds the top between two samples; the sample that of a turn so sharp that no parabola fits it.
+    The top is that of a parabola through the samples about the middle of the turn, as long as it leaves no more than
+    noise: the largest of many samples would be too large. A turn that is sharper is read from few samples about the
+    outermost, or from that one where it is beyond the parabola by more than noise.
+
+    Parameters
+    ----------
+    side
+        Samples of the turn on its side, ``(k,)``.
+    noise
+        Standard deviation of `across` by noise.
     """
+    about = slice(max(int(side[0]) - 1, 0), int(side[-1]) + 2)
+    t, y = time[about], across[about]
+    centre, half = 0.5 * float(time[side[0]] + time[side[-1]]), _SHARE * float(time[side[-1]] - time[side[0]])
+    while int((np.abs(t - centre) <= half).sum()) >= _LEAST_NEAR:
+        for _ in range(2):  # again about the top that was found
+            near = np.abs(t - centre) <= half
+            if int(near.sum()) < _LEAST_NEAR:
+                break
+            x = (t[near] - centre) / half
+            a, b, c = np.polyfit(x, y[near], 2)
+            free = len(x) - 3
+            left = float(np.sqrt(((y[near] - np.polyval((a, b, c), x)) ** 2).sum() / free))
+            most = noise * (_LEFT + np.sqrt(1.5 / free))
+            at = float(np.clip(-b / (2 * a), -1.0, 1.0)) if a < 0 else 0.0
+            top = float(a * at * at + b * at + c)
+            centre += at * half
+        if a < 0 and left <= most:
+            return top
+        half /= 1.5
+    peak = int(side[across[side].argmax()])
     first, last = max(peak - _ABOUT, 0), min(peak + _ABOUT + 1, len(time))
     t, y = time[first:last] - time[peak], across[first:last]
     if len(t) < 4:
@@ -166,4 +207,5 @@ def _top(time: Array, across: Array, peak: int) -> float:
     if a >= 0:
         return float(y.mean())
     at = float(np.clip(-b / (2 * a), t[0] / (t[-1] - t[0]), t[-1] / (t[-1] - t[0])))
-    return max(float(a * at * at + b * at + c), float(across[peak]))
+    top = float(a * at * at + b * at + c)
+    return float(across[peak]) if across[peak] > top + _SHARPER * noise else top

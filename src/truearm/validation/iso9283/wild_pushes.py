@@ -52,7 +52,7 @@ def wild_pushes(lines: Sequence[PushLine], instrument: Instrument) -> tuple[Wild
     if not lines:
         return ()
     off = [_off(one.force, one.displacement) for one in lines]
-    scatter = max(1.4826 * float(np.median(np.concatenate(off))), _LEAST_SCATTER * instrument.sigma, 1e-12)
+    scatter = max(1.4826 * float(np.median(np.concatenate(off))), instrument.least_scatter(_LEAST_SCATTER)[0], 1e-12)
     order = np.argsort([-one.max() for one in off], kind="stable")
     wild = 0
     for k in range(1, max(1, len(lines) // 3) + 1):

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
+from truearm.validation.iso9283.alike_cycles import AlikeCycles, alike_cycles
 from truearm.validation.iso9283.drift import groups_of
 from truearm.validation.iso9283.pose_rows import Cycles
 from truearm.validation.iso9283.values import Instrument, Value
@@ -38,7 +39,7 @@ _FAR: Final = 5.0
 _BEYOND: Final = (2.2, 1.8)
 #: What is counted as a Gaussian's deviation: where Student's t is as rare as this.
 _RARE: Final = 1e-5
-#: The scatter is never taken below this share of the instrument's, so that rounding makes no row wild.
+#: The scatter is never taken below this share of the instrument's, nor below that of rounding.
 _LEAST_SCATTER: Final = 1.0 / 3.0
 #: At most this share of all rows is wild, but three may be.
 _SHARE: Final = 0.02
@@ -110,27 +111,30 @@ class UnusualRows:
         Rows that lie far from the others.
     two_places
         Poses with two places of rest.
+    alike
+        Tests whose cycles are like those before them.
     """
 
     wild: tuple[WildRow, ...] = ()
     two_places: tuple[TwoPlaces, ...] = ()
+    alike: tuple[AlikeCycles, ...] = ()
 
 
 def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRows:
-    """Return rows that lie far from the others, in the order of the plan, and poses with two places of rest."""
+    """Return rows that lie far from the others, in the order of the plan, and what else is unusual about them."""
     groups = [part for one in cycles for part in (groups_of(one) if one.test == "dAP" else [one])]
     wild: list[WildRow] = []
     two: list[TwoPlaces] = []
-    sigmas: dict[Kind, float] = {"position": instrument.sigma, "orientation": instrument.sigma_rot or 0.0}
-    for kind, sigma in sigmas.items():
+    kinds: tuple[Kind, Kind] = ("position", "orientation")
+    for kind, least in zip(kinds, instrument.least_scatter(_LEAST_SCATTER), strict=True):
         mine = [one for one in groups if kind == "position" or one.angles is not None]
         if mine:
-            found = _Rows(mine, kind, sigma)
+            found = _Rows(mine, kind, least)
             places = found.two_places()
             named, alike = found.wild(places)
             wild += named
             two += [*places.values(), *alike]
-    return UnusualRows(tuple(wild), tuple(two))
+    return UnusualRows(tuple(wild), tuple(two), alike_cycles(cycles))
 
 
 def without(cycles: Sequence[Cycles], wild: Sequence[WildRow]) -> list[Cycles]:
@@ -143,7 +147,7 @@ def without(cycles: Sequence[Cycles], wild: Sequence[WildRow]) -> list[Cycles]:
 class _Rows:
     """All rows of a campaign, by groups."""
 
-    def __init__(self, groups: list[Cycles], kind: Kind, sigma: float) -> None:
+    def __init__(self, groups: list[Cycles], kind: Kind, least: float) -> None:
         self.groups = groups
         self.kind: Kind = kind
         numbers = [one.points if kind == "position" or one.angles is None else one.angles for one in groups]
@@ -155,7 +159,7 @@ class _Rows:
         self.small = self.counts < _SMALL
         names: dict[tuple[str, float, float], int] = {}
         self.family = np.array([names.setdefault((g.test, g.velocity, g.load), len(names)) for g in groups])
-        self.floor = max(_LEAST_SCATTER * np.sqrt(3.0) * sigma, 1e-12)
+        self.floor = max(np.sqrt(3.0) * least, 1e-12)
 
     def two_places(self) -> dict[int, TwoPlaces]:
         """Return the groups whose cycles are in two places, three cycles or more in each."""

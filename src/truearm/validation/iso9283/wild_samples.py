@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
+from truearm.validation.iso9283.clock import Clock
 
 #: No tip is accelerated so much [m/s^2] while its velocity changes by so many times the commanded one, or the one about
 #: it, between two samples.
@@ -80,7 +81,7 @@ def wild_steps(time: Array, position: Array, velocity: float | None) -> WildStep
     if len(time) < 2 * _ABOUT:
         return WildSteps(np.empty(0, dtype=np.intp), np.empty((0, 3)), max(len(time) - 1, 0))
     lasts = np.diff(time)
-    lasts = np.maximum(lasts, 0.5 * float(np.median(lasts)))
+    lasts = np.maximum(lasts, 0.5 * float(np.median(lasts) or lasts.mean()))
     step = np.diff(position, axis=0)
     # what is far beyond every tip is sought alone: medians about all of a million steps would take their time
     size = np.linalg.norm(step, axis=1)
@@ -101,7 +102,9 @@ def wild_steps(time: Array, position: Array, velocity: float | None) -> WildStep
     return WildSteps(likely[impossible], pace[impossible], len(step))
 
 
-def refuse_wild(samples: Samples, rows: NDArray[np.intp], position: Array, found: WildSteps, cycle: int) -> None:
+def refuse_wild(
+    samples: Samples, rows: NDArray[np.intp], position: Array, found: WildSteps, cycle: int, clock: Clock
+) -> None:
     """Refuse a record with samples that no tip can have passed, naming them.
 
     Parameters
@@ -114,16 +117,26 @@ def refuse_wild(samples: Samples, rows: NDArray[np.intp], position: Array, found
         What no tip can do there.
     cycle
         Its number; 0 for a stream.
+    clock
+        Of the record.
 
     Raises
     ------
     InputError
-        If there are such steps.
+        If there are such steps; of times that are rounded too coarsely to tell, this is said instead.
     """
     if not len(found.before):
         return
+    if clock.is_coarse:
+        raise InputError(
+            "times of samples are rounded too coarsely to say how fast the tip moves",
+            where=f"{samples.source}, line {samples.line[rows[found.before[0]]]}, column time",
+            came=f"times to {clock.resolution:g} s, samples {float(np.diff(clock.time).mean()):.4g} s apart",
+            allowed="a tenth of the time between two samples, or less",
+            cure="Write the times with more decimals.",
+        )
     line, name = samples.line[rows], _name(samples, int(rows[0]), cycle)
-    wild, jumps = _groups(samples.time[rows], position, found)
+    wild, jumps = _groups(clock.time, position, found)
     if wild:
         shown = [_lines(line[first : last + 1].tolist()) for first, last, _ in wild[:_NAMED]]
         more = f" and {len(wild) - _NAMED} more such places" if len(wild) > _NAMED else ""
@@ -140,7 +153,8 @@ def refuse_wild(samples: Samples, rows: NDArray[np.intp], position: Array, found
         where=f"{samples.source}, lines {line[first - 1]} and {line[first]}",
         came=f"{1e3 * off:.4g} mm from one sample to the next, and on from there",
         allowed="steps that a robot can take from one sample to the next",
-        cure="The instrument lost the target and found it elsewhere: measure the cycle again, or leave it out.",
+        cure="Check that times are in seconds. Otherwise the instrument lost the target and found it elsewhere: "
+        "measure the cycle again, or leave it out.",
     )
 
 

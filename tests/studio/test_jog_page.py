@@ -57,7 +57,7 @@ def drag(page: JogPage, position: Any, rotation: Any) -> None:
 
 
 def eventually(true: Callable[[], bool]) -> bool:
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + 30.0
     while time.monotonic() < end:
         if true():
             return True

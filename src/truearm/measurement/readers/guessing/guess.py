@@ -119,7 +119,7 @@ def guess_mapping(path: Path) -> Guessed:
     _write_missing(text, [*joints, *quaternion, *(column for three in positions.values() for column in three)])
     _write_labels(text, left, joints, positions, quaternion, sure)
     _write_joints(text, joints)
-    text.lines += [f"# Note: {note}." for note in layout.notes]
+    text.lines += [f"# Note: {escaped(note)}." for note in layout.notes]
     if layout.header and any({"tcp", "x"} <= set(column.words) for column in left.columns):
         text.lines.append("# Note: tables of RoboDK with tool points come in by truearm import robodk.")
     unused = [column.name for column in left.columns if column.name]

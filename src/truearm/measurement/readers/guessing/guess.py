@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from pathlib import Path
 from typing import Final
 
@@ -37,15 +36,12 @@ from truearm.measurement.readers.guessing.meanings import (
     positions_among,
     quaternion_among,
 )
+from truearm.measurement.readers.guessing.times import GuessedTime, time_among
 from truearm.measurement.readers.mapping import MappingFile
 from truearm.measurement.readers.table import TableFiles, read_with
 from truearm.modeling.formats.joint_columns import JOINT_COLUMN
 from truearm.schemas import validated
 
-_TIMES: Final = (
-    *("%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p"),
-    *("%d/%m/%Y %H:%M:%S", "%Y/%m/%d %H:%M:%S", "%H:%M:%S", "%H:%M:%S.%f"),
-)
 _NUMBERED: Final = re.compile("(.*?)[0-9]{1,9}")
 
 
@@ -210,8 +206,8 @@ def _write_labels(
     sigma_rot = left.take(deviations_among(left.columns, ("rx", "ry", "rz"))) if turned else []
     temperature = named_like([c for c in left.columns if c.is_numeric], "temperature")
     left.take([temperature] if temperature else [])
-    time = named_like(left.columns, "time")
-    left.take([time] if time else [])
+    time = time_among(left.columns)
+    left.take([time.column] if time is not None and time.column is not None else [])
     several = len(positions) > 1
     label, target, pattern = _names(left, several)
     if pattern is not None and label is not None:
@@ -351,38 +347,15 @@ def _write_joints(text: MappingText, joints: Sequence[Column]) -> None:
     text.add("joints.unit", unit, why, f"  unit: {quoted(unit)}")
 
 
-def _write_order(text: MappingText, label: Column | None, time: Column | None, pattern: str | None) -> None:
+def _write_order(text: MappingText, label: Column | None, time: GuessedTime | None, pattern: str | None) -> None:
     """Write what tells the order of measurement, if anything seems to."""
     if time is not None:
-        if time.is_numeric:
-            text.add("order", f"{{column: {named(time)}}}", "its name")
-            return
-        formats = _formats(time.given)
-        if formats:
-            shown = "iso" if formats[0] == "iso" else f"'{formats[0]}'"
-            value = f"{{column: {named(time)}, time: {shown}}}"
-            because = "its name and its texts"
-            if len(formats) > 1:
-                because = f"its texts; {formats[1]} would read them too"
-            text.add("order", value, because)
-            return
+        text.add("order", time.value, time.because)
+        return
     if label is not None and pattern is None and not label.is_numeric:
         starts = {match[1] if (match := _NUMBERED.fullmatch(name)) else None for name in set(label.texts)}
         if len(starts) == 1 and None not in starts:
             text.add("order", "{by: labels}", "the labels are numbered; remove it if they were not measured so")
-
-
-def _formats(texts: Sequence[str]) -> list[str]:
-    """Return the formats that read all of these times."""
-    return [way for way in ("iso", *_TIMES) if all(_reads(text, way) for text in texts)]
-
-
-def _reads(text: str, way: str) -> bool:
-    try:
-        datetime.fromisoformat(text) if way == "iso" else datetime.strptime(text, way)
-    except ValueError:
-        return False
-    return True
 
 
 def _tried(made: Guessed, path: Path) -> Guessed:

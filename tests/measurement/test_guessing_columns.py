@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 import truearm
+from truearm.errors import InputError
+from truearm.measurement.readers.guessing.guess import guess_mapping
 
 
 def guessed(folder: Path, more: str, cells: list[str], name: str = "label") -> str:
@@ -55,7 +57,7 @@ def test_three_numbers_of_an_orientation_are_asked_for(tmp_path: Path, name: str
     "name",
     [
         *("dX,dY,dZ", "delta x,delta y,delta z", "dev_x,dev_y,dev_z", "nom_x,nom_y,nom_z", "cmd_x,cmd_y,cmd_z"),
-        *("v_x,v_y,v_z", "A_x [mm/s],A_y [mm/s],A_z [mm/s]", "X_nom,Y_nom,Z_nom"),
+        *("Xnom,Ynom,Znom", "v_x,v_y,v_z", "A_x [mm/s],A_y [mm/s],A_z [mm/s]", "X_nom,Y_nom,Z_nom"),
     ],
 )
 def test_what_is_no_measured_position_is_no_target(tmp_path: Path, name: str) -> None:
@@ -74,3 +76,57 @@ def test_what_was_measured_comes_before_what_is_shown(tmp_path: Path) -> None:
     text = truearm.import_guess(tmp_path / "table.csv").text
     assert "x: act_x" in text
     assert "# Not used: nom_x, nom_y, nom_z" in text
+
+
+def wide(folder: Path, text: str) -> str:
+    """Return what is guessed of a table."""
+    (folder / "table.txt").write_text(text)
+    made = truearm.import_guess(folder / "table.txt").guessed
+    assert made.refusal is None
+    return made.text
+
+
+@pytest.mark.parametrize("number", ["-999", "0", "-999.000"])
+def test_a_reading_of_one_number_is_none(tmp_path: Path, number: str) -> None:
+    rows = f"a,90,80.5,1.5,3\nb,91,{number},{number},{number}\nc,92,81.5,2.5,3\n"
+    text = wide(tmp_path, "p,J1,X,Y,Z\n" + rows)
+    assert f'missing: ["{number}"]  # guess: rows have {number} in all of x, y and z' in text
+
+
+def test_a_reading_of_zeros_is_asked_for_where_zeros_are_coordinates(tmp_path: Path) -> None:
+    text = wide(tmp_path, "p,J1,X,Y,Z\na,90,80.5,0,3\nb,91,0,0,0\nc,92,81.5,2.5,3\n")
+    assert "missing: '?'  # guess: rows of 0 in all of x, y and z seem to be no readings" in text
+
+
+def test_a_number_for_no_reading_may_fill_the_whole_row(tmp_path: Path) -> None:
+    text = wide(tmp_path, "p,J1,X,Y,Z,A,B,C\na,90,80,1,3,1,2,3\nb,91,-9,-9,-9,-9,-9,-9\nc,92,81,2,3,10,20,30\n")
+    assert 'missing: ["-9"]' in text
+
+
+def test_a_column_without_a_heading_goes_by_its_number(tmp_path: Path) -> None:
+    text = wide(tmp_path, "Point\tMeasured\t\t\tJoints\n\tX\tY\tZ\tJ1\n1\t801\t2\t3\t90\n2\t802\t3\t4\t91\n")
+    assert "header: none  # guess: line 2 leaves a column without a name" in text
+    assert "configuration: {column: 1}" in text
+    assert "columns: [5]" in text
+
+
+@pytest.mark.parametrize("names", [["Cell::Grp 01::T1", "Cell::Grp 02::T1"], ["A::P1::T 1", "A::P1::T 2"]])
+def test_names_with_blanks_between_blanks_are_refused(tmp_path: Path, names: list[str]) -> None:
+    (tmp_path / "table.txt").write_text("".join(f"{name} 906.8 22{n}.5 1151.4\n" for n, name in enumerate(names)))
+    with pytest.raises(InputError, match=f"a name with blanks seems to stand.*{names[0]}.*Export the table again"):
+        guess_mapping(tmp_path / "table.txt")
+    text = wide(tmp_path, "".join(f"{name},906.8,22{n}.5,1151.4\n" for n, name in enumerate(names)))
+    assert "names: {column: 1" in text
+
+
+@pytest.mark.parametrize(
+    ("unit", "because"),
+    [
+        ("mrad", "the headings say mrad, in which joints are not read"),
+        ("grad", "the headings say grad: 400 to a turn are not read"),
+        ("gon", "the headings say gon"),
+    ],
+)
+def test_units_in_which_joints_are_not_read_are_asked_for(tmp_path: Path, unit: str, because: str) -> None:
+    text = wide(tmp_path, f"p,J1 [{unit}],J2 [{unit}],X,Y,Z\na,90,2,801,2,3\nb,91,3,802,3,4\n")
+    assert f"unit: '?'  # guess: {because}" in text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -27,6 +28,7 @@ from truearm.measurement.readers.guessing.mapping_text import (
 )
 from truearm.measurement.readers.guessing.meanings import (
     Column,
+    Triple,
     angles_among,
     columns_of,
     deviations_among,
@@ -35,6 +37,7 @@ from truearm.measurement.readers.guessing.meanings import (
     named_like,
     positions_among,
     quaternion_among,
+    stand_ins_among,
 )
 from truearm.measurement.readers.guessing.times import GuessedTime, time_among
 from truearm.measurement.readers.mapping import MappingFile
@@ -84,6 +87,8 @@ def guess_mapping(path: Path) -> Guessed:
     layout = guess_layout(path)
     columns = columns_of(layout)
     _refuse_canonical(path, layout)
+    if layout.entries.get("delimiter", ("",))[0] == "whitespace":
+        _refuse_cut_names(path, columns)
     text = MappingText()
     text.lines += [
         f"# Guessed from {escaped(path.name)}.",
@@ -112,7 +117,8 @@ def guess_mapping(path: Path) -> Guessed:
             allowed="three columns of numbers named x, y, z, such as X, Pos Y [mm] or ball_1_z",
             cure="Rename them, or write the mapping by hand: the guide has complete ones.",
         )
-    _write_missing(text, [*joints, *quaternion, *(column for three in positions.values() for column in three)])
+    others = [column for column in (*quaternion, *left.columns) if column.is_numeric and not column.counts]
+    _write_missing(text, [*joints, *quaternion], list(positions.values()), others)
     _write_labels(text, left, joints, positions, quaternion, sure)
     _write_joints(text, joints)
     text.lines += [f"# Note: {escaped(note)}." for note in layout.notes]
@@ -150,6 +156,19 @@ def _refuse_canonical(path: Path, layout: GuessedLayout) -> None:
         )
 
 
+def _refuse_cut_names(path: Path, columns: Sequence[Column]) -> None:
+    """Refuse names with blanks in a table between whose columns are blanks."""
+    for first, second in pairwise(columns):
+        for one, other in zip(first.texts, second.texts, strict=True):
+            if "::" in one and ("::" in other or all(text.isdigit() for text in second.texts)):
+                raise InputError(
+                    "a name with blanks seems to stand in a table whose columns are separated by blanks",
+                    where=str(path),
+                    came=f"{one} {other}",
+                    cure="Export the table again with commas, semicolons or tabs between its columns.",
+                )
+
+
 class _Left:
     """The columns that mean nothing yet."""
 
@@ -182,11 +201,24 @@ def _by_place(
     return {(): (first, second, third)}, numeric[:-3]
 
 
-def _write_missing(text: MappingText, columns: Sequence[Column]) -> None:
-    texts = list(dict.fromkeys(odd for column in columns for odd in column.nothing))
-    if texts:
-        shown = f"[{', '.join(plain(odd) for odd in texts)}]"
-        text.add("missing", shown, "these texts stand among numbers")
+def _write_missing(
+    text: MappingText, columns: Sequence[Column], positions: Sequence[Triple], others: Sequence[Column]
+) -> None:
+    """Write texts that mean no reading; `others` are further columns in which they would mean so."""
+    coordinates = [column for three in positions for column in three]
+    texts = list(dict.fromkeys(odd for column in (*columns, *coordinates) for odd in column.nothing))
+    because = "these texts stand among numbers" if texts else ""
+    stand_ins, elsewhere = stand_ins_among(positions, others)
+    if elsewhere:
+        because = f"rows of {elsewhere} in all of x, y and z seem to be no readings, and {elsewhere} stands elsewhere "
+        text.add("missing", quoted(OPEN), because + "too: empty the cells of those rows, and remove this line")
+        return
+    if stand_ins:
+        because += "; " if because else ""
+        because += f"rows have {', '.join(stand_ins)} in all of x, y and z"
+    if because:
+        shown = f"[{', '.join(plain(odd) for odd in (*texts, *stand_ins))}]"
+        text.add("missing", shown, because)
 
 
 def _write_labels(
@@ -307,10 +339,10 @@ def _names(left: _Left, several: bool) -> tuple[Column | None, Column | None, st
     """Return the columns of the configuration and of the target, and a pattern if one column holds both."""
     for column in left.columns:
         parts = {text.count("::") for text in column.texts}
-        if parts in ({1}, {2}):
+        pattern = f"{'[^:]*::' if parts == {2} else ''}(?P<configuration>[^:]+)::(?P<target>[^:]+)"
+        if parts in ({1}, {2}) and all(re.fullmatch(pattern, text) for text in column.texts):
             left.take([column])
-            lead = "[^:]*::" if parts == {2} else ""
-            return column, None, rf"{lead}(?P<configuration>[^:]+)::(?P<target>[^:]+)"
+            return column, None, pattern
     whole = [column for column in left.columns if column.given and len(column.given) == len(column.texts)]
     texts = [column for column in whole if column.can_name]
     target = None if several else named_like(texts, "target")
@@ -344,6 +376,8 @@ def _write_joints(text: MappingText, joints: Sequence[Column]) -> None:
         text.add("joints.units", f"[{', '.join(units)}]", "the headings", f"  units: [{', '.join(units)}]")
         return
     unit, why = angle_unit(joints)
+    if unit == "mrad":
+        unit, why = OPEN, "the headings say mrad, in which joints are not read: convert the columns"
     text.add("joints.unit", unit, why, f"  unit: {quoted(unit)}")
 
 

@@ -26,10 +26,13 @@ _CHARACTERS: Final = 400_000
 _TITLES: Final = 8
 _DELIMITERS: Final = {"semicolon": ";", "tab": "\t", "comma": ",", "whitespace": None}
 _COMMENTS: Final = ("//", "#", "%", "!", "*")
+#: Units of which 400 are a turn; a degree is called Grad in German too.
+GON: Final = frozenset({"gon", "grad"})
 #: Units that stand in a line of their own, or behind a name.
 UNITS: Final = {
     **{name: name for name in ("mm", "m", "um", "in", "deg", "rad", "mrad", "degC", "degF", "K")},
-    **{"µm": "um", "μm": "um", "inch": "in", "°": "deg", "degree": "deg", "degrees": "deg", "grad": "deg"},
+    **{"µm": "um", "μm": "um", "inch": "in", "°": "deg", "degree": "deg", "degrees": "deg", "gon": "gon"},
+    **{"grad": "grad", "Grad": "grad"},
     **{"radian": "rad", "radians": "rad", "°c": "degC", "°C": "degC", "degc": "degC", "°F": "degF"},
     **{"metre": "m", "meter": "m", "millimetre": "mm", "millimeter": "mm"},
 }
@@ -228,13 +231,17 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
             entries["first_row"] = (first, "the first line of numbers")
         return replace(made, names=numbers, headings=numbers)
     line, names = above[-1]
+    upper = above[-2][1] if len(above) > 1 else [""] * split.width
     given = [name for name in names if name]
     if len(set(given)) < len(given):
         entries["header"] = ("none", f"line {line} has names twice, so that columns go by number")
         entries["first_row"] = (first, "the first line of numbers")
-        upper = above[-2][1] if len(above) > 1 else [""] * split.width
         headings = tuple(f"{over} {name}".strip() for over, name in zip(upper, names, strict=True))
         return replace(made, names=numbers, headings=headings)
+    if any(not name and any(column) for name, column in zip(names, columns, strict=True)):
+        entries["header"] = ("none", f"line {line} leaves a column without a name, so that columns go by number")
+        entries["first_row"] = (first, "the first line of numbers")
+        return replace(made, names=numbers, headings=tuple(n or over for over, n in zip(upper, names, strict=True)))
     entries["header"] = (line, "the last line of names above the numbers")
     if first != line + 1:
         entries["first_row"] = (first, "the first line of numbers")

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.measurement.readers.guessing.layouts import GON
 from truearm.measurement.readers.guessing.meanings import Column
 
 #: Where nothing in the file tells an answer.
@@ -92,6 +93,8 @@ def unit_of(columns: Sequence[Column]) -> str | None:
 def angle_unit(columns: Sequence[Column]) -> tuple[str, str]:
     """Return the unit of angles and what it rests on."""
     unit = unit_of(columns)
+    if unit in GON:
+        return OPEN, f"the headings say {unit}: 400 to a turn are not read, convert them; 360 to a turn are deg"
     if unit is not None:
         return unit, "the headings"
     if not columns:

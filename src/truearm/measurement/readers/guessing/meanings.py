@@ -20,7 +20,7 @@ _IN_BRACKETS: Final = re.compile(r"\s*(?P<sign>[\[({])(?P<unit>[^\])}]*)[\])}]\s
 _OTHER_UNITS: Final = frozenset({"s", "ms", "us", "min", "h", "V", "mV", "A", "mA", "N", "kN", "Nm", "N m", "W", "%"})
 _AT_THE_END: Final = re.compile(r"(?P<name>.*[^\s_/,])[\s_/,]+(?P<unit>[^\s_/,]+)\s*")
 _GLUED: Final = re.compile("(?P<name>[XYZxyz])(?P<unit>mm|m|in)")
-_TOKEN: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_]+")
+_TOKEN: Final = re.compile(r"[XYZ](?=(?:act|nom|meas|cmd|ist|soll)\b)|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_]+")
 #: Words before the number of a joint.
 _JOINT: Final = frozenset({"joint", "joints", "axis", "ax", "achse", "gelenk", "j", "a", "q", "theta", "rax"})
 _UR: Final = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
@@ -208,6 +208,27 @@ def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
             return chosen
     measured = {key: three for key, three in found.items() if not _TOOL & set(key)}
     return measured or found
+
+
+def stand_ins_among(positions: Sequence[Triple], others: Sequence[Column]) -> tuple[list[str], str | None]:
+    """Return numbers that stand for no reading, as -999 or 0 in all of x, y and z, and one that stands elsewhere too.
+
+    `others` are further columns in which the texts would be taken for nothing.
+    """
+    found: dict[str, None] = {}
+    kept: list[str] = []
+    somewhere: set[int] = set()
+    for three in positions:
+        rows = list(zip(*(column.texts for column in three), strict=True))
+        numbers = [{number_of(text, three[0].decimal) for text in row} for row in rows]
+        alike = {at for at, values in enumerate(numbers) if len(values) == 1 and None not in values}
+        if 2 * len(alike) >= len(rows):
+            alike = set()
+        somewhere |= alike
+        found.update(dict.fromkeys(text for at in sorted(alike) for text in rows[at]))
+        kept += [text for at, row in enumerate(rows) if at not in alike for text in row]
+    kept += [text for column in others for at, text in enumerate(column.texts) if at not in somewhere]
+    return list(found), next((text for text in found if text in kept), None)
 
 
 def quaternion_among(columns: Sequence[Column]) -> tuple[list[Column], bool]:

@@ -130,3 +130,9 @@ def test_names_with_blanks_between_blanks_are_refused(tmp_path: Path, names: lis
 def test_units_in_which_joints_are_not_read_are_asked_for(tmp_path: Path, unit: str, because: str) -> None:
     text = wide(tmp_path, f"p,J1 [{unit}],J2 [{unit}],X,Y,Z\na,90,2,801,2,3\nb,91,3,802,3,4\n")
     assert f"unit: '?'  # guess: {because}" in text
+
+
+def test_joints_that_were_reached_come_before_those_that_were_commanded(tmp_path: Path) -> None:
+    text = wide(tmp_path, "p,J1_cmd,J2_cmd,J1_act,J2_act,X,Y,Z\na,90,2,90.1,2.1,801,2,3\nb,91,3,91.1,3.1,802,3,4\n")
+    assert "columns: [J1_act, J2_act]" in text
+    assert "# Not used: J1_cmd, J2_cmd" in text

@@ -152,7 +152,8 @@ def joints_among(columns: Sequence[Column]) -> list[Column]:
     """Return the columns of the joints in their order, none if no names say so."""
     groups: dict[tuple[str, ...], dict[int, Column]] = {}
     for column in columns:
-        *before, number = column.words or ("",)
+        words = column.words[:-1] if {*column.words[-1:]} & (_ACTUAL | _MEASURED) else column.words
+        *before, number = words or ("",)
         if not before or not number.isdigit() or before[-1] not in _JOINT or _NOT_MEASURED & set(before):
             continue
         groups.setdefault(tuple(before), {}).setdefault(int(number), column)

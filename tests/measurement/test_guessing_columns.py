@@ -136,3 +136,11 @@ def test_joints_that_were_reached_come_before_those_that_were_commanded(tmp_path
     text = wide(tmp_path, "p,J1_cmd,J2_cmd,J1_act,J2_act,X,Y,Z\na,90,2,90.1,2.1,801,2,3\nb,91,3,91.1,3.1,802,3,4\n")
     assert "columns: [J1_act, J2_act]" in text
     assert "# Not used: J1_cmd, J2_cmd" in text
+
+
+def test_letters_of_targets_may_be_those_of_differences(tmp_path: Path) -> None:
+    names = ",".join(f"{target}_{axis}" for target in "ABCD" for axis in "xyz")
+    rows = "a,90,1,2,3,4,5,6,7,8,9,10,11,12\nb,91,1,2,3,4,5,6,7,8,9,10,11,12\n"
+    (tmp_path / "table.txt").write_text(f"p,J1,{names}\n{rows}")
+    text = truearm.import_guess(tmp_path / "table.txt").text
+    assert all(f"- target: {target}" in text for target in "abcd")

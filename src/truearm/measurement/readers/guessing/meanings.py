@@ -32,7 +32,7 @@ _DEVIATION_LETTERS: Final = frozenset({"s", "u"})
 _EXPANDED: Final = frozenset({"k2", "u95", "95", "expanded", "2sigma"})
 _NOT_MEASURED: Final = frozenset(
     {"nominal", "nom", "soll", "theoretical", "theo", "cad", "design", "cmd", "command", "commanded", "programmed"}
-    | {"d", "error", "err", "delta", "diff", "difference", "dev", "deviation", "residual", "rms", "tol", "tolerance"}
+    | {"error", "err", "delta", "diff", "difference", "dev", "deviation", "residual", "rms", "tol", "tolerance"}
 )
 #: Words of what was measured, and of what is so called beside nominal positions.
 _MEASURED: Final = frozenset({"meas", "measured", "measurement", "ist", "gemessen"})
@@ -40,9 +40,11 @@ _ACTUAL: Final = frozenset({"act", "actual"})
 #: Words of three numbers that are no position.
 _TURNED: Final = frozenset({"ori", "orient", "orientation", "rot", "rotation", "angle", "angles", "euler", "rotvec"})
 _NO_POSITION: Final = _TURNED | {
-    *("quat", "quaternion", "v", "vel", "velocity", "speed", "acc", "accel", "acceleration", "gyro", "omega"),
+    *("quat", "quaternion", "vel", "velocity", "speed", "acc", "accel", "acceleration", "gyro", "omega"),
     *("force", "torque", "moment", "normal", "offset", "correction", "corr", "weight"),
 }
+#: Letters of differences and velocities, where no other letters stand for targets.
+_NO_TARGET: Final = frozenset({"d", "v"})
 #: Words of positions that a controller shows or was given, where others stand beside them.
 _TOOL: Final = frozenset({"tcp", "tool", "flange", "robot", "target", "desired", "setpoint", "reference"})
 _LABEL: Final = frozenset(
@@ -203,6 +205,10 @@ def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
         for key, three in triples_among(columns, "xyz").items()
         if not (_DEVIATION | _DEVIATION_LETTERS | _NO_POSITION) & set(key) and _may_be(three, LENGTH_UNITS)
     }
+    letters = {key for key in found if len("".join(key)) == 1}
+    if all(_NO_TARGET & set(key) for key in letters):
+        found = {key: three for key, three in found.items() if key not in letters}
+    found = {key: three for key, three in found.items() if not (_NO_TARGET & set(key) and len(key) > 1)}
     beside_nominal = any(_NOT_MEASURED & set(column.words) for column in columns)
     for words in (_MEASURED, _ACTUAL if beside_nominal else frozenset[str]()):
         if chosen := {key: three for key, three in found.items() if words & set(key)}:
@@ -267,10 +273,11 @@ def angles_among(columns: Sequence[Column]) -> tuple[Triple, str, str, str] | No
             if all(column.is_numeric for column in three):
                 return three, about, axes, who
     for key, three in triples_among(columns, ("rx", "ry", "rz")).items():
-        if not _DEVIATION & set(key):
+        if not (_DEVIATION | _NO_TARGET) & set(key):
             return three, "?", "?", "names such as Rx do not say it"
     for key, three in triples_among(columns, "xyz").items():
-        if _TURNED & set(key) and not (_DEVIATION | _DEVIATION_LETTERS) & set(key) and _is_turned(three):
+        others = _DEVIATION | _DEVIATION_LETTERS | _NO_TARGET
+        if _TURNED & set(key) and not others & set(key) and _is_turned(three):
             return three, "?", "?", f"names such as {three[0].name} do not say it"
     return None
 

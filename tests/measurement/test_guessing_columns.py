@@ -132,6 +132,21 @@ def test_units_in_which_joints_are_not_read_are_asked_for(tmp_path: Path, unit: 
     assert f"unit: '?'  # guess: {because}" in text
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "because"),
+    [
+        ("J1 [mrad]", "J2 [mm]", "the headings say mrad"),
+        ("J1 [grad]", "J2 [mm]", "the headings say grad"),
+        ("J1", "J2 (Grad)", "the headings say Grad"),
+        ("J1", "J2 [mm]", "the headings do not name one unit for all"),
+    ],
+)
+def test_a_unit_of_some_joints_is_not_that_of_all(tmp_path: Path, first: str, second: str, because: str) -> None:
+    text = wide(tmp_path, f"p,{first},{second},X [in],Y,Z\na,90,2,801,2,3\nb,91,3,802,3,4\n")
+    assert f"unit: '?'  # guess: {because}" in text
+    assert "length_unit: in  # guess: the headings that name one" in text
+
+
 def test_joints_that_were_reached_come_before_those_that_were_commanded(tmp_path: Path) -> None:
     text = wide(tmp_path, "p,J1_cmd,J2_cmd,J1_act,J2_act,X,Y,Z\na,90,2,90.1,2.1,801,2,3\nb,91,3,91.1,3.1,802,3,4\n")
     assert "columns: [J1_act, J2_act]" in text

@@ -376,7 +376,7 @@ def _write_joints(text: MappingText, joints: Sequence[Column]) -> None:
         text.add("joints.units", f"[{', '.join(units)}]", "the headings", f"  units: [{', '.join(units)}]")
         return
     unit, why = angle_unit(joints)
-    if unit == "mrad":
+    if "mrad" in units:
         unit, why = OPEN, "the headings say mrad, in which joints are not read: convert the columns"
     text.add("joints.unit", unit, why, f"  unit: {quoted(unit)}")
 

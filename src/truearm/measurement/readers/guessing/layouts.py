@@ -27,12 +27,12 @@ _TITLES: Final = 8
 _DELIMITERS: Final = {"semicolon": ";", "tab": "\t", "comma": ",", "whitespace": None}
 _COMMENTS: Final = ("//", "#", "%", "!", "*")
 #: Units of which 400 are a turn; a degree is called Grad in German too.
-GON: Final = frozenset({"gon", "grad"})
+GON: Final = frozenset({"gon", "grad", "Grad"})
 #: Units that stand in a line of their own, or behind a name.
 UNITS: Final = {
     **{name: name for name in ("mm", "m", "um", "in", "deg", "rad", "mrad", "degC", "degF", "K")},
     **{"µm": "um", "μm": "um", "inch": "in", "°": "deg", "degree": "deg", "degrees": "deg", "gon": "gon"},
-    **{"grad": "grad", "Grad": "grad"},
+    **{"grad": "grad", "Grad": "Grad"},
     **{"radian": "rad", "radians": "rad", "°c": "degC", "°C": "degC", "degc": "degC", "°F": "degF"},
     **{"metre": "m", "meter": "m", "millimetre": "mm", "millimeter": "mm"},
 }

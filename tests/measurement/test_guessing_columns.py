@@ -159,3 +159,14 @@ def test_letters_of_targets_may_be_those_of_differences(tmp_path: Path) -> None:
     (tmp_path / "table.txt").write_text(f"p,J1,{names}\n{rows}")
     text = truearm.import_guess(tmp_path / "table.txt").text
     assert all(f"- target: {target}" in text for target in "abcd")
+
+
+def test_directions_and_columns_of_no_clear_target_are_not_used(tmp_path: Path) -> None:
+    names = "n_x,n_y,n_z,std x,std y,std z"
+    text = wide(tmp_path, f"p,J1,X,Y,Z,{names}\na,90,80,1,3,1,0,0,1,2,3\nb,91,81,1,4,0,1,0,1,2,3\n")
+    assert "# Not used: n_x, n_y, n_z" in text
+    assert "sigma: {columns: [std x, std y, std z]" in text
+    names = "X2,Y2,Z2,std x,std y,std z"
+    text = wide(tmp_path, f"p,J1,X,Y,Z,{names}\na,90,80,1,3,10,0,0,1,2,3\nb,91,81,1,4,0,10,0,1,2,3\n")
+    assert "which target they are of is not clear" in text
+    assert "# Not used: std x, std y, std z" in text

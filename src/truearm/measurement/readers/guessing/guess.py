@@ -230,17 +230,19 @@ def _write_labels(
     sure: bool,
 ) -> None:
     """Write where labels and targets are, then the columns of the readings and what belongs to them."""
+    several = len(positions) > 1
+    unclear = left.columns if several else []
     angles = None if quaternion else angles_among(left.columns)
     if angles is not None:
         left.take(angles[0])
     sigma = left.take(deviations_among(left.columns, ("x", "y", "z")))
     turned = bool(quaternion) or angles is not None
     sigma_rot = left.take(deviations_among(left.columns, ("rx", "ry", "rz"))) if turned else []
+    unclear = [*quaternion, *(column for column in unclear if column not in left.columns)] if several else []
     temperature = named_like([c for c in left.columns if c.is_numeric], "temperature")
     left.take([temperature] if temperature else [])
     time = time_among(left.columns)
     left.take([time.column] if time is not None and time.column is not None else [])
-    several = len(positions) > 1
     label, target, pattern = _names(left, several)
     if pattern is not None and label is not None:
         text.add(
@@ -309,6 +311,7 @@ def _write_labels(
         text.lines.append(
             "# Note: columns of orientations or deviations are there too; which target they are of is not clear."
         )
+        left.columns = sorted([*left.columns, *unclear], key=lambda column: column.place)
     if temperature is not None:
         unit = temperature.unit if temperature.unit in ("degC", "degF", "K") else OPEN
         value = f"{{column: {named(temperature)}, unit: {quoted(unit)}}}"

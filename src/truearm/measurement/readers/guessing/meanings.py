@@ -213,7 +213,7 @@ def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
     for words in (_MEASURED, _ACTUAL if beside_nominal else frozenset[str]()):
         if chosen := {key: three for key, three in found.items() if words & set(key)}:
             return chosen
-    measured = {key: three for key, three in found.items() if not _TOOL & set(key)}
+    measured = {key: three for key, three in found.items() if not (_TOOL & set(key) or _is_unit(three))}
     return measured or found
 
 
@@ -254,15 +254,16 @@ def quaternion_among(columns: Sequence[Column]) -> tuple[list[Column], bool]:
     ):
         for start in ("", "quat", "quaternion", "orientation", "orient", "ori", "rotation", "rot", "pose"):
             four = [named[start + name] for name in names if start + name in named]
-            if len(four) == 4 and _is_quaternion(four):
+            if len(four) == 4 and _is_unit(four):
                 return four, sure
     return [], True
 
 
-def _is_quaternion(four: Sequence[Column]) -> bool:
-    if len({len(column.values) for column in four}) > 1 or not len(four[0].values):
+def _is_unit(columns: Sequence[Column]) -> bool:
+    """Return whether the sum of their squares is 1 in every row, as of quaternions and directions."""
+    if len({len(column.values) for column in columns}) > 1 or not len(columns[0].values):
         return False
-    length = np.sqrt(sum(column.values**2 for column in four))
+    length = np.sqrt(sum(column.values**2 for column in columns))
     return bool(np.abs(length - 1.0).max() < 1e-2)
 
 

@@ -68,6 +68,10 @@ def test_poses_turn_about_moving_axes(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("a,b,c,d\n1,2,3,4\n", "this is no table of RoboDK's calibration; got '4 columns'"),
+        (
+            POINTS.replace("J1,J2,J3,J4,J5,J6", "J6,J5,J4,J3,J2,J1"),
+            "the joints do not follow each other, and columns go by their place; got 'J5 behind J6'",
+        ),
         (POINTS.replace("J1,", "configuration,"), "not that of a joint, and joints come first; got 'configuration'"),
         (POINTS.removeprefix(HEADINGS), "holds numbers where headings belong"),
         (POINTS.replace(",", ";"), "not separated by commas"),

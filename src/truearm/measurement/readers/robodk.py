@@ -10,8 +10,10 @@ has is all that tells its targets apart.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Final, Literal
 
@@ -35,6 +37,8 @@ _JOINTS: Final = 6
 _POINTS, _POSES = 12, 18
 #: Sum of coordinates below which nothing was measured [m].
 _NOT_MEASURED: Final = 1e-6
+#: Headings of joints that are numbered.
+_NUMBERED: Final = re.compile(r"\D*?([0-9]{1,2})")
 #: Headings that no joint has.
 _NO_JOINTS: Final = frozenset({"x", "y", "z", "configuration", "target", "name", "point", "id"})
 _HEADINGS: Final = {
@@ -200,6 +204,17 @@ def _refuse_other_headings(cells: Cells) -> None:
                 came=heading,
                 allowed=f"{_JOINTS} joints, the measured point, the tool point",
                 cure="Put the columns in this order. A canonical CSV needs no import.",
+            )
+    found = [_NUMBERED.fullmatch(re.split(r"[\[({]", heading)[0].strip()) for heading in cells.names[:_JOINTS]]
+    numbers = [None if match is None else int(match[1]) for match in found]
+    for place, (before, number) in enumerate(pairwise(numbers), 1):
+        if before is not None and number is not None and number != before + 1:
+            raise InputError(
+                "the numbers in the headings of the joints do not follow each other, and columns go by their place",
+                where=f"{cells.source}, line {cells.header}, column {place + 1}",
+                came=f"{cells.names[place]} behind {cells.names[place - 1]}",
+                allowed=f"the joints in their order, 1 to {_JOINTS}",
+                cure="Put the columns in this order.",
             )
 
 

@@ -104,6 +104,14 @@ def _readable(path: Path) -> Iterator[None]:
         ) from error
 
 
+def texts_of(book: Workbook, title: str, most: int) -> list[list[str]]:
+    """Return the first rows of a sheet as texts, whatever :func:`sheet_cells` would refuse in them."""
+    with _readable(book.path):
+        sheet = book.values[title]
+        sheet.reset_dimensions()
+        return [[_text(value) for value in row] for row in sheet.iter_rows(max_row=most, values_only=True)]
+
+
 def read_sheet(path: Path, name: str | None, layout: Layout, entry: str) -> Cells:
     """Return the cells of a sheet of a workbook, see :func:`sheet_cells`."""
     return sheet_cells(open_workbook(path), name, layout, entry)

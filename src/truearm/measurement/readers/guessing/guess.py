@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -28,6 +28,7 @@ from truearm.measurement.readers.guessing.mapping_text import (
 )
 from truearm.measurement.readers.guessing.meanings import (
     Column,
+    Triple,
     angles_among,
     columns_of,
     deviations_among,
@@ -36,16 +37,14 @@ from truearm.measurement.readers.guessing.meanings import (
     named_like,
     positions_among,
     quaternion_among,
+    stand_ins_among,
 )
+from truearm.measurement.readers.guessing.times import GuessedTime, time_among
 from truearm.measurement.readers.mapping import MappingFile
 from truearm.measurement.readers.table import TableFiles, read_with
 from truearm.modeling.formats.joint_columns import JOINT_COLUMN
 from truearm.schemas import validated
 
-_TIMES: Final = (
-    *("%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p"),
-    *("%d/%m/%Y %H:%M:%S", "%Y/%m/%d %H:%M:%S", "%H:%M:%S", "%H:%M:%S.%f"),
-)
 _NUMBERED: Final = re.compile("(.*?)[0-9]{1,9}")
 
 
@@ -88,6 +87,8 @@ def guess_mapping(path: Path) -> Guessed:
     layout = guess_layout(path)
     columns = columns_of(layout)
     _refuse_canonical(path, layout)
+    if layout.entries.get("delimiter", ("",))[0] == "whitespace":
+        _refuse_cut_names(path, columns)
     text = MappingText()
     text.lines += [
         f"# Guessed from {escaped(path.name)}.",
@@ -116,10 +117,11 @@ def guess_mapping(path: Path) -> Guessed:
             allowed="three columns of numbers named x, y, z, such as X, Pos Y [mm] or ball_1_z",
             cure="Rename them, or write the mapping by hand: the guide has complete ones.",
         )
-    _write_missing(text, [*joints, *quaternion, *(column for three in positions.values() for column in three)])
+    others = [column for column in (*quaternion, *left.columns) if column.is_numeric and not column.counts]
+    _write_missing(text, [*joints, *quaternion], list(positions.values()), others)
     _write_labels(text, left, joints, positions, quaternion, sure)
     _write_joints(text, joints)
-    text.lines += [f"# Note: {note}." for note in layout.notes]
+    text.lines += [f"# Note: {escaped(note)}." for note in layout.notes]
     if layout.header and any({"tcp", "x"} <= set(column.words) for column in left.columns):
         text.lines.append("# Note: tables of RoboDK with tool points come in by truearm import robodk.")
     unused = [column.name for column in left.columns if column.name]
@@ -154,6 +156,19 @@ def _refuse_canonical(path: Path, layout: GuessedLayout) -> None:
         )
 
 
+def _refuse_cut_names(path: Path, columns: Sequence[Column]) -> None:
+    """Refuse names with blanks in a table between whose columns are blanks."""
+    for first, second in pairwise(columns):
+        for one, other in zip(first.texts, second.texts, strict=True):
+            if "::" in one and ("::" in other or all(text.isdigit() for text in second.texts)):
+                raise InputError(
+                    "a name with blanks seems to stand in a table whose columns are separated by blanks",
+                    where=str(path),
+                    came=f"{one} {other}",
+                    cure="Export the table again with commas, semicolons or tabs between its columns.",
+                )
+
+
 class _Left:
     """The columns that mean nothing yet."""
 
@@ -186,11 +201,24 @@ def _by_place(
     return {(): (first, second, third)}, numeric[:-3]
 
 
-def _write_missing(text: MappingText, columns: Sequence[Column]) -> None:
-    texts = list(dict.fromkeys(odd for column in columns for odd in column.nothing))
-    if texts:
-        shown = f"[{', '.join(plain(odd) for odd in texts)}]"
-        text.add("missing", shown, "these texts stand among numbers")
+def _write_missing(
+    text: MappingText, columns: Sequence[Column], positions: Sequence[Triple], others: Sequence[Column]
+) -> None:
+    """Write texts that mean no reading; `others` are further columns in which they would mean so."""
+    coordinates = [column for three in positions for column in three]
+    texts = list(dict.fromkeys(odd for column in (*columns, *coordinates) for odd in column.nothing))
+    because = "these texts stand among numbers" if texts else ""
+    stand_ins, elsewhere = stand_ins_among(positions, others)
+    if elsewhere:
+        because = f"rows of {elsewhere} in all of x, y and z seem to be no readings, and {elsewhere} stands elsewhere "
+        text.add("missing", quoted(OPEN), because + "too: empty the cells of those rows, and remove this line")
+        return
+    if stand_ins:
+        because += "; " if because else ""
+        because += f"rows have {', '.join(stand_ins)} in all of x, y and z"
+    if because:
+        shown = f"[{', '.join(plain(odd) for odd in (*texts, *stand_ins))}]"
+        text.add("missing", shown, because)
 
 
 def _write_labels(
@@ -202,17 +230,19 @@ def _write_labels(
     sure: bool,
 ) -> None:
     """Write where labels and targets are, then the columns of the readings and what belongs to them."""
+    several = len(positions) > 1
+    unclear = left.columns if several else []
     angles = None if quaternion else angles_among(left.columns)
     if angles is not None:
         left.take(angles[0])
     sigma = left.take(deviations_among(left.columns, ("x", "y", "z")))
     turned = bool(quaternion) or angles is not None
     sigma_rot = left.take(deviations_among(left.columns, ("rx", "ry", "rz"))) if turned else []
+    unclear = [*quaternion, *(column for column in unclear if column not in left.columns)] if several else []
     temperature = named_like([c for c in left.columns if c.is_numeric], "temperature")
     left.take([temperature] if temperature else [])
-    time = named_like(left.columns, "time")
-    left.take([time] if time else [])
-    several = len(positions) > 1
+    time = time_among(left.columns)
+    left.take([time.column] if time is not None and time.column is not None else [])
     label, target, pattern = _names(left, several)
     if pattern is not None and label is not None:
         text.add(
@@ -281,6 +311,7 @@ def _write_labels(
         text.lines.append(
             "# Note: columns of orientations or deviations are there too; which target they are of is not clear."
         )
+        left.columns = sorted([*left.columns, *unclear], key=lambda column: column.place)
     if temperature is not None:
         unit = temperature.unit if temperature.unit in ("degC", "degF", "K") else OPEN
         value = f"{{column: {named(temperature)}, unit: {quoted(unit)}}}"
@@ -311,10 +342,10 @@ def _names(left: _Left, several: bool) -> tuple[Column | None, Column | None, st
     """Return the columns of the configuration and of the target, and a pattern if one column holds both."""
     for column in left.columns:
         parts = {text.count("::") for text in column.texts}
-        if parts in ({1}, {2}):
+        pattern = f"{'[^:]*::' if parts == {2} else ''}(?P<configuration>[^:]+)::(?P<target>[^:]+)"
+        if parts in ({1}, {2}) and all(re.fullmatch(pattern, text) for text in column.texts):
             left.take([column])
-            lead = "[^:]*::" if parts == {2} else ""
-            return column, None, rf"{lead}(?P<configuration>[^:]+)::(?P<target>[^:]+)"
+            return column, None, pattern
     whole = [column for column in left.columns if column.given and len(column.given) == len(column.texts)]
     texts = [column for column in whole if column.can_name]
     target = None if several else named_like(texts, "target")
@@ -348,41 +379,20 @@ def _write_joints(text: MappingText, joints: Sequence[Column]) -> None:
         text.add("joints.units", f"[{', '.join(units)}]", "the headings", f"  units: [{', '.join(units)}]")
         return
     unit, why = angle_unit(joints)
+    if "mrad" in units:
+        unit, why = OPEN, "the headings say mrad, in which joints are not read: convert the columns"
     text.add("joints.unit", unit, why, f"  unit: {quoted(unit)}")
 
 
-def _write_order(text: MappingText, label: Column | None, time: Column | None, pattern: str | None) -> None:
+def _write_order(text: MappingText, label: Column | None, time: GuessedTime | None, pattern: str | None) -> None:
     """Write what tells the order of measurement, if anything seems to."""
     if time is not None:
-        if time.is_numeric:
-            text.add("order", f"{{column: {named(time)}}}", "its name")
-            return
-        formats = _formats(time.given)
-        if formats:
-            shown = "iso" if formats[0] == "iso" else f"'{formats[0]}'"
-            value = f"{{column: {named(time)}, time: {shown}}}"
-            because = "its name and its texts"
-            if len(formats) > 1:
-                because = f"its texts; {formats[1]} would read them too"
-            text.add("order", value, because)
-            return
+        text.add("order", time.value, time.because)
+        return
     if label is not None and pattern is None and not label.is_numeric:
         starts = {match[1] if (match := _NUMBERED.fullmatch(name)) else None for name in set(label.texts)}
         if len(starts) == 1 and None not in starts:
             text.add("order", "{by: labels}", "the labels are numbered; remove it if they were not measured so")
-
-
-def _formats(texts: Sequence[str]) -> list[str]:
-    """Return the formats that read all of these times."""
-    return [way for way in ("iso", *_TIMES) if all(_reads(text, way) for text in texts)]
-
-
-def _reads(text: str, way: str) -> bool:
-    try:
-        datetime.fromisoformat(text) if way == "iso" else datetime.strptime(text, way)
-    except ValueError:
-        return False
-    return True
 
 
 def _tried(made: Guessed, path: Path) -> Guessed:

@@ -15,7 +15,7 @@ from truearm.errors import InputError
 from truearm.files import read_bytes
 from truearm.limits import refuse_beyond
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, split_line
-from truearm.measurement.readers.sheets import Workbook, is_workbook, open_workbook, sheet_cells
+from truearm.measurement.readers.sheets import Workbook, is_workbook, open_workbook, sheet_cells, texts_of
 from truearm.units import as_number
 
 #: Lines that are looked at.
@@ -26,10 +26,13 @@ _CHARACTERS: Final = 400_000
 _TITLES: Final = 8
 _DELIMITERS: Final = {"semicolon": ";", "tab": "\t", "comma": ",", "whitespace": None}
 _COMMENTS: Final = ("//", "#", "%", "!", "*")
+#: Units of which 400 are a turn; a degree is called Grad in German too.
+GON: Final = frozenset({"gon", "grad", "Grad"})
 #: Units that stand in a line of their own, or behind a name.
 UNITS: Final = {
     **{name: name for name in ("mm", "m", "um", "in", "deg", "rad", "mrad", "degC", "degF", "K")},
-    **{"µm": "um", "μm": "um", "inch": "in", "°": "deg", "degree": "deg", "degrees": "deg", "grad": "deg"},
+    **{"µm": "um", "μm": "um", "inch": "in", "°": "deg", "degree": "deg", "degrees": "deg", "gon": "gon"},
+    **{"grad": "grad", "Grad": "Grad"},
     **{"radian": "rad", "radians": "rad", "°c": "degC", "°C": "degC", "degc": "degC", "°F": "degF"},
     **{"metre": "m", "meter": "m", "millimetre": "mm", "millimeter": "mm"},
 }
@@ -43,6 +46,9 @@ NOTHING: Final = re.compile(
 _HEADED: Final = 15
 #: So many different texts in a line without numbers are headings.
 _DIFFERENT: Final = 3
+
+#: A line of data has so many numbers.
+_ENOUGH: Final = 2
 
 Rows = list[tuple[int, list[str]]]
 
@@ -201,7 +207,7 @@ def number_of(text: str, decimal: str) -> float | None:
 def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path: Path) -> GuessedLayout:
     """Find the first line with data, and the names and units above it."""
     counts = sorted(_numbers(cells, split.decimal) for n, cells in split.rows if n > 0 and len(cells) == split.width)
-    enough = max(2, counts[len(counts) // 2] / 2)
+    enough = max(_ENOUGH, counts[len(counts) // 2] / 2)
     whole = [n > 0 and len(cells) == split.width for n, cells in split.rows]
     data = [i for i, (_, cells) in enumerate(split.rows) if whole[i] and _numbers(cells, split.decimal) >= enough]
     headed = [i for i, found in enumerate(whole[:_HEADED]) if found and _is_heading(split.rows[i][1], split.decimal)]
@@ -225,13 +231,17 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
             entries["first_row"] = (first, "the first line of numbers")
         return replace(made, names=numbers, headings=numbers)
     line, names = above[-1]
+    upper = above[-2][1] if len(above) > 1 else [""] * split.width
     given = [name for name in names if name]
     if len(set(given)) < len(given):
         entries["header"] = ("none", f"line {line} has names twice, so that columns go by number")
         entries["first_row"] = (first, "the first line of numbers")
-        upper = above[-2][1] if len(above) > 1 else [""] * split.width
         headings = tuple(f"{over} {name}".strip() for over, name in zip(upper, names, strict=True))
         return replace(made, names=numbers, headings=headings)
+    if any(not name and any(column) for name, column in zip(names, columns, strict=True)):
+        entries["header"] = ("none", f"line {line} leaves a column without a name, so that columns go by number")
+        entries["first_row"] = (first, "the first line of numbers")
+        return replace(made, names=numbers, headings=tuple(n or over for over, n in zip(upper, names, strict=True)))
     entries["header"] = (line, "the last line of names above the numbers")
     if first != line + 1:
         entries["first_row"] = (first, "the first line of numbers")
@@ -255,42 +265,69 @@ def _is_units(cells: Sequence[str]) -> bool:
 
 
 def _of_workbook(path: Path) -> GuessedLayout:
-    """Return the layout of the sheet that has the most numbers."""
+    """Return the layout of the sheet that has the most numbers, or refuse one that has more and cannot be read."""
     best: tuple[_Split, str] | None = None
     book = open_workbook(path)
+    left: dict[str, tuple[int, InputError]] = {}
     for name in book.names:
-        cells = _cells_below_titles(book, name)
-        if cells is None:
+        shown = texts_of(book, name, _LOOKED_AT)
+        cells = _cells_below_titles(book, name, shown)
+        if isinstance(cells, InputError):
+            if any(map(any, shown)):
+                left[name] = sum(_numbers(row, ".") for row in shown), cells
             continue
         rows: Rows = [
             (number, [column[row] for column in cells.columns]) for row, number in enumerate(cells.lines[:_LOOKED_AT])
         ]
         split = _measured(rows)
-        if best is None or split.numbers > best[0].numbers:
+        if split.numbers and (best is None or split.numbers > best[0].numbers):
             best = split, name
-    if best is None or best[0].numbers == 0:
-        if book.names:
-            sheet_cells(book, book.names[0], Layout(header=None), str(path))
+    larger = max(left.values(), key=lambda found: found[0], default=None)
+    if larger is not None and (best is None or larger[0] >= best[0].numbers):
+        raise larger[1]
+    if best is None:
         raise InputError(
-            "no sheet looks like a table of numbers", where=str(path), allowed="a sheet with names above columns"
+            "no sheet looks like a table of numbers",
+            where=str(path),
+            allowed="a sheet with names above columns, and at least two cells with numbers in a row",
+            cure="Write numbers as numbers: those that stand in their cells as texts, such as '12,5', are none.",
         )
     entries: dict[str, tuple[str | int, str]] = {}
     if len(book.names) > 1:
-        entries["sheet"] = (best[1], f"it has the most numbers of {len(book.names)} sheets")
-    return _with_header(best[0], entries, path)
+        because = f"it has the most numbers of {len(book.names)} sheets"
+        entries["sheet"] = (best[1], because + (" that can be read" if left else ""))
+    made = _with_header(best[0], entries, path)
+    unread = tuple(f"the sheet {name} was not read: {str(error).rstrip('.')}" for name, (_, error) in left.items())
+    return replace(made, notes=made.notes + unread)
 
 
-def _cells_below_titles(book: Workbook, name: str) -> Cells | None:
-    """Return the cells of a sheet, those below titles whose cells are merged; None if it cannot be read."""
+def _fewest(counts: Sequence[int]) -> float:
+    """Return how many numbers a line of data has at least, by the numbers in all lines."""
+    data = sorted(count for count in counts if count >= _ENOUGH) or [_ENOUGH]
+    return max(_ENOUGH, data[len(data) // 2] / 2)
+
+
+def _cells_below_titles(book: Workbook, name: str, shown: Sequence[Sequence[str]]) -> Cells | InputError:
+    """Return the cells of a sheet, those below titles whose cells are merged, or why it cannot be read.
+
+    A row with as many numbers as others is no title.
+    """
+    counts = [_numbers(row, ".") for row in shown]
+    enough = _fewest(counts)
+    found: InputError | None = None
     for first in range(1, _TITLES + 1):
         try:
             return sheet_cells(book, name, Layout(header=None, first_row=first), str(book.path))
-        except InputError:
-            continue
-    return None
+        except InputError as error:
+            found = error if found is None or first <= len(shown) else found
+        if first <= len(shown) and counts[first - 1] >= enough:
+            break
+    assert found is not None
+    return found
 
 
 def _measured(rows: Rows) -> _Split:
     """Return rows of cells of a sheet, as a text that was cut; empty cells at the end are cells too."""
     width = max((len(cells) for _, cells in rows), default=0)
-    return _Split("", ".", rows, width, sum(_numbers(cells, ".") for _, cells in rows))
+    numbers = [_numbers(cells, ".") for _, cells in rows]
+    return _Split("", ".", rows, width, sum(count for count in numbers if count >= _ENOUGH))

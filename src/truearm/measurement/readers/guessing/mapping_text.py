@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.measurement.readers.guessing.layouts import GON
 from truearm.measurement.readers.guessing.meanings import Column
 
 #: Where nothing in the file tells an answer.
@@ -91,9 +92,12 @@ def unit_of(columns: Sequence[Column]) -> str | None:
 
 def angle_unit(columns: Sequence[Column]) -> tuple[str, str]:
     """Return the unit of angles and what it rests on."""
-    unit = unit_of(columns)
-    if unit is not None:
-        return unit, "the headings"
+    units = list(dict.fromkeys(column.unit for column in columns))
+    of_gon = next((unit for unit in units if unit in GON), None)
+    if of_gon is not None:
+        return OPEN, f"the headings say {of_gon}: 400 to a turn are not read, convert them; 360 to a turn are deg"
+    if any(units):
+        return (units[0], "the headings") if len(units) == 1 else (OPEN, "the headings do not name one unit for all")
     if not columns:
         return OPEN, "nothing tells the unit"
     most = max((float(np.abs(column.values).max()) for column in columns if len(column.values)), default=0.0)
@@ -109,7 +113,10 @@ def length_unit(columns: Sequence[Column]) -> tuple[str, str]:
     unit = unit_of(columns)
     if unit is not None:
         return unit, "the headings"
-    if len({column.unit for column in columns if column.unit}) > 1:
+    units = {column.unit for column in columns if column.unit}
+    if len(units) == 1:
+        return units.pop(), "the headings that name one"
+    if units:
         return f"'{OPEN}'", "the headings name several units, and a mapping has one for all positions"
     most = max((float(np.abs(column.values).max()) for column in columns if len(column.values)), default=0.0)
     if most > _MOST_METRES:

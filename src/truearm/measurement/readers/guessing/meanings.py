@@ -13,22 +13,38 @@ import numpy as np
 
 from truearm.measurement.readers.guessing.layouts import NOTHING, UNITS, GuessedLayout, number_of
 from truearm.modeling.chain import Array
+from truearm.units import LENGTH_UNITS, SMALL_ANGLE_UNITS
 
-_IN_BRACKETS: Final = re.compile(r"(?P<name>.*?)\s*[\[({](?P<unit>[^\])}]*)[\])}]\s*")
+_IN_BRACKETS: Final = re.compile(r"\s*(?P<sign>[\[({])(?P<unit>[^\])}]*)[\])}]\s*")
+#: Units of what is no position.
+_OTHER_UNITS: Final = frozenset({"s", "ms", "us", "min", "h", "V", "mV", "A", "mA", "N", "kN", "Nm", "N m", "W", "%"})
 _AT_THE_END: Final = re.compile(r"(?P<name>.*[^\s_/,])[\s_/,]+(?P<unit>[^\s_/,]+)\s*")
 _GLUED: Final = re.compile("(?P<name>[XYZxyz])(?P<unit>mm|m|in)")
-_TOKEN: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_]+")
+_TOKEN: Final = re.compile(r"[XYZ](?=(?:act|nom|meas|cmd|ist|soll)\b)|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_]+")
 #: Words before the number of a joint.
 _JOINT: Final = frozenset({"joint", "joints", "axis", "ax", "achse", "gelenk", "j", "a", "q", "theta", "rax"})
 _UR: Final = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
 _YASKAWA: Final = tuple("slurbt")
-_DEVIATION: Final = frozenset({"std", "stdev", "stddev", "sigma", "s", "sd", "u", "unc", "uncertainty", "σ"})
+_DEVIATION: Final = frozenset({"std", "stdev", "stddev", "sigma", "sd", "unc", "uncertainty", "σ"})
+#: Letters of deviations, where an axis or a coverage stands beside them: alone they are speeds, paths and voltages.
+_DEVIATION_LETTERS: Final = frozenset({"s", "u"})
 #: Words of expanded uncertainties.
 _EXPANDED: Final = frozenset({"k2", "u95", "95", "expanded", "2sigma"})
 _NOT_MEASURED: Final = frozenset(
     {"nominal", "nom", "soll", "theoretical", "theo", "cad", "design", "cmd", "command", "commanded", "programmed"}
     | {"error", "err", "delta", "diff", "difference", "dev", "deviation", "residual", "rms", "tol", "tolerance"}
 )
+#: Words of what was measured, and of what is so called beside nominal positions.
+_MEASURED: Final = frozenset({"meas", "measured", "measurement", "ist", "gemessen"})
+_ACTUAL: Final = frozenset({"act", "actual"})
+#: Words of three numbers that are no position.
+_TURNED: Final = frozenset({"ori", "orient", "orientation", "rot", "rotation", "angle", "angles", "euler", "rotvec"})
+_NO_POSITION: Final = _TURNED | {
+    *("quat", "quaternion", "vel", "velocity", "speed", "acc", "accel", "acceleration", "gyro", "omega"),
+    *("force", "torque", "moment", "normal", "offset", "correction", "corr", "weight"),
+}
+#: Letters of differences and velocities, where no other letters stand for targets.
+_NO_TARGET: Final = frozenset({"d", "v"})
 #: Words of positions that a controller shows or was given, where others stand beside them.
 _TOOL: Final = frozenset({"tcp", "tool", "flange", "robot", "target", "desired", "setpoint", "reference"})
 _LABEL: Final = frozenset(
@@ -50,7 +66,10 @@ _ANGLES: Final = {
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its place, name, unit in the heading, words of the name, and what stands in it."""
+    """A column: its place, name, unit in the heading, words of the name, and what stands in it.
+
+    `foreign` is what stands where a unit belongs and is none that is known, such as V or mm/s.
+    """
 
     place: int
     name: str
@@ -58,6 +77,7 @@ class Column:
     words: tuple[str, ...]
     texts: tuple[str, ...]
     decimal: str
+    foreign: str = ""
 
     @cached_property
     def given(self) -> list[str]:
@@ -106,25 +126,36 @@ def columns_of(layout: GuessedLayout) -> list[Column]:
     """Return the columns of a table."""
     made = []
     for place, (name, heading, texts) in enumerate(zip(layout.names, layout.headings, layout.columns, strict=True)):
-        bare, unit = _name_and_unit(heading) if layout.header else (heading, "")
+        bare, unit, foreign = _name_and_unit(heading) if layout.header else (heading, "", "")
         words = tuple(word.lower() for word in _TOKEN.findall(bare)) if layout.header else ()
-        made.append(Column(place, name, unit or layout.units[place], words, texts, layout.decimal))
+        made.append(Column(place, name, unit or layout.units[place], words, texts, layout.decimal, foreign))
     return made
 
 
-def _name_and_unit(heading: str) -> tuple[str, str]:
-    for pattern in (_IN_BRACKETS, _AT_THE_END, _GLUED):
-        match = pattern.fullmatch(heading)
-        if match is not None and (unit := UNITS.get(match["unit"].strip())):
-            return match["name"], unit
-    return heading, ""
+def _name_and_unit(heading: str) -> tuple[str, str, str]:
+    """Return a heading without its unit, the unit, and what stands in its place where it is not known."""
+    foreign = ""
+    for match in _IN_BRACKETS.finditer(heading):
+        inside = match["unit"].strip()
+        bare = f"{heading[: match.start()]} {heading[match.end() :]}".strip()
+        if unit := UNITS.get(inside):
+            return bare, unit, ""
+        if match["sign"] == "[" or inside in _OTHER_UNITS or "/" in inside:
+            heading, foreign = bare, inside
+            break
+    for pattern in (_AT_THE_END, _GLUED):
+        found = pattern.fullmatch(heading)
+        if not foreign and found is not None and (unit := UNITS.get(found["unit"].strip())):
+            return found["name"], unit, ""
+    return heading, "", foreign
 
 
 def joints_among(columns: Sequence[Column]) -> list[Column]:
     """Return the columns of the joints in their order, none if no names say so."""
     groups: dict[tuple[str, ...], dict[int, Column]] = {}
     for column in columns:
-        *before, number = column.words or ("",)
+        words = column.words[:-1] if {*column.words[-1:]} & (_ACTUAL | _MEASURED) else column.words
+        *before, number = words or ("",)
         if not before or not number.isdigit() or before[-1] not in _JOINT or _NOT_MEASURED & set(before):
             continue
         groups.setdefault(tuple(before), {}).setdefault(int(number), column)
@@ -161,11 +192,50 @@ def triples_among(columns: Iterable[Column], last: Sequence[str]) -> dict[tuple[
     }
 
 
+def _may_be(columns: Iterable[Column], units: Sequence[str]) -> bool:
+    """Return whether no column names a unit of something else."""
+    return all(column.unit in ("", *units) and not column.foreign for column in columns)
+
+
 def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
     """Return the columns x, y, z of each target by the other words of their names."""
-    found = {key: three for key, three in triples_among(columns, "xyz").items() if not _DEVIATION & set(key)}
-    measured = {key: three for key, three in found.items() if not _TOOL & set(key)}
+    columns = list(columns)
+    found = {
+        key: three
+        for key, three in triples_among(columns, "xyz").items()
+        if not (_DEVIATION | _DEVIATION_LETTERS | _NO_POSITION) & set(key) and _may_be(three, LENGTH_UNITS)
+    }
+    letters = {key for key in found if len("".join(key)) == 1}
+    if all(_NO_TARGET & set(key) for key in letters):
+        found = {key: three for key, three in found.items() if key not in letters}
+    found = {key: three for key, three in found.items() if not (_NO_TARGET & set(key) and len(key) > 1)}
+    beside_nominal = any(_NOT_MEASURED & set(column.words) for column in columns)
+    for words in (_MEASURED, _ACTUAL if beside_nominal else frozenset[str]()):
+        if chosen := {key: three for key, three in found.items() if words & set(key)}:
+            return chosen
+    measured = {key: three for key, three in found.items() if not (_TOOL & set(key) or _is_unit(three))}
     return measured or found
+
+
+def stand_ins_among(positions: Sequence[Triple], others: Sequence[Column]) -> tuple[list[str], str | None]:
+    """Return numbers that stand for no reading, as -999 or 0 in all of x, y and z, and one that stands elsewhere too.
+
+    `others` are further columns in which the texts would be taken for nothing.
+    """
+    found: dict[str, None] = {}
+    kept: list[str] = []
+    somewhere: set[int] = set()
+    for three in positions:
+        rows = list(zip(*(column.texts for column in three), strict=True))
+        numbers = [{number_of(text, three[0].decimal) for text in row} for row in rows]
+        alike = {at for at, values in enumerate(numbers) if len(values) == 1 and None not in values}
+        if 2 * len(alike) >= len(rows):
+            alike = set()
+        somewhere |= alike
+        found.update(dict.fromkeys(text for at in sorted(alike) for text in rows[at]))
+        kept += [text for at, row in enumerate(rows) if at not in alike for text in row]
+    kept += [text for column in others for at, text in enumerate(column.texts) if at not in somewhere]
+    return list(found), next((text for text in found if text in kept), None)
 
 
 def quaternion_among(columns: Sequence[Column]) -> tuple[list[Column], bool]:
@@ -182,17 +252,18 @@ def quaternion_among(columns: Sequence[Column]) -> tuple[list[Column], bool]:
         (("q0", "q1", "q2", "q3"), False),
         (("q1", "q2", "q3", "q4"), False),
     ):
-        for start in ("", "quat", "orientation", "rotation", "pose"):
+        for start in ("", "quat", "quaternion", "orientation", "orient", "ori", "rotation", "rot", "pose"):
             four = [named[start + name] for name in names if start + name in named]
-            if len(four) == 4 and _is_quaternion(four):
+            if len(four) == 4 and _is_unit(four):
                 return four, sure
     return [], True
 
 
-def _is_quaternion(four: Sequence[Column]) -> bool:
-    if len({len(column.values) for column in four}) > 1 or not len(four[0].values):
+def _is_unit(columns: Sequence[Column]) -> bool:
+    """Return whether the sum of their squares is 1 in every row, as of quaternions and directions."""
+    if len({len(column.values) for column in columns}) > 1 or not len(columns[0].values):
         return False
-    length = np.sqrt(sum(column.values**2 for column in four))
+    length = np.sqrt(sum(column.values**2 for column in columns))
     return bool(np.abs(length - 1.0).max() < 1e-2)
 
 
@@ -203,26 +274,38 @@ def angles_among(columns: Sequence[Column]) -> tuple[Triple, str, str, str] | No
             if all(column.is_numeric for column in three):
                 return three, about, axes, who
     for key, three in triples_among(columns, ("rx", "ry", "rz")).items():
-        if not _DEVIATION & set(key):
+        if not (_DEVIATION | _NO_TARGET) & set(key):
             return three, "?", "?", "names such as Rx do not say it"
+    for key, three in triples_among(columns, "xyz").items():
+        others = _DEVIATION | _DEVIATION_LETTERS | _NO_TARGET
+        if _TURNED & set(key) and not others & set(key) and _is_turned(three):
+            return three, "?", "?", f"names such as {three[0].name} do not say it"
     return None
+
+
+def _is_turned(three: Triple) -> bool:
+    return _may_be(three, SMALL_ANGLE_UNITS) and all(column.is_numeric for column in three)
 
 
 def deviations_among(columns: Sequence[Column], of: Sequence[str]) -> list[Column]:
     """Return the columns with the deviations of x, y, z, or those of rx, ry, rz: one, three or none."""
+    turned = tuple(of) != ("x", "y", "z")
+    units = SMALL_ANGLE_UNITS if turned else LENGTH_UNITS
+    columns = [column for column in columns if _may_be([column], units) and column.is_numeric]
     for key, three in triples_among(columns, of).items():
-        if _DEVIATION & set(key):
+        if (_DEVIATION | _DEVIATION_LETTERS) & set(key):
             return [*three]
     for sign in ("u", "s"):
         named = {"".join(column.words): column for column in columns}
         if all(sign + axis in named for axis in of):
             return [named[sign + axis] for axis in of]
-    if tuple(of) != ("x", "y", "z"):
+    if turned:
         return []
     plain = [
         column
         for column in columns
-        if _DEVIATION & set(column.words) and not {"rot", "angle", "x", "y", "z"} & set(column.words)
+        if (_DEVIATION & set(column.words) or (_DEVIATION_LETTERS & set(column.words) and is_expanded([column])))
+        and not (_TURNED | {"x", "y", "z"}) & set(column.words)
     ]
     return plain[:1]
 

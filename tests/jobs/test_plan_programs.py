@@ -283,3 +283,10 @@ def test_programs_of_two_plans_never_stand_in_one_folder(folder: Path, planned: 
         refuse_other_programs(folder, ["MEASURE.src"])
     assert refusal.value.parameter == "out"
     refuse_other_programs(folder, ["MEASURE.mod"])
+
+
+@pytest.mark.parametrize(("language", "name"), [("urscript", "8"), ("krl", "0"), ("krl", "99999")])
+def test_an_input_that_a_controller_does_not_have_is_refused(language: str, name: str) -> None:
+    with pytest.raises(InputError, match="has no such digital input") as refusal:
+        program_wanted(language, approach=False, speed=None, dwell=None, wait=f"input {name}")
+    assert refusal.value.parameter == "wait"

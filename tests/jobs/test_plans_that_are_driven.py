@@ -336,3 +336,15 @@ def test_arms_of_other_kinds_are_driven_where_nothing_is_near(kind: str, tmp_pat
     robot = planned.made.robot
     assert sampled_room(robot, on_the_ways(planned), Cell(0.0 if not low else None), points=9).min() >= 0.05
     assert len(planned.tour.measured) == 12
+
+
+def test_a_clearance_in_another_unit_is_refused() -> None:
+    with pytest.raises(InputError, match=r"so little room.*'0\.05 mm'") as refusal:
+        truearm.plan("irb120", poses=10, candidates=60, clearance=5e-5)
+    assert refusal.value.parameter == "clearance"
+
+
+def test_a_plan_warns_of_links_beside_their_lines() -> None:
+    planned = truearm.plan("ur5e", poses=10, candidates=60)
+    assert any("links-beside" in line for line in planned.lines())
+    assert [one["code"] for one in planned.summary()["warnings"]] == ["links-beside"]

@@ -92,7 +92,9 @@ def plan(
             show_default="0; where the robot hangs, its mounting surface",
         ),
     ] = None,
-    no_floor: Annotated[bool, typer.Option("--no-floor", help="There is no floor and no mounting surface to keep clear.")] = False,
+    no_floor: Annotated[
+        bool, typer.Option("--no-floor", help="There is no floor and no mounting surface to keep clear.")
+    ] = False,
     clearance: Annotated[
         float | None,
         typer.Option(

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.jobs.arguments import flag_argument, length_argument, numbers_argument
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.constraints import Constraints, keep_out
-from truearm.planning.driving.cell import CLEARANCE, FLOOR, MOUNTING, Cell, boxes_of, refuse_floor_above_base, refuse_floor_elsewhere, stands
+from truearm.planning.driving.cell import (
+    CLEARANCE,
+    FLOOR,
+    MOUNTING,
+    Cell,
+    boxes_of,
+    refuse_floor_above_base,
+    refuse_floor_elsewhere,
+    stands,
+)
 from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.driving.home import checked_home, safe_configuration
 from truearm.planning.driving.joint_window import joint_window
 from truearm.planning.driving.ways import WayFinder
 from truearm.units import sized_si
+
+#: What is less, and not zero, is meant in another unit [m].
+_LEAST_CLEARANCE: Final = 1e-3
 
 
 def cell_argument(
@@ -44,7 +58,8 @@ def cell_argument(
     Raises
     ------
     InputError
-        If the floor is above the base, or is none, as the robot does not stand, or both given and denied, or a length is none.
+        If the floor is above the base, or is none, as the robot does not stand, or both given and denied, or a length is
+        none, or the clearance above 0 and below 1 mm.
     """
     without = flag_argument(no_floor, "no_floor")
     height = None if floor is None else length_argument(floor, "floor")
@@ -67,6 +82,14 @@ def cell_argument(
         if constraints is not None and constraints.floor is not None:
             height = min(0.0, sized_si(constraints.floor, constraints.units.length, f"{where}, floor"))
     room = CLEARANCE if clearance is None else length_argument(clearance, "clearance", 0.0)
+    if 0.0 < room < _LEAST_CLEARANCE:
+        raise InputError(
+            "so little room is kept by no arm whose thickness is estimated",
+            parameter="clearance",
+            came=f"{room * 1e3:g} mm",
+            allowed=f"0 mm, or {_LEAST_CLEARANCE * 1e3:g} mm and more",
+            cure="Check its unit.",
+        )
     boxes = boxes_of({} if constraints is None else keep_out(constraints, where))
     return Cell(height, boxes, room, FLOOR if standing else MOUNTING)
 

@@ -22,6 +22,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
+from truearm.planning.driving.links_beside import beside_notices
 from truearm.results.plan import Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.units import as_number
@@ -42,6 +43,8 @@ _WAITS: Final = "time; input N or input N,SECONDSs; operator"
 _INPUT: Final = re.compile(r"([0-9]{1,5}|[A-Za-z][A-Za-z0-9_]{0,31})")
 #: Languages whose inputs have names.
 _NAMED_INPUTS: Final = ("RAPID",)
+#: Numbers of the digital inputs, where a language has them: standard ones of a UR, as many as KUKA has at most.
+_INPUTS: Final = {"URScript": (0, 7), "KRL": (1, 8192)}
 #: Devices that see the arm, or are fixed to it, while it is driven.
 _SEEN: Final = (
     "tracker",
@@ -284,6 +287,15 @@ def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "
         raise InputError(
             f"digital inputs have numbers in {language.name}", parameter="wait", came=name, allowed="input 3"
         )
+    if name.isdigit() and language.name in _INPUTS:
+        low, high = _INPUTS[language.name]
+        if not low <= int(name) <= high:
+            raise InputError(
+                f"{language.name} has no such digital input",
+                parameter="wait",
+                came=name,
+                allowed=f"input {low} to input {high}",
+            )
     if comma:
         seconds = as_number(time.removesuffix("s").strip()) if time.endswith("s") else None
         if seconds is None:
@@ -293,7 +305,7 @@ def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "
 
 
 def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -> list[Notice]:
-    found = counts_notices(robot)
+    found = [*counts_notices(robot), *beside_notices(robot)]
     unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
     if unsaid:
         cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []

@@ -58,8 +58,8 @@ def cell_argument(
     Raises
     ------
     InputError
-        If the floor is above the base, or is none, as the robot does not stand, or both given and denied, or a length is
-        none, or the clearance above 0 and below 1 mm.
+        If the floor is above the base, or is none, as the robot does not stand, or both given and denied, or a
+        length is none, or the clearance above 0 and below 1 mm.
     """
     without = flag_argument(no_floor, "no_floor")
     height = None if floor is None else length_argument(floor, "floor")

@@ -133,7 +133,8 @@ def plan(
         not stand, only 0 is taken: the surface on which it is mounted. With a clearance it is kept by all that moves,
         as are the boxes of the constraints and the arm's own links: in every configuration, and on the ways from the
         safe one to the first, on to each other and back. Configurations that are given were reached
-        once: they are checked if one of these four or a program is said, with joints that can turn further than once on the turn from -180 to 180 deg.
+        once: they are checked if one of these four or a program is said, with joints that can turn further than once on
+        the turn from -180 to 180 deg.
     no_floor
         Whether there is no floor and no mounting surface.
     clearance

@@ -304,8 +304,26 @@ def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "
     return "input", name, longest
 
 
+def _overload(robot: Robot) -> list[Notice]:
+    """Return what to know of a load above that for which the arm is rated."""
+    if robot.rated_load is None or robot.payload.mass <= robot.rated_load:
+        return []
+    return [
+        Notice(
+            "overload",
+            f"The flange carries {robot.payload.mass:g} kg, and {robot.name} is rated for {robot.rated_load:g} kg. "
+            "Check the unit and the tool of `payload` before anything is driven.",
+        )
+    ]
+
+
+def _taken(robot: Robot) -> str:
+    """Say which tool a plan has taken."""
+    return f"{robot.payload.mass:g} kg and {', '.join(f'target {one.name}' for one in robot.targets) or 'no target'}"
+
+
 def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -> list[Notice]:
-    found = [*counts_notices(robot), *beside_notices(robot)]
+    found = [*_overload(robot), *counts_notices(robot), *beside_notices(robot)]
     unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
     if unsaid:
         cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []
@@ -314,7 +332,7 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
             Notice(
                 "tool-assumed",
                 f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is "
-                f"assumed. {' '.join(cures)}",
+                f"assumed, {_taken(robot)}. {' '.join(cures)}",
             )
         )
     slow, fast = joint_rates(robot)

@@ -205,10 +205,10 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         driven = with_program(replace(planned, made=made, tour=tour, program=None), asked, robot, weighed=False).program
         assert driven is not None
         codes = [notice.code for notice in driven.warnings]
-        assert codes == ["controller-counts-assumed", "tool-assumed", "joint-speed-assumed"]
-        assert [notice.level for notice in driven.warnings] == ["warning", "warning", "note"]
+        assert codes == ["controller-counts-assumed", "links-beside", "tool-assumed", "joint-speed-assumed"]
+        assert [notice.level for notice in driven.warnings] == ["warning", "warning", "warning", "note"]
         assert any("compare joints with the pendant" in text for text in driven.files.values())
-        assert "Nobody said the load of the flange" in driven.warnings[1].message
+        assert "Nobody said the load of the flange" in driven.warnings[2].message
         by_hand = {"fanuc": "Payload schedule 1 on", "inform": "Tool file 0 on", "val3": "The tool flange on"}
         assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.lines())
 
@@ -283,3 +283,20 @@ def test_programs_of_two_plans_never_stand_in_one_folder(folder: Path, planned: 
         refuse_other_programs(folder, ["MEASURE.src"])
     assert refusal.value.parameter == "out"
     refuse_other_programs(folder, ["MEASURE.mod"])
+
+
+@pytest.mark.parametrize(("language", "name"), [("urscript", "8"), ("krl", "0"), ("krl", "99999")])
+def test_an_input_that_a_controller_does_not_have_is_refused(language: str, name: str) -> None:
+    with pytest.raises(InputError, match="has no such digital input") as refusal:
+        program_wanted(language, approach=False, speed=None, dwell=None, wait=f"input {name}")
+    assert refusal.value.parameter == "wait"
+
+
+def test_a_load_above_the_rated_one_is_warned_of() -> None:
+    robot = replace(truearm.load_robot("irb120"), rated_load=3.0)
+    planned = truearm.plan(robot, **QUICK, program="rapid", payload="9kg,0mm,0mm,60mm", out=None)
+    assert planned.program is not None
+    (notice,) = [one for one in planned.program.warnings if one.code == "overload"]
+    assert notice.level == "warning"
+    assert "carries 9 kg" in notice.message
+    assert "rated for 3 kg" in notice.message

@@ -123,19 +123,38 @@ def test_a_file_with_a_floor_below_the_base_lowers_it() -> None:
     assert above.tour.floor == 0.0
 
 
-def test_a_robot_that_hangs_has_no_floor() -> None:
-    planned = truearm.plan("irb120", poses=12, candidates=60, gravity=(0.0, 0.0, 9.81))
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, 9.81), (9.81, 0.0, 0.0)])
+def test_a_ceiling_or_wall_that_carries_the_robot_is_kept_clear(gravity: tuple[float, float, float]) -> None:
+    planned = truearm.plan("irb120", poses=10, candidates=60, gravity=gravity)
     assert planned.tour is not None
-    assert planned.tour.floor is None
-    assert "No floor is kept clear: by its gravity the robot does not stand on one." in planned.lines()
-    mounted = truearm.plan("irb120", poses=12, candidates=60, gravity=(0.0, 0.0, 9.81), floor=0.0)
-    assert mounted.tour is not None
-    assert mounted.tour.floor == 0.0
+    assert planned.tour.floor == 0.0
+    assert sampled_room(planned.made.robot, on_the_ways(planned), Cell()).min() >= 0.048
+    words = "\n".join(planned.lines())
+    assert "mm or more from the mounting surface at 0 mm" in words
+    assert "Only its mounting surface is kept clear: by its gravity the robot does not stand" in words
+    assert "floor" not in words
+
+
+def test_without_a_floor_an_arm_that_stands_goes_below_its_base() -> None:
     without = truearm.plan("irb120", poses=12, candidates=60, no_floor=True)
     assert without.tour is not None
     assert without.tour.floor is None
     assert not any("gravity" in line for line in without.lines())
     assert without.made.robot.forward(without.joints)[0][:, 2].min() < 0.0
+
+
+def test_what_carries_the_robot_is_taken_away_as_a_floor_is() -> None:
+    planned = truearm.plan("irb120", poses=10, candidates=60, gravity=(0.0, 0.0, 9.81), no_floor=True)
+    assert planned.tour is not None
+    assert planned.tour.floor is None
+    assert any(line.startswith("Its mounting surface is not kept clear") for line in planned.lines())
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, 9.81), (9.81, 0.0, 0.0)])
+def test_a_height_in_the_base_frame_is_no_floor_of_a_robot_that_hangs(gravity: tuple[float, float, float]) -> None:
+    with pytest.raises(InputError, match=r"(?s)does not stand by its gravity.*'-600 mm'.*keep_out") as refusal:
+        truearm.plan("irb120", poses=10, candidates=60, gravity=gravity, floor=-0.6)
+    assert refusal.value.parameter == "floor"
 
 
 def test_a_safe_configuration_that_is_given_is_driven_from() -> None:
@@ -317,3 +336,15 @@ def test_arms_of_other_kinds_are_driven_where_nothing_is_near(kind: str, tmp_pat
     robot = planned.made.robot
     assert sampled_room(robot, on_the_ways(planned), Cell(0.0 if not low else None), points=9).min() >= 0.05
     assert len(planned.tour.measured) == 12
+
+
+def test_a_clearance_in_another_unit_is_refused() -> None:
+    with pytest.raises(InputError, match=r"so little room.*'0\.05 mm'") as refusal:
+        truearm.plan("irb120", poses=10, candidates=60, clearance=5e-5)
+    assert refusal.value.parameter == "clearance"
+
+
+def test_a_plan_warns_of_links_beside_their_lines() -> None:
+    planned = truearm.plan("ur5e", poses=10, candidates=60)
+    assert any("links-beside" in line for line in planned.lines())
+    assert [one["code"] for one in planned.summary()["warnings"]] == ["links-beside"]

@@ -89,10 +89,12 @@ def plan(
         typer.Option(
             metavar="MM",
             help="Height of the floor in the base frame, kept clear.",
-            show_default="0, and none where the robot hangs",
+            show_default="0; where the robot hangs, its mounting surface",
         ),
     ] = None,
-    no_floor: Annotated[bool, typer.Option("--no-floor", help="There is no floor to keep clear.")] = False,
+    no_floor: Annotated[
+        bool, typer.Option("--no-floor", help="There is no floor and no mounting surface to keep clear.")
+    ] = False,
     clearance: Annotated[
         float | None,
         typer.Option(

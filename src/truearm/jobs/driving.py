@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.jobs.arguments import flag_argument, length_argument, numbers_argument
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.constraints import Constraints, keep_out
-from truearm.planning.driving.cell import CLEARANCE, Cell, boxes_of, refuse_floor_above_base, stands
+from truearm.planning.driving.cell import (
+    CLEARANCE,
+    FLOOR,
+    MOUNTING,
+    Cell,
+    boxes_of,
+    refuse_floor_above_base,
+    refuse_floor_elsewhere,
+    stands,
+)
 from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.driving.home import checked_home, safe_configuration
 from truearm.planning.driving.joint_window import joint_window
 from truearm.planning.driving.ways import WayFinder
 from truearm.units import sized_si
+
+#: What is less, and not zero, is meant in another unit [m].
+_LEAST_CLEARANCE: Final = 1e-3
 
 
 def cell_argument(
@@ -34,16 +48,18 @@ def cell_argument(
         With boxes to keep out of, and the file that says so, for messages. Its floor, if it has one below the base,
         is the floor unless `floor` says another.
     floor
-        Height in the base frame [m]; None for 0 where the robot stands, and for none where it hangs.
+        Height in the base frame [m]; None for 0: where the robot hangs or is on a wall, that is the surface
+        on which it is mounted, and no other height is one of a floor.
     no_floor
-        Whether there is no floor to keep clear of.
+        Whether there is no floor and no mounting surface to keep clear of.
     clearance
         Room to keep [m]; None for 50 mm.
 
     Raises
     ------
     InputError
-        If the floor is above the base, or both given and denied, or a length is none.
+        If the floor is above the base, or is none, as the robot does not stand, or both given and denied, or a
+        length is none, or the clearance above 0 and below 1 mm.
     """
     without = flag_argument(no_floor, "no_floor")
     height = None if floor is None else length_argument(floor, "floor")
@@ -54,14 +70,28 @@ def cell_argument(
             came=f"{1e3 * float(height):g} mm",
             cure="Leave one of them out.",
         )
-    if height is not None:
+    standing = stands(robot)
+    if height is not None and not standing:
+        refuse_floor_elsewhere(height)
+    elif height is not None:
         refuse_floor_above_base(height)
-    elif not without and stands(robot):
+    elif not without and not standing:
+        height = 0.0
+    elif not without:
         height = 0.0
         if constraints is not None and constraints.floor is not None:
             height = min(0.0, sized_si(constraints.floor, constraints.units.length, f"{where}, floor"))
     room = CLEARANCE if clearance is None else length_argument(clearance, "clearance", 0.0)
-    return Cell(height, boxes_of({} if constraints is None else keep_out(constraints, where)), room)
+    if 0.0 < room < _LEAST_CLEARANCE:
+        raise InputError(
+            "so little room is kept by no arm whose thickness is estimated",
+            parameter="clearance",
+            came=f"{room * 1e3:g} mm",
+            allowed=f"0 mm, or {_LEAST_CLEARANCE * 1e3:g} mm and more",
+            cure="Check its unit.",
+        )
+    boxes = boxes_of({} if constraints is None else keep_out(constraints, where))
+    return Cell(height, boxes, room, FLOOR if standing else MOUNTING)
 
 
 def finder_argument(

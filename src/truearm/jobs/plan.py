@@ -129,13 +129,14 @@ def plan(
         Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
     floor
-        Height of the floor in the base frame [m], 0 or less; None for 0, and for none where the robot's gravity says
-        that it does not stand. With a clearance it is kept by all that moves, as are the boxes of the constraints and
-        the arm's own links: in every configuration, and on the ways from the safe one to the first, on to each other
-        and back. Configurations that are given were reached once: they are checked if one of these four is said, with
-        joints that can turn further than once on the turn from -180 to 180 deg.
+        Height of the floor in the base frame [m], 0 or less; None for 0. Where the robot's gravity says that it does
+        not stand, only 0 is taken: the surface on which it is mounted. With a clearance it is kept by all that moves,
+        as are the boxes of the constraints and the arm's own links: in every configuration, and on the ways from the
+        safe one to the first, on to each other and back. Configurations that are given were reached
+        once: they are checked if one of these four or a program is said, with joints that can turn further than once on
+        the turn from -180 to 180 deg.
     no_floor
-        Whether there is no floor.
+        Whether there is no floor and no mounting surface.
     clearance
         Room to keep [m]; None for 50 mm.
     home

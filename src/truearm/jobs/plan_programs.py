@@ -22,6 +22,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
+from truearm.planning.driving.links_beside import beside_notices
 from truearm.results.plan import Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.units import as_number
@@ -42,6 +43,8 @@ _WAITS: Final = "time; input N or input N,SECONDSs; operator"
 _INPUT: Final = re.compile(r"([0-9]{1,5}|[A-Za-z][A-Za-z0-9_]{0,31})")
 #: Languages whose inputs have names.
 _NAMED_INPUTS: Final = ("RAPID",)
+#: Numbers of the digital inputs, where a language has them: standard ones of a UR, as many as KUKA has at most.
+_INPUTS: Final = {"URScript": (0, 7), "KRL": (1, 8192)}
 #: Devices that see the arm, or are fixed to it, while it is driven.
 _SEEN: Final = (
     "tracker",
@@ -284,6 +287,15 @@ def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "
         raise InputError(
             f"digital inputs have numbers in {language.name}", parameter="wait", came=name, allowed="input 3"
         )
+    if name.isdigit() and language.name in _INPUTS:
+        low, high = _INPUTS[language.name]
+        if not low <= int(name) <= high:
+            raise InputError(
+                f"{language.name} has no such digital input",
+                parameter="wait",
+                came=name,
+                allowed=f"input {low} to input {high}",
+            )
     if comma:
         seconds = as_number(time.removesuffix("s").strip()) if time.endswith("s") else None
         if seconds is None:
@@ -292,8 +304,26 @@ def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "
     return "input", name, longest
 
 
+def _overload(robot: Robot) -> list[Notice]:
+    """Return what to know of a load above that for which the arm is rated."""
+    if robot.rated_load is None or robot.payload.mass <= robot.rated_load:
+        return []
+    return [
+        Notice(
+            "overload",
+            f"The flange carries {robot.payload.mass:g} kg, and {robot.name} is rated for {robot.rated_load:g} kg. "
+            "Check the unit and the tool of `payload` before anything is driven.",
+        )
+    ]
+
+
+def _taken(robot: Robot) -> str:
+    """Say which tool a plan has taken."""
+    return f"{robot.payload.mass:g} kg and {', '.join(f'target {one.name}' for one in robot.targets) or 'no target'}"
+
+
 def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -> list[Notice]:
-    found = counts_notices(robot)
+    found = [*_overload(robot), *counts_notices(robot), *beside_notices(robot)]
     unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
     if unsaid:
         cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []
@@ -302,7 +332,7 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
             Notice(
                 "tool-assumed",
                 f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is "
-                f"assumed. {' '.join(cures)}",
+                f"assumed, {_taken(robot)}. {' '.join(cures)}",
             )
         )
     slow, fast = joint_rates(robot)

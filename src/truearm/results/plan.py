@@ -9,13 +9,15 @@ from typing import Any, Final
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
+from truearm.notices import Notice
 from truearm.planning.choosing.measurement_plan import ERROR, MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.choosing.prediction import There
+from truearm.planning.driving.links_beside import beside_notices
 from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
-from truearm.results.record import Record, joints_lines
+from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
 from truearm.results.tour_files import tour_summary, ways_beside
 from truearm.writing import output_file, output_folder, write_files
 
@@ -85,6 +87,13 @@ class Plan(Record):
         return (*words, "The fixtures of the device are not kept clear of.") if self.made.fixtures else words
 
     @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know of the ways that were checked, and of the program."""
+        if self.program is not None:
+            return self.program.warnings
+        return () if self.tour is None else tuple(beside_notices(self.made.robot))
+
+    @property
     def _there(self) -> tuple[str, ...]:
         """How accurate the robot will be where it shall be, in words."""
         from truearm.reporting.numbers import significant
@@ -132,6 +141,7 @@ class Plan(Record):
             "usable": made.usable,
             "rejected": dict(made.rejected),
             "left_out": list(made.left_out),
+            "warnings": notice_summaries(self.warnings),
             **({} if self.tour is None else {"ways": tour_summary(self.tour, made.robot, self.joints_are)}),
             **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
             "seconds": made.seconds,
@@ -167,7 +177,7 @@ class Plan(Record):
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
-        driven = [] if self.program is None else self.program.lines()
+        driven = notice_lines(self.warnings) if self.program is None else self.program.lines()
         return [*text, *self.driving, *self.answer, *joints_lines(self.joints_are), *driven]
 
     def contents(self) -> dict[str, str]:

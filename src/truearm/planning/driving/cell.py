@@ -14,6 +14,9 @@ from truearm.modeling.robot import Robot
 
 #: Room that is kept between the arm and everything else, unless told [m].
 CLEARANCE: Final = 0.05
+#: What carries an arm that stands, and one that hangs or is on a wall.
+FLOOR: Final = "floor"
+MOUNTING: Final = "mounting surface"
 #: A robot stands on a floor if free fall points this near to the base's -z.
 _STANDING: Final = np.cos(np.deg2rad(30.0))
 
@@ -47,11 +50,14 @@ class Cell:
         What the arm stays out of.
     clearance
         Room to keep to each of them, and between links that are not neighbours [m].
+    surface
+        What the plane at the height `floor` is called: the mounting surface of an arm that does not stand on a floor.
     """
 
     floor: float | None = 0.0
     boxes: tuple[KeepOut, ...] = field(default=())
     clearance: float = CLEARANCE
+    surface: str = FLOOR
 
 
 def stands(robot: Robot) -> bool:
@@ -70,6 +76,21 @@ def refuse_floor_above_base(floor: float) -> None:
             came=f"{floor * 1e3:g} mm",
             allowed="0 mm or less: its height in the base frame",
             cure="A robot on a pedestal has its floor below 0. Something higher than the base is a box to keep out of.",
+        )
+
+
+def refuse_floor_elsewhere(floor: float) -> None:
+    """Refuse a floor that is not the mounting surface of a robot that hangs or is on a wall.
+
+    Heights are along the z-axis of the base, which is not upright there: a plane at one of them is no floor.
+    """
+    if floor != 0.0:
+        raise InputError(
+            "the robot does not stand by its gravity, so no height in its base frame is that of a floor",
+            parameter="floor",
+            came=f"{floor * 1e3:g} mm",
+            allowed="0 mm: the surface on which it is mounted, kept clear without saying so",
+            cure="State the true floor as a box of the constraints (`keep_out`), in the base frame.",
         )
 
 

@@ -21,9 +21,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.segments import box_distance, segment_distance
 from truearm.planning.driving.arm_capsules import ArmCapsules, Capsule
-from truearm.planning.driving.cell import Cell
+from truearm.planning.driving.cell import FLOOR, Cell
 
-FLOOR: Final = "floor"
 LINKS: Final = "links"
 #: What is kept on top of the clearance, so that it holds between the postures that are looked at, too [m].
 MARGIN: Final = 2e-3
@@ -246,7 +245,7 @@ class CollisionCheck:
         # What no joint raises or lowers is where it was mounted.
         level = np.ptp(self.arm.sampled[:, 2], axis=1) < 1e-3
         return [
-            _Room(FLOOR, f"{self._point(k)} comes near the floor", point=k, radius=r)
+            _Room(FLOOR, f"{self._point(k)} comes near the {self.cell.surface}", point=k, radius=r)
             for k, r in sorted(radius.items())
             if not level[k]
         ]

@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from truearm.modeling.chain import Array
+from truearm.planning.driving.cell import FLOOR
 
 #: Why the arm stops: in its safe configuration, on a way around something, right before a measurement, or to measure.
 StopKind = Literal["home", "via", "approach", "measure"]
@@ -48,12 +49,15 @@ class Tour:
         What is kept between the arm and the floor, boxes and its own links [m].
     room
         The smallest such distance that was found on the ways [m]; infinite if there is nothing to come close to.
+    surface
+        What the plane at the height `floor` is called.
     """
 
     stops: tuple[Stop, ...]
     floor: float | None
     clearance: float
     room: float
+    surface: str = FLOOR
 
     @property
     def joints(self) -> Array:

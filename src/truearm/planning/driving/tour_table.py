@@ -41,10 +41,13 @@ def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list
     vias = sum(stop.kind == "via" for stop in tour.stops)
     over = f", {counted(vias, 'via point')} among them" if vias else ""
     text = [f"Driven from home ({home}) and back in {counted(len(tour.stops) - 1, 'move')}{over}."]
-    near = "its own links and boxes" if tour.floor is None else f"the floor at {tour.floor * 1e3:g} mm, boxes and links"
+    near = "its own links and boxes"
+    if tour.floor is not None:
+        near = f"the {tour.surface} at {tour.floor * 1e3:g} mm, boxes and links"
     if math.isfinite(tour.room):
         # Down to a tenth of a millimetre: never more than there is.
         text.append(f"All the way the arm stays {math.floor(tour.room * 1e4) / 10:g} mm or more from {near}.")
-    if tour.floor is None and not stands(robot):
-        text.append("No floor is kept clear: by its gravity the robot does not stand on one.")
+    if not stands(robot):
+        mounted = "Its mounting surface is not" if tour.floor is None else "Only its mounting surface is"
+        text.append(f"{mounted} kept clear: by its gravity the robot does not stand; boxes say what else is there.")
     return text

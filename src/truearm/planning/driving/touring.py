@@ -62,7 +62,7 @@ def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Arr
             stops.append(Stop(joints[k], "measure", labels[k]))
     stops.append(Stop(finder.home, "home"))
     cell = finder.check.cell
-    tour = Tour(tuple(stops), cell.floor, cell.clearance, room)
+    tour = Tour(tuple(stops), cell.floor, cell.clearance, room, cell.surface)
     _refuse_winding(finder, tour)
     return tour
 

@@ -11,6 +11,7 @@ from truearm.modeling.controller import JointsOf
 from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
 from truearm.modeling.robot import Robot
 from truearm.planning.driving.cell import stands
+from truearm.planning.driving.links_beside import links_beside
 from truearm.planning.driving.tour import Tour
 from truearm.shown import counted
 
@@ -46,7 +47,11 @@ def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list
         near = f"the {tour.surface} at {tour.floor * 1e3:g} mm, boxes and links"
     if math.isfinite(tour.room):
         # Down to a tenth of a millimetre: never more than there is.
-        text.append(f"All the way the arm stays {math.floor(tour.room * 1e4) / 10:g} mm or more from {near}.")
+        room = f"{math.floor(tour.room * 1e4) / 10:g} mm or more from {near}"
+        if links_beside(robot):
+            text.append(f"All the way the lines of the model with their thickness stay {room}; links may be nearer.")
+        else:
+            text.append(f"All the way the arm stays {room}.")
     if not stands(robot):
         mounted = "Its mounting surface is not" if tour.floor is None else "Only its mounting surface is"
         text.append(f"{mounted} kept clear: by its gravity the robot does not stand; boxes say what else is there.")

@@ -80,10 +80,16 @@ def test_a_plan_tells_of_its_program(planned: Plan) -> None:
 def test_the_sheet_has_every_configuration_and_room_to_write(planned: Plan, folder: Path) -> None:
     sheet = (folder / "sheet.html").read_text()
     rows = sheet.split("Configurations, in the order of the program")[1].split("</table>")[0]
-    assert rows.count('<td class="label">') == 10
+    assert rows.count('<td class="label">') == 11
+    assert rows.index("Home") < rows.index(f'<td class="label">{planned.labels[0]}</td>')
+    assert planned.program is not None
+    assert f"Plan {planned.program.mark}" in sheet
+    assert planned.program.mark in (folder / "MEASURE.mod").read_text()
+    for words in planned.driving:
+        assert words in sheet
     for label in planned.labels:
         assert f'<td class="label">{label}</td>' in rows
-    assert rows.count('<span class="box">') == 10 * 4  # three targets, and done
+    assert rows.count('<span class="box">') == 10 * 4 + 1  # three targets, and done
     first = planned.made.robot.controller.from_model(planned.joints[:1])[0, 0]
     assert f'<td class="joints">{round(first * 57.29577951, 2):.2f}</td>' in rows
     for words in ("Temp. [&deg;C]", "Start x [mm]", "End z [mm]", "operator", "Instrument: serial", "Environment:"):

@@ -200,7 +200,7 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed:
             ),
         )
     texts = dict(language.motion(program))
-    written = PlanProgram(language.name, texts, tour, wanted.driving, program.carried, fastest, tuple(notices))
+    written = PlanProgram(language.name, texts, tour, wanted.driving, program.carried, fastest, mark, tuple(notices))
     return replace(planned, program=written)
 
 

@@ -38,7 +38,7 @@ class _Row:
 
 
 def plan_sheet(planned: Plan) -> str:
-    """Return the sheet of a plan that has a program."""
+    """Return the sheet of a plan that has a program: Home, from which it is driven, and every configuration."""
     program, made = planned.program, planned.made
     assert program is not None
     reads = dict(zip(made.labels, made.reads, strict=True)) if made.reads else {}
@@ -46,9 +46,9 @@ def plan_sheet(planned: Plan) -> str:
         "plan-sheet.html.jinja",
         {},
         title=f"Measuring {made.robot.title}",
-        subtitle=f"{', '.join(program.files)}: {len(program.tour.measured)} configurations, joint positions as the "
-        "controller shows them.",
-        words=program.answer,
+        subtitle=f"Plan {program.mark}, {', '.join(program.files)}: {len(program.tour.measured)} configurations, joint "
+        "positions as the controller shows them.",
+        words=(*program.answer, *planned.driving),
         notices=worst_first(program.warnings),
         command=planned.command,
         noted=_NOTED,
@@ -68,12 +68,13 @@ def _ticked(targets: list[str]) -> list[str]:
 
 def _rows(planned: Plan, program: PlanProgram, reads: dict[str, str]) -> list[_Row]:
     robot = planned.made.robot
-    stops = program.tour.measured
+    tour = program.tour
+    stops = (tour.stops[0], *tour.measured)
     shown = robot.controller.from_model(np.array([stop.joints for stop in stops]))
     units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
     return [
         _Row(
-            str(stop.label),
+            str(stop.label) if stop.kind == "measure" else "Home",
             [written(from_si(value, unit), 2) for value, unit in zip(values, units, strict=True)],
             reads.get(str(stop.label), ""),
         )

@@ -46,6 +46,8 @@ class PlanProgram:
         What it tells the controller of the tool.
     fastest
         Highest speed of a target or the flange [m/s].
+    mark
+        The first digits of the plan's hash, by which program and sheet name it.
     warnings
         What to know about it.
     """
@@ -56,6 +58,7 @@ class PlanProgram:
     driving: Driving
     carried: Carried
     fastest: float
+    mark: str = ""
     warnings: tuple[Notice, ...] = ()
 
     @property

@@ -282,7 +282,7 @@ class Window:
 
     def _pressed(self, name: str) -> None:
         settings = self.project.settings
-        {
+        {  # type: ignore[no-untyped-call]
             "undo": self._undo_edit,
             "redo": self._redo_edit,
             "reload": self._reload,

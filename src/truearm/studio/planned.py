@@ -26,7 +26,7 @@ class Planned:
     chosen
         Where the flange is at the chosen configurations, in the base frame [m], ``(n, 3)``.
     places, errors
-        Where the accuracy was predicted, in the base frame [m], ``(m, 3)``, and the error to expect there [m], ``(m,)``.
+        Where the accuracy was predicted, in the base frame, ``(m, 3)``, and the error to expect there, ``(m,)`` [m].
     enough
         How the error falls with the number of poses: the picture of the plan's page.
     """

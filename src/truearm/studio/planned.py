@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from truearm.files import confined_reads
 from truearm.modeling.chain import Array
 from truearm.studio.tasks import Outcome, Progress
@@ -22,9 +24,9 @@ class Planned:
     outcome
         What its command prints, and the files.
     chosen
-        Where the flange is at the chosen configurations, in the world [m], ``(n, 3)``.
+        Where the flange is at the chosen configurations, in the base frame [m], ``(n, 3)``.
     places, errors
-        Where the accuracy was predicted [m], ``(m, 3)``, and the error to expect there [m], ``(m,)``.
+        Where the accuracy was predicted, in the base frame, ``(m, 3)``, and the error to expect there, ``(m,)`` [m].
     enough
         How the error falls with the number of poses: the picture of the plan's page.
     """
@@ -58,11 +60,11 @@ def planned(folder: Path, robot: str, poses: int | str, out: str, progress: Prog
             progress=progress,
             **given,
         )
-    made, page = found.made, Path(out).with_suffix(".html").name
+    made, base, page = found.made, found.made.robot.base, Path(out).with_suffix(".html").name
     return Planned(
         Outcome(tuple(found.lines()), (), (out, page)),
-        made.robot.forward(made.joints, frame="world")[0],
-        made.prediction.places,
+        made.robot.forward(made.joints)[0],
+        (made.prediction.places - np.array(base.translation)) @ base.rotation,
         made.prediction.error,
         number_figure(made.prediction, len(made.joints)),
     )

@@ -80,13 +80,15 @@ class PlanPage:
     def _draw(self) -> None:
         scene = next(page.scene for page in self._window.pages if isinstance(page, JogPage))
         found = self._planned if self._cloud.value else None
-        if found is None:
+        if found is None or scene.solid is None:
             scene.show_points("predicted", None)
             scene.show_points("chosen", None)
             return
+        base = scene.solid.robot.base  # where the instrument has found it, if it has
+        chosen_at, places = (points @ base.rotation.T + base.translation for points in (found.chosen, found.places))
         low, high = float(found.errors.min()), float(found.errors.max())
-        scene.show_points("predicted", found.places, coloured(found.errors, low, high))
-        scene.show_points("chosen", found.chosen, _CHOSEN)
+        scene.show_points("predicted", places, coloured(found.errors, low, high))
+        scene.show_points("chosen", chosen_at, _CHOSEN)
 
     def _picture(self) -> None:
         if self._planned is not None:

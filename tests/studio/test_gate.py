@@ -299,9 +299,14 @@ def test_only_the_value_of_an_element_can_be_changed(serving: Serving) -> None:
         assert eventually(lambda: any("otherwise" in text for text in said))
         send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": "kr5"})
         assert eventually(lambda: studio.window.project.settings.robot == "kr5")
+
+        def shown_value() -> Any:
+            return studio.window.gui._gui_input_handle_from_uuid[robot].value
+
         for count, value in enumerate(("../../etc/passwd", "/etc/passwd", "C:\\x", "a\nb"), 1):
             send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": value})
             assert eventually(lambda wanted=count: studio.window._notices.content.count("no place") == wanted)
+            assert eventually(lambda: shown_value() == "kr5")  # what was refused is taken back before one types again
         send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": "<script>alert(1)</script>"})
         assert eventually(lambda: "script" in studio.window.project.settings.robot)
     shown = [getattr(one, "content", "") for one in studio.window.gui._gui_input_handle_from_uuid.values()]

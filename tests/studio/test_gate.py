@@ -281,6 +281,7 @@ def working(studio: Studio, line: Any) -> None:
     """Let a window be the one that works."""
     send(line, **CAMERA)
     assert eventually(lambda: len(studio.window.server.get_clients()) > 0)
+    assert eventually(lambda: studio.window.gate._working is not None)  # which is said a little later
 
 
 def element(studio: Studio, label: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from truearm.files import confined_reads
 from truearm.modeling.chain import Array
-from truearm.studio.tasks import Outcome, Progress
+from truearm.studio.tasks import Outcome, Progress, option_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,5 +73,4 @@ def planned(folder: Path, robot: str, poses: int | str, out: str, progress: Prog
 def plan_command(robot: str, poses: int | str, out: str, options: dict[str, Any]) -> str:
     """Return the command that does the same in the project's folder, as the page shows it."""
     said = {**options, **({"noise": f"{options['noise'] * 1e3:.15g}"} if "noise" in options else {})}
-    named = [word for name, value in said.items() for word in (f"--{name.replace('_', '-')}", str(value))]
-    return shlex.join(["truearm", "plan", robot, "--poses", str(poses), *named, "--out", out])
+    return shlex.join(["truearm", "plan", robot, "--poses", str(poses), *option_words(said), "--out", out])

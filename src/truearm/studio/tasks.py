@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -72,8 +72,12 @@ def calibrate(folder: Path, robot: str, data: str, out: str, progress: Progress,
 
 def calibrate_command(robot: str, data: str, options: dict[str, Any]) -> str:
     """Return the command that does the same in the project's folder, as the report shows it."""
-    named = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
-    return shlex.join(["truearm", "calibrate", robot, data, *named, "--out", "DIR"])
+    return shlex.join(["truearm", "calibrate", robot, data, *option_words(options), "--out", "DIR"])
+
+
+def option_words(options: Mapping[str, Any]) -> list[str]:
+    """Return parameters of a job as the words of its command."""
+    return [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
 
 
 def compensate(

@@ -26,6 +26,32 @@ _KEPT: Final = 100
 _Name = Annotated[str, Field(min_length=1)]
 
 
+class TestedFiles(BaseModel):
+    """Of a project: the tests by ISO 9283.
+
+    Attributes
+    ----------
+    plan, poses, paths, settling, forces, alignment, compare
+        Files, as for :func:`truearm.iso9283_evaluate`.
+    noise_mm, noise_rot_deg
+        Of the instrument.
+    result
+        Folder of the evaluation.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    plan: _Name | None = None
+    poses: _Name | None = None
+    paths: _Name | None = None
+    settling: _Name | None = None
+    forces: _Name | None = None
+    alignment: _Name | None = None
+    compare: _Name | None = None
+    noise_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.01
+    noise_rot_deg: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.005
+    result: _Name = "iso9283/result"
+
+
 class Settings(BaseModel):
     """Schema ``truearm-studio/1``: what the studio's pages say.
 
@@ -51,6 +77,8 @@ class Settings(BaseModel):
         Likewise.
     corrected
         Folder of the corrected program.
+    performance
+        Files of tests by ISO 9283.
     dark
         Whether the window is dark.
     """
@@ -70,6 +98,7 @@ class Settings(BaseModel):
     taught: tuple[_Name, ...] | None = None
     controller_kinematics: _Name | None = None
     corrected: _Name = "result/corrected"
+    performance: TestedFiles = TestedFiles()
     dark: bool = False
 
     def text(self) -> str:
@@ -79,13 +108,16 @@ class Settings(BaseModel):
 
         stream, yaml = StringIO(), YAML()
         yaml.default_flow_style = False
-        said = {name: list(value) if isinstance(value, tuple) else value for name, value in self if value is not None}
+        said = self.model_dump(mode="json", exclude_none=True)
+        if self.performance == TestedFiles():
+            del said["performance"]
         yaml.dump(said, stream)
         return str(stream.getvalue())
 
 
-#: Settings that name a file of the folder, or a folder in it.
+#: Settings that name a file of the folder, or a folder in it; those of the tests.
 _PATHS: Final = ("data", "result", "program", "cell", "corrected")
+_TESTED: Final = ("plan", "poses", "paths", "settling", "forces", "alignment", "compare", "result")
 
 
 @dataclass(frozen=True)
@@ -358,6 +390,10 @@ def _check_paths(project: Project, settings: Settings) -> None:
         value = getattr(settings, name)
         if value is not None:
             project.path(value, name)
+    for name in _TESTED:
+        value = getattr(settings.performance, name)
+        if value is not None:
+            project.path(value, f"performance.{name}")
     if settings.robot not in library():
         project.path(settings.robot, "robot")
     if settings.controller_kinematics not in (None, "nominal", "proprietary", "unknown"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -15,11 +14,9 @@ from truearm.results.calibration import RESULT_FILES
 from truearm.studio import words
 from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.error_arrows import ErrorArrows
-from truearm.studio.pictures import Picture
+from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.window import Window
 
-#: Where the report has the data of its pictures.
-_FIGURES: Final = re.compile(r'<script type="application/json" id="figures">(.*?)</script>', re.S)
 _PARTS: Final = (("nominal", "before"), ("validation", "after, held out"), ("train", "after, training"))
 _KINDS: Final = (("position_mm", "mm"), ("length_mm", "mm"), ("orientation_mrad", "mrad"))
 
@@ -65,7 +62,7 @@ class ProofPage:
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise _no_result(folder / "result.json") from error
         self._table.content, self._notices.content = shown_figures, told
-        self._figures = _report_figures(folder / "report.html")
+        self._figures = report_figures(folder / "report.html")
         self._files.visible = True
         self._picture.visible = self._drawn.place.visible = bool(self._figures)
         if self._figures:
@@ -125,15 +122,3 @@ def _read_result(path: Path) -> dict[str, Any]:
 
 def _no_result(path: Path) -> InputError:
     return InputError("this is no result of a calibration", where=str(path), cure="Calibrate again.")
-
-
-def _report_figures(path: Path) -> dict[str, Any]:
-    """Return the pictures of a report by their names; none if it has none."""
-    if not exists(path):
-        return {}
-    found = _FIGURES.search(read_text(path))
-    try:
-        figures = json.loads(found[1]) if found else {}
-    except (json.JSONDecodeError, RecursionError):
-        return {}
-    return figures if isinstance(figures, dict) else {}

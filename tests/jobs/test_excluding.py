@@ -86,10 +86,8 @@ def test_who_excludes_from_the_held_out_part_is_told_what_it_is_worth_with_them(
     assert with_it is not None
     assert found.validation is not None
     assert found.validation.position is not None
-    assert f"With them the held-out errors are {with_it.mean * 1e3:.3f} mm on average" in told.message
-    assert (
-        f"{with_it.max * 1e3:.3f} mm at most; without them {found.validation.position.mean * 1e3:.3f}" in told.message
-    )
+    assert f"With it the held-out errors are {with_it.mean * 1e3:.3f} mm on average" in told.message
+    assert f"{with_it.max * 1e3:.3f} mm at most; without it {found.validation.position.mean * 1e3:.3f}" in told.message
     only_training = _file(tmp_path, (TRAINING[0], "2", "beam broken"))
     fit = calibrate("irb120", csv, model="offsets", exclude=only_training)
     assert "held-out-excluded" not in [one.code for one in fit.warnings]

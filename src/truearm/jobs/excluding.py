@@ -94,8 +94,8 @@ def check_excluded(
         some, every = without.position or without.length, whole.position or whole.length
         if some is not None and every is not None:
             told = (
-                f" With them the held-out errors are {every.mean * 1e3:.3f} mm on average and {every.max * 1e3:.3f} mm "
-                f"at most; without them {some.mean * 1e3:.3f} and {some.max * 1e3:.3f} mm."
+                f" With {'it' if count == 1 else 'them'} the held-out errors are {every.mean * 1e3:.3f} mm on average and {every.max * 1e3:.3f} mm "
+                f"at most; without {'it' if count == 1 else 'them'} {some.mean * 1e3:.3f} and {some.max * 1e3:.3f} mm."
             )
     return [
         Notice(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -109,8 +109,8 @@ class Window:
 
         return called
 
-    def edit(self, **changes: Any) -> None:
-        """Change settings of the project; pages are shown anew where something changed.
+    def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> None:
+        """Change settings of the project, and small files; pages are shown anew where something changed.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Window:
             If a value cannot be.
         """
         with self.lock:
-            if self.project.edit(**changes):
+            if self.project.edit(files, **changes):
                 self.refresh()
 
     def tell(self, notice: Notice) -> None:

@@ -63,6 +63,7 @@ class CalibratePage:
             seed=settings.seed or None,
             loss=None if settings.loss == "linear" else settings.loss,
             payload=settings.payload,
+            exclude=settings.exclude,
         )
 
     def _done(self, outcome: Outcome) -> None:

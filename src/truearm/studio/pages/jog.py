@@ -12,6 +12,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import exists
+from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.notices import Notice
@@ -204,6 +205,13 @@ class JogPage:
         self._jogged().whose = self._whose.value
         self._shown()
         self._show_recorded()
+
+    def go_to_joints(self, joints: Array, arm: str | None = None) -> None:
+        """Move the drawn arm, ``nominal`` or ``calibrated``, to joint positions of the model [rad or m]."""
+        if arm is not None and arm in self._arms and arm != self._arm.value:
+            self._take(arm)
+        self._jogged().go(joints)
+        self._moved()
 
     # What follows from where the arm is --------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
 from truearm.files import exists, read_text
+from truearm.measurement.excluded import read_exclusions
 from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES
 from truearm.studio import words
@@ -51,7 +52,9 @@ class ProofPage:
             self._picture.visible = self._files.visible = self._drawn.place.visible = False
             return
         stat = (folder / "result.json").stat()
-        shown = (folder, stat.st_mtime_ns, stat.st_size, project.settings.data, project.settings.dark)
+        exclude = project.file("exclude")
+        rows = exclude.stat().st_mtime_ns if exclude is not None and exists(exclude) else None
+        shown = (folder, stat.st_mtime_ns, stat.st_size, project.settings.data, rows, project.settings.dark)
         if shown == self._shown:
             return
         result = _read_result(folder / "result.json")
@@ -80,6 +83,12 @@ class ProofPage:
             if f"sha256 {digest}" not in str(result.get("history", "")):
                 text = f"This result is of other measurements than {self._window.project.settings.data} as it is now."
                 found.append(Notice("other-measurements", text, "warning"))
+        exclude = self._window.project.file("exclude")
+        chosen = read_exclusions(exclude) if exclude is not None and exists(exclude) else ()
+        now = [(one.configuration, one.target, one.reason) for one in chosen]
+        if now != [(one["configuration"], one["target"], one["reason"]) for one in result.get("excluded", ())]:
+            text = "This result is without other readings than those that are excluded now: calibrate again."
+            found.append(Notice("other-measurements", text, "warning"))
         return found
 
     def _draw(self) -> None:

@@ -93,9 +93,10 @@ def check_excluded(
         whole = errors_of(robot, without_table_motion(as_read).of_configurations(held_out))
         some, every = without.position or without.length, whole.position or whole.length
         if some is not None and every is not None:
+            it = "it" if count == 1 else "them"
             told = (
-                f" With {'it' if count == 1 else 'them'} the held-out errors are {every.mean * 1e3:.3f} mm on average and {every.max * 1e3:.3f} mm "
-                f"at most; without {'it' if count == 1 else 'them'} {some.mean * 1e3:.3f} and {some.max * 1e3:.3f} mm."
+                f" With {it} the held-out errors are {every.mean * 1e3:.3f} mm on average and {every.max * 1e3:.3f} mm "
+                f"at most; without {it} {some.mean * 1e3:.3f} and {some.max * 1e3:.3f} mm."
             )
     return [
         Notice(

@@ -47,6 +47,7 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.check import notices_of
 from truearm.jobs.excluding import check_excluded, in_parts, without_excluded
+from truearm.jobs.following import followed
 from truearm.jobs.holding import held_argument
 from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
 from truearm.jobs.split import (
@@ -296,6 +297,7 @@ def calibrate(
         readings = steady
         first = readings.of_configurations(training)
         second = readings.of_configurations(held_out) if len(held_out) else None
+        judges = first if second is None else second
         progress("placing the nominal robot")
         placed = place(nominal_robot, first, loss, held)
         if trials is not None:
@@ -305,19 +307,20 @@ def calibrate(
         if named is None:
             compared = compared_with(nominal_robot, first)
             selection = select(nominal_robot, compared, **how, held=held, seed=seed, progress=progress)
-            selection, fit = identify_chosen(
-                nominal_robot, first, selection, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
-            )
+            with followed(progress, judges, held_out=second is not None):
+                selection, fit = identify_chosen(
+                    nominal_robot, first, selection, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
+                )
             nominal_robot, chosen = selection.prepared(nominal_robot), selection.model
         else:
             chosen, held_effects = without_unseen_balancers(named.also(effects), first)
             progress(f"identifying the {chosen.name} model on {count} configurations")
-            fit = identify(
-                nominal_robot, first, chosen, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
-            )
+            with followed(progress, judges, held_out=second is not None):
+                fit = identify(
+                    nominal_robot, first, chosen, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
+                )
         contradicted = check_held(nominal_robot, fit, first, **how)
     progress("judging it")
-    judges = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(placed, judges)
     train_errors = errors_of(fit.robot, first)

@@ -26,8 +26,8 @@ class Picture:
         The folder it stands in.
     """
 
-    def __init__(self, window: Window, title: str) -> None:
-        self._window = window
+    def __init__(self, window: Window, title: str, aspect: float = 1.2) -> None:
+        self._window, self._aspect = window, aspect
         self.place = window.gui.add_folder(title, visible=False)
         self._plot: Any = None
 
@@ -45,7 +45,7 @@ class Picture:
         self.place.visible = True
         if self._plot is None:
             with self.place:
-                self._plot = self._window.gui.add_plotly(figure, aspect=1.2)
+                self._plot = self._window.gui.add_plotly(figure, aspect=self._aspect)
         else:
             self._plot.figure = figure
 

@@ -137,13 +137,22 @@ class Window:
             if self.gate.is_working(connection):
                 client.add_notification("Refused", text, color="red", auto_close_seconds=20)
 
-    def start(self, title: str, do: Callable[..., Any], done: Callable[[Any], None], **arguments: Any) -> None:
+    def start(
+        self,
+        title: str,
+        do: Callable[..., Any],
+        done: Callable[[Any], None],
+        told: Callable[[str], None] = lambda _: None,
+        **arguments: Any,
+    ) -> None:
         """Run a function of :mod:`truearm.studio.tasks` in a process of its own, with progress and cancel.
 
         Parameters
         ----------
         done
             Called with what it returned, under the lock.
+        told
+            Called with each word of its progress, under the lock.
 
         Raises
         ------
@@ -158,6 +167,8 @@ class Window:
 
             def said(text: str) -> None:
                 self._doing.content = words.paragraph(f"{title}: {text}")
+                with self.lock:
+                    told(text)
 
             def ended(outcome: Any) -> None:
                 with self.lock:

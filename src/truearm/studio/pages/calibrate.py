@@ -40,7 +40,7 @@ class CalibratePage:
         self._steps: list[FitStep] = []
         self._drawn = 0.0
         self._shown: tuple[int, bool] = (0, False)
-        self._course = Picture(window, "Cost and error, step by step", 1.5)
+        self._course = Picture(window, "Cost and error, step by step", 0.75)
         self._said = gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))
         self._data.on_update(window.action(lambda: window.edit(data=chosen(self._data))))
         self._model.on_update(window.action(lambda: window.edit(model=self._model.value)))

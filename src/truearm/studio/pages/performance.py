@@ -97,8 +97,8 @@ class PerformancePage:
             self._tip: Any = gui.add_vector3("Tip [mm]", (0.0, 0.0, 100.0), step=1.0, hint="in the flange frame")
             self._velocity: Any = gui.add_number("Rated [mm/s]", 1000.0, min=10.0, max=20000.0, step=10.0)
             self._velocities: Any = gui.add_text("Velocities [%]", "100,50,10", hint="percent of the rated velocity")
-            plan = gui.add_button("Plan the tests")
-        plan.on_click(self._window.action(self._plan))
+            self._plan_button = gui.add_button("Plan the tests")
+        self._plan_button.on_click(self._window.action(self._plan))
 
     def _simulating(self) -> None:
         gui = self._window.gui
@@ -108,8 +108,8 @@ class PerformancePage:
             self._corrected: Any = gui.add_checkbox(
                 "Corrected", False, hint="commands are corrected by the calibrated robot"
             )
-            simulate = gui.add_button("Simulate the tests")
-        simulate.on_click(self._window.action(self._simulate))
+            self._simulate_button = gui.add_button("Simulate the tests")
+        self._simulate_button.on_click(self._window.action(self._simulate))
 
     # -- what is shown -------------------------------------------------------------------------------------
 

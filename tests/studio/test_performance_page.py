@@ -95,9 +95,7 @@ def test_the_values_of_the_command_stand_in_the_table_and_in_space(
     assert not any(jog.scene._parts[name] for name in ("tests-errors", "tests-rp", "tests-frame", "tests-paths"))
 
 
-def test_a_result_of_another_plan_is_not_drawn_and_one_that_is_none_is_refused(
-    tested: Path, serving: Serving
-) -> None:
+def test_a_result_of_another_plan_is_not_drawn_and_one_that_is_none_is_refused(tested: Path, serving: Serving) -> None:
     other = small_plan(["AP"], rated_velocity=0.7)
     (tested / "other").mkdir()
     (tested / "other" / ROBOT).write_text(robot_text(other.robot))

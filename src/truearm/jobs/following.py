@@ -18,7 +18,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 
 #: That much time may go into the errors that are told of a fit [s], and that share of the fit's own.
-_TIME: Final = 0.2
+_TIME: Final = 0.5
 _SHARE: Final = 0.05
 
 
@@ -58,12 +58,12 @@ def followed(progress: Callable[[str], None], judging: Dataset, *, held_out: boo
     held_out
         Whether the fit does not see it.
     """
-    number, spent, start = 0, 0.0, time.monotonic()
+    number, spent, start = 0, 0.0, time.process_time()
 
     def told(problem: object, vector: Array, cost: float) -> None:
         nonlocal number, spent
         number += 1
-        began = time.monotonic()
+        began = time.process_time()
         if spent > _TIME + _SHARE * (began - start):
             return
         inner = problem.plain if isinstance(problem, WhitenedProblem) else problem
@@ -78,7 +78,7 @@ def followed(progress: Callable[[str], None], judging: Dataset, *, held_out: boo
         found = errors.position or errors.length
         if found is not None:
             progress(FitStep.of(number, cost, found.mean, "held-out" if held_out else "training"))
-        spent += time.monotonic() - began
+        spent += time.process_time() - began
 
     with watching(told):
         yield

@@ -345,7 +345,8 @@ class Project:
                 self.path(name).unlink(missing_ok=True)
             else:
                 write_text(self.path(name), text)
-        self.look(*files)
+        if files:
+            self.look(*files)
 
     def _text_of(self, name: str) -> str | None:
         path = self.path(name)

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.judging.orientation_slips import orientation_slips
 from truearm.identification.judging.slip_trials import (
     Slip,
     angle_slips,
@@ -37,7 +38,7 @@ from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rotation_from_quaternion, rotation_vector
+from truearm.modeling.transform import Transform
 from truearm.notices import Notice
 
 #: A nominal robot that is placed better than this needs no explanation [m].
@@ -64,8 +65,6 @@ _UNRELATED: Final = 0.3
 #: much better than the best of these data must fit that follow them.
 _ORDERS_DRAWN: Final = 19
 _ALIKE: Final = 0.8
-#: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
-_TURNED_WITHIN: Final = 0.1
 #: No target is farther from the flange [m].
 _LARGEST_TOOL: Final = 2.0
 #: Weight of readings against priors where slips are judged by a fit [m or rad].
@@ -75,7 +74,7 @@ _FITTED_NOISE: Final = 1e-4
 def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     """Return which slip explains positions in the instrument's frame; nothing if they fit, or if none does."""
     data, robot = _few_targets(data), robot.with_frames(Transform(), {})  # made once for all that is tried
-    turned = _quaternion_slips(robot, data)
+    turned = orientation_slips(robot, _some(data))
     some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
     some = replace(some, quaternion=None, sigma_rot=None)
     seen = [t for t in range(len(some.targets)) if _seen(some, t)]
@@ -271,50 +270,6 @@ def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
             )
         ]
     return []
-
-
-# -- orientations ------------------------------------------------------------------------------------------
-
-
-def _quaternion_slips(robot: Robot, data: Dataset) -> list[Notice]:
-    """Say if the orientations agree with the robot only with the numbers of the quaternions in another order."""
-    some = _some(data)
-    if some.quaternion is None or not some.has_orientation.any():
-        return []
-    read = some.quaternion
-    placed = initial_frames(robot, replace(some, quaternion=None, sigma_rot=None))
-    given = _turned(placed, some, read)
-    if given <= _TURNED_WITHIN:
-        return []
-    inverse = np.array([1.0, -1.0, -1.0, -1.0])
-    orders = [
-        ("their numbers are in the order x, y, z, w. Exchange the columns", read[:, [3, 0, 1, 2]]),
-        ("they turn the other way round. Change the sign of qw", read * inverse),
-        (
-            "their numbers are in the order x, y, z, w, and they turn the other way round. Mend the columns",
-            read[:, [3, 0, 1, 2]] * inverse,
-        ),
-    ]
-    tried = [(_turned(placed, some, mended), words) for words, mended in orders]
-    left, words = min(tried)
-    if left * _LEAST_IMPROVEMENT > given:
-        return []
-    return [Notice("quaternion-order", f"The quaternions do not turn as the robot does: {words}.", "error")]
-
-
-def _turned(placed: Robot, data: Dataset, quaternion: Array) -> float:
-    """Return how far a target's orientation on the flange differs from its mean, as a root mean square [rad]."""
-    _, R = placed.world_poses(data.postures)
-    left = []
-    for t in range(len(data.targets)):
-        mine = np.flatnonzero(data.has_orientation & (data.target == t))
-        if len(mine) < 2:
-            continue
-        on_flange = np.swapaxes(R[data.configuration[mine]], 1, 2) @ rotation_from_quaternion(quaternion[mine])
-        U, _, Vt = np.linalg.svd(on_flange.mean(axis=0))
-        mean = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-        left.append(np.linalg.norm(rotation_vector(mean.T @ on_flange), axis=1))
-    return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) if left else 0.0
 
 
 # -- parts of the data -------------------------------------------------------------------------------------

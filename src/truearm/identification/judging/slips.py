@@ -23,6 +23,7 @@ from truearm.identification.judging.slip_trials import (
     controller_slips,
     length_slips,
     mirrored,
+    mixed_length_slips,
     order_slips,
     scale_slips,
     shifted,
@@ -65,6 +66,8 @@ _UNRELATED: Final = 0.3
 #: much better than the best of these data must fit that follow them.
 _ORDERS_DRAWN: Final = 19
 _ALIKE: Final = 0.8
+#: A campaign is at least so large, over what an arm lets it be at most.
+_LEAST_OF_REACH: Final = 0.02
 #: No target is farther from the flange [m].
 _LARGEST_TOOL: Final = 2.0
 #: Weight of readings against priors where slips are judged by a fit [m or rad].
@@ -93,21 +96,39 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
         )
         if best is not None:
             return [best.notice]
-        return turned or _beyond_reach(robot, some) or _unrelated(robot, some)
+        return turned or _two_slips(robot, rest) or _beyond_reach(robot, some) or _unrelated(robot, some)
     # The other targets fit with the same joints, so these are right.
     found = []
     for t in bad:
         only = _only(some, t)
-        best = _best(robot, only, [*length_slips(only), *mirrored(only), *scale_slips(robot, only)])
+        best = _best(
+            robot, only, [*length_slips(only), *mirrored(only), *mixed_length_slips(only), *scale_slips(robot, only)]
+        )
         if best is not None:
             found.append(Notice(best.code, f"Target {some.targets[t]}: {best.words}.", "error"))
-    return [*turned, *found]
+    return [*turned, *found] or _beyond_reach(robot, some)
+
+
+def _two_slips(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if lengths in another unit and one slip more explain the data: a unit alone is told by no size."""
+    some = _some(data)
+    if _size_over_reach(robot, some) <= 1.0:
+        return []
+    for lengths in length_slips(some):
+        mended = next(slip.data for slip in length_slips(data) if slip.words == lengths.words)
+        if not _LEAST_OF_REACH < _size_over_reach(robot, lengths.data) <= 1.0:
+            continue
+        best = _best(robot, lengths.data, _simple_slips(robot, mended))
+        if best is not None:
+            return [lengths.notice, best.notice]
+    return []
 
 
 def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     """Try everything but several slips at once, the simplest first."""
     some = _some(data)
     yield from length_slips(some)
+    yield from mixed_length_slips(some)
     yield from as_noted(robot, some, angle_slips)
     yield from controller_slips(robot, some)
     yield from mirrored(some)
@@ -233,19 +254,31 @@ def _spread(data: Dataset) -> float:
 
 def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:
     """Say if readings lie so far apart that no arm of this size was read, in whatever frame."""
-    reach = float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
-    read = data.position[data.has_position]
-    apart = float(np.linalg.norm(read - np.median(read, axis=0), axis=1).max())
-    if apart <= 2.0 * (reach + _LARGEST_TOOL):
+    if _size_over_reach(robot, data) <= 1.0:
         return []
     return [
         Notice(
             "unit-length",
-            f"The positions lie up to {apart:.3g} m from the middle of all, where the arm reaches {reach:.2g} m. Some "
-            "of their numbers are in another unit, or lost their decimal point or comma.",
+            f"The positions lie up to {_apart(data):.3g} m from the middle of all, where the arm reaches "
+            f"{_reach(robot, data):.2g} m. No one unit makes them fit: some of their numbers are in another unit or "
+            "lost their decimal point or comma, or more is wrong with the data than that.",
             "error",
         )
     ]
+
+
+def _size_over_reach(robot: Robot, data: Dataset) -> float:
+    """Return how far readings lie apart, over what an arm of this size lets them at most."""
+    return _apart(data) / (2.0 * (_reach(robot, data) + _LARGEST_TOOL))
+
+
+def _apart(data: Dataset) -> float:
+    read = data.position[data.has_position]
+    return float(np.linalg.norm(read - np.median(read, axis=0), axis=1).max())
+
+
+def _reach(robot: Robot, data: Dataset) -> float:
+    return float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
 
 
 def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:

@@ -170,3 +170,38 @@ def test_directions_and_columns_of_no_clear_target_are_not_used(tmp_path: Path) 
     text = wide(tmp_path, f"p,J1,X,Y,Z,{names}\na,90,80,1,3,10,0,0,1,2,3\nb,91,81,1,4,0,10,0,1,2,3\n")
     assert "which target they are of is not clear" in text
     assert "# Not used: std x, std y, std z" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "entry"),
+    [("U [mm]", "coverage: 2}"), ("u [um]", "unit: um}"), ("U (mm)", "coverage: 2}")],
+)
+def test_an_uncertainty_alone_is_told_by_its_unit(tmp_path: Path, name: str, entry: str) -> None:
+    (line,) = [line for line in guessed(tmp_path, name, ["0.03", "0.02", "0.05"]).splitlines() if "sigma:" in line]
+    assert entry in line
+
+
+def test_a_path_in_millimetres_is_no_uncertainty(tmp_path: Path) -> None:
+    assert "sigma:" not in guessed(tmp_path, "u [mm]", ["3", "200", "500"])
+    assert "sigma:" not in guessed(tmp_path, "u [mm]", ["-3", "2", "5"])
+
+
+def test_visits_are_guessed_where_labels_come_again(tmp_path: Path) -> None:
+    rows = ["Pose,J1,J2,X,Y,Z,Round"]
+    rows += [f"P{n},{10 * n},{20 * n},100{n},200,30{n}.{k},{k}" for n in (1, 2, 3) for k in (1, 2)]
+    (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
+    assert "visit: {column: Round}" in guess_mapping(tmp_path / "table.csv").text
+    (tmp_path / "table.csv").write_text("\n".join(rows[:2] + rows[3:4]) + "\n")
+    assert "visit:" not in guess_mapping(tmp_path / "table.csv").text
+
+
+def test_a_change_of_form_far_below_is_found(tmp_path: Path) -> None:
+    rows = ["Pose;J1;J2;X;Y;Z"] + [f"P{n};{n % 90},5;{n % 80},25;1000,5;{n % 700},25;30,5" for n in range(1, 5200)]
+    rows[5000] = rows[5000].replace(",", ".")
+    rows[5100] += ";7"
+    (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
+    made = guess_mapping(tmp_path / "table.csv")
+    assert "# Note: line 5101 has 7 cells where others have 6." in made.text
+    assert "# Note: line 5001, column J1: '50.5' is no number as others are written." in made.text
+    assert made.refusal is not None
+    assert "line 5101" in made.refusal or "line 5001" in made.refusal

@@ -39,7 +39,8 @@ def test_formats_of_times(tmp_path: Path, times: list[str], way: str) -> None:
     ("heading", "cells"),
     [
         ("Time", ["am Dienstag", "am Mittwoch"]),
-        ("Date;Time", ["03.04.2026;23:59:30", "04.04.2026;00:00:17"]),
+        ("Date;Time", ["03/04/2026;10:00:00", "05/02/2026;10:00:00"]),
+        ("Date;Time", ["03.04.2026;23:59:30", "04.04.2026;"]),
         ("Time", ["03/04/2026 10:00:00", "05/02/2026 10:00:00"]),
         ("Date", ["03.04.2026", "04.04.2026"]),
         ("t [s]", ["12.5", "3.25"]),
@@ -61,3 +62,8 @@ def test_one_day_leaves_the_order_to_its_times(tmp_path: Path) -> None:
 
 def test_a_running_time_that_rises_tells_the_order(tmp_path: Path) -> None:
     assert 'order: {column: "t [s]"}' in guessed(tmp_path, "t [s]", ["0.00", "47.25", "94.5"])
+
+
+def test_a_day_and_a_time_in_two_columns_are_taken_together(tmp_path: Path) -> None:
+    text = guessed(tmp_path, "Date;Time", ["03.04.2026;23:59:30", "04.04.2026;00:00:17"])
+    assert "order: {columns: [Date, Time], time: '%d.%m.%Y %H:%M:%S'}  # guess: their names and their texts" in text

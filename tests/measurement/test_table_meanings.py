@@ -265,3 +265,41 @@ def test_a_mapping_that_nobody_confirmed_is_refused(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"map.yaml, confirmed: this mapping was guessed.*allowed: yes"):
             read(tmp_path, LONG, MAP + f"confirmed: {word}\n")
     assert read(tmp_path, LONG, MAP + "confirmed: yes\n").labels == ("a", "b")
+
+
+def test_a_day_and_a_time_in_two_columns_tell_the_order(tmp_path: Path) -> None:
+    table = "pose,q1,q2,ball,X,Y,Z,day,clock\nb,1,2,t,1,2,3,23.11.2026,00:01\na,3,4,t,1,2,3,22.11.2026,23:59\n"
+    order = "order: {columns: [day, clock], time: '%d.%m.%Y %H:%M'}\n"
+    data = read(tmp_path, table, MAP + order)
+    assert data.number is not None
+    assert data.number.tolist() == [1, 0]
+    for text, part in (
+        (table.replace("23:59", ""), "line 3, column clock: this cell is empty, and the other of day and time is not"),
+        (table.replace("23:59", "late"), "line 3, column day and clock: this is no time of the format"),
+        (table.replace("22.11.2026,23:59", "23.11.2026,00:01"), "line 3, column day and clock: the configurations"),
+    ):
+        with pytest.raises(InputError, match=part):
+            read(tmp_path, text, MAP + order)
+    for wrong, part in (
+        ("{columns: [day], time: iso}", "not one column with the day and one with the time"),
+        ("{columns: [day, clock]}", "give their format"),
+        ("{columns: [day, hour], time: iso}", r"order.columns\[2\]"),
+    ):
+        with pytest.raises(InputError, match=part):
+            read(tmp_path, table, MAP + f"order: {wrong}\n")
+
+
+def test_visits_come_from_a_column(tmp_path: Path) -> None:
+    table = "pose,q1,q2,ball,X,Y,Z,round\na,1,2,t,1,2,3,1\na,1,2,u,1,2,3,2\nb,3,4,t,1,2,3,1\n"
+    data = read(tmp_path, table, MAP + "visit: {column: round}\n")
+    assert data.visit is not None
+    assert data.visit.tolist() == [1, 2, 1]
+    (tmp_path / "again.csv").write_text(csv_text(data))
+    assert np.array_equal(np.asarray(read_csv(tmp_path / "again.csv").visit), data.visit)
+    with pytest.raises(InputError, match="line 3, column round: this is no number of a visit; got 'II'"):
+        read(tmp_path, table.replace("3,2\n", "3,II\n"), MAP + "visit: {column: round}\n")
+    mapping = MAP.replace("columns: [q1, q2]\n  unit: deg", "file: joints.csv") + "visit: {column: round}\n"
+    joints = "configuration,joint_1 [deg],joint_2 [deg]\na,1,2\nb,3,4\nc,5,6\n"
+    assert len(np.asarray(read(tmp_path, table, mapping, joints).visit)) == 5
+    with pytest.raises(InputError, match="a column is used twice"):
+        read(tmp_path, table, MAP + "visit: {column: X}\n")

@@ -13,6 +13,7 @@ from truearm.errors import InputError, did_you_mean, nearest_names
 from truearm.files import exists, read_bytes, read_yaml
 from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.readers.canonical_rows import visits_of
 from truearm.measurement.readers.cells import Cells, read_cells
 from truearm.measurement.readers.columns import joints_in_file
 from truearm.measurement.readers.mapping import MappingFile, NamesEntry, name_pattern
@@ -148,6 +149,10 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
     quaternion = quaternions(cells, content, mapping)
     sigma, sigma_rot = (deviations(cells, content, mapping, name) for name in ("sigma", "sigma_rot"))
 
+    visit = None
+    if content.visit is not None:
+        visit = np.repeat(visits_of(cells, place_of(cells, content.visit.column, mapping, "visit.column")), entries)
+
     reference = _is_reference(targets, content.references, f"{mapping}, references")
     absent = np.setdiff1d(np.arange(len(configurations.labels)), of_row)
     kept = list(dict.fromkeys(compress(targets, ~reference)))
@@ -167,6 +172,7 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
         quaternion=None if quaternion is None else padded(quaternion),
         sigma=None if sigma is None else padded(sigma, same=content.sigma is not None),
         sigma_rot=None if sigma_rot is None else padded(sigma_rot, same=content.sigma_rot is not None),
+        visit=None if visit is None else np.concatenate([visit, np.full(added, visit[0])]),
         called=called_in(content),
     )
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
@@ -198,10 +204,10 @@ def _order(cells: Cells, configurations: Configurations, of_row: IntArray, files
     entry = files.content.order
     if entry is None:
         return None
-    place = None if entry.column is None else place_of(cells, entry.column, files.mapping, "order.column")
+    places = [place_of(cells, column, files.mapping, f"order.{name}") for name, column in entry.names.items()]
     if entry.by == "rows" and files.joints is None:
         refuse_returns(cells, configurations.labels, of_row, f"{files.mapping}, order.by")
-    return measuring_order(entry, cells, place, configurations.labels, of_row, f"{files.mapping}, order")
+    return measuring_order(entry, cells, places, configurations.labels, of_row, f"{files.mapping}, order")
 
 
 def _read(path: Path, entry: LayoutEntry, where: str) -> Cells:

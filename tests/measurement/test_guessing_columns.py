@@ -205,3 +205,11 @@ def test_a_change_of_form_far_below_is_found(tmp_path: Path) -> None:
     assert "# Note: line 5001, column J1: '50.5' is no number as others are written." in made.text
     assert made.refusal is not None
     assert "line 5101" in made.refusal or "line 5001" in made.refusal
+
+
+def test_a_guess_says_if_it_has_not_seen_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = ["Pose,J1,J2,X,Y,Z"] + [f"P{n},{n},{2 * n},1000,{n},30" for n in range(1, 500)]
+    (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
+    assert "looked at" not in guess_mapping(tmp_path / "table.csv").text
+    monkeypatch.setattr("truearm.measurement.readers.guessing.layouts._MOST_LINES", 450)
+    assert "# Note: only the first 450 lines were looked at" in guess_mapping(tmp_path / "table.csv").text

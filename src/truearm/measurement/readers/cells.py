@@ -179,7 +179,9 @@ class Cells:
                 where=where,
                 came=cell,
                 allowed="a number with a decimal comma and no thousands separator",
-                cure="Say decimal: point in the mapping, or remove the thousands separators.",
+                cure="Remove the thousands separators, or name the other decimal sign."
+                if self.absent is None
+                else "Say decimal: point in the mapping, or remove the thousands separators.",
             )
         if not cell:
             return InputError(

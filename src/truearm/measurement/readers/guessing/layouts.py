@@ -19,8 +19,9 @@ from truearm.measurement.readers.sheets import Workbook, is_workbook, open_workb
 from truearm.shown import counted
 from truearm.units import as_number
 
-#: Lines that are looked at to see how a table is laid out; what its columns hold is looked for in all of them.
+#: Lines that are looked at to see how a table is laid out, and to see what its columns hold.
 _LOOKED_AT: Final = 400
+_MOST_LINES: Final = 100_000
 #: Characters of them.
 _CHARACTERS: Final = 400_000
 #: Lines of titles that may stand above the headings of a sheet.
@@ -134,8 +135,13 @@ def guess_layout(path: Path) -> GuessedLayout:
         entries["encoding"] = (encoding, "it is no UTF-8 text")
     if comment is not None:
         entries["comment"] = (comment, "lines begin with it")
-    best = replace(best, rows=[*best.rows, *_cut(_lines_behind(text, lines), comment, best.delimiter)])
-    return _with_header(best, entries, path)
+    behind = _lines_behind(text, lines)
+    some = islice(behind, max(_MOST_LINES - len(lines), 0))
+    made = _with_header(replace(best, rows=[*best.rows, *_cut(some, comment, best.delimiter)]), entries, path)
+    if next(behind, None) is None:
+        return made
+    seen = f"only the first {_MOST_LINES} lines were looked at; an import refuses by its cell what does not fit below"
+    return replace(made, notes=(*made.notes, seen))
 
 
 def _lines_behind(text: str, lines: Sequence[tuple[int, str]]) -> Iterator[tuple[int, str]]:

@@ -11,8 +11,9 @@ import pytest
 from tests.measurement.test_table import LONG, MAP, read
 
 from truearm.errors import InputError
+from truearm.jobs.import_table import import_table
 from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.table import read_table
+from truearm.measurement.readers.table import read_noting, read_table
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_vector
 
 ROWS = "pose,q1,q2,ball,X,Y,Z,a,b,c\np,1,2,t,1,2,3,{}\n"
@@ -62,6 +63,22 @@ def test_deviations_in_columns(tmp_path: Path) -> None:
     one = read(tmp_path, table, MAP.replace("z: Z", "z: Z, sigma: {columns: [U], unit: mm, coverage: 2}"))
     assert one.sigma is not None
     assert one.sigma[0] == pytest.approx(4e-5)
+
+
+def test_deviations_that_are_far_apart_are_told(tmp_path: Path) -> None:
+    mapping = MAP.replace("z: Z", "z: Z, sigma: {columns: [a, b, c], unit: mm}")
+    table = "pose,q1,q2,ball,X,Y,Z,a,b,c\np,1,2,t,1,2,3,0.01,0.02,{}\np,1,2,u,1,2,3,0.01,0.01,0.04\np,1,2,v,,,,,,\n"
+    read(tmp_path, table.format("0.03"), mapping)
+    data, (notice,) = read_noting(tmp_path / "table.txt", tmp_path / "map.yaml")
+    assert (notice.code, notice.level) == ("sigma-uneven", "note")
+    assert "3.5 times apart in half of the readings or more, and up to 4 times" in notice.message
+    assert data.sigma is not None
+    assert 3.0 * data.sigma[0] ** 2 == pytest.approx(1e-10 * (1 + 4 + 9))
+    told = import_table(tmp_path / "table.txt", tmp_path / "map.yaml")
+    assert told.lines()[-1].startswith("Note (sigma-uneven): ")
+    assert told.summary()["warnings"][0]["code"] == "sigma-uneven"
+    (tmp_path / "table.txt").write_text(table.format("0.01").replace("0.04", "0.015"))
+    assert not import_table(tmp_path / "table.txt", tmp_path / "map.yaml").warnings
 
 
 def test_deviations_of_each_target_of_a_wide_table(tmp_path: Path) -> None:

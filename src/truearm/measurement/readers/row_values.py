@@ -16,8 +16,11 @@ from truearm.measurement.readers.mapping_entries import SigmaColumns, SigmaRotCo
 from truearm.measurement.readers.orientation_columns import quaternions_of_angles, quaternions_of_vectors
 from truearm.measurement.readers.rows import Configurations
 from truearm.modeling.chain import Array
+from truearm.notices import Notice
 from truearm.units import as_number, sized_si
 
+#: Deviations of the coordinates of a reading are called uneven if they are so many times apart in half of all.
+_UNEVEN: Final = 2.0
 #: Temperatures of an arm that are meant [degC].
 _TEMPERATURES: Final = (-100.0, 200.0)
 #: What is taken off a temperature, and by what the rest is multiplied, to have degC.
@@ -108,6 +111,34 @@ def deviations(cells: Cells, content: MappingFile, mapping: Path, name: Literal[
         each = numbers_of(cells, columns, entry.unit, mapping, f"readings[{number}].{name}", deviation=True)
         parts.append(np.sqrt(np.mean(each**2, axis=1)) / entry.coverage)
     return np.stack(parts, axis=1).reshape(-1)
+
+
+def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list[Notice]:
+    """Say if deviations of the three coordinates of a reading are far apart: a reading has one for all of them."""
+    found: list[Notice] = []
+    for name, whole in (("sigma", "x, y and z"), ("sigma_rot", "the three angles")):
+        ratios = []
+        for number, reading in enumerate(content.readings, 1):
+            entry: SigmaColumns | SigmaRotColumns | None = getattr(reading, name)
+            if entry is None or len(entry.columns) != 3:
+                continue
+            columns = {f"columns[{n}]": column for n, column in enumerate(entry.columns, 1)}
+            each = numbers_of(cells, columns, entry.unit, mapping, f"readings[{number}].{name}", deviation=True)
+            each = each[np.isfinite(each).all(axis=1)]
+            ratios.append(each.max(axis=1) / each.min(axis=1))
+        apart = np.concatenate([*ratios, np.zeros(0)])
+        if not len(apart) or np.median(apart) < _UNEVEN:
+            continue
+        found.append(
+            Notice(
+                "sigma-uneven",
+                f"The deviations of {whole} of one reading are {np.median(apart):.2g} times apart in half of the "
+                f"readings or more, and up to {apart.max():.2g} times. Data have one {name} for all three, the root of "
+                "their mean square: the best coordinate counts less than it could, and the worst one more.",
+                "note",
+            )
+        )
+    return found
 
 
 def called_in(content: MappingFile) -> dict[str, str]:

@@ -28,11 +28,13 @@ from truearm.measurement.readers.row_values import (
     quaternions,
     refuse_second_header,
     temperatures,
+    uneven_deviations,
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.measurement.readers.sheets import is_workbook, read_sheet
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
+from truearm.notices import Notice
 from truearm.shown import counted
 
 
@@ -119,11 +121,18 @@ def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, jo
     InputError
         If a file cannot be used, or the mapping says that the joint positions are another's.
     """
+    return read_with(_files(path, mapping, joints), joints_are)[0]
+
+
+def read_noting(
+    path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None
+) -> tuple[Dataset, tuple[Notice, ...]]:
+    """Read a table as :func:`read_table` does, and say what data cannot hold of it."""
     return read_with(_files(path, mapping, joints), joints_are)
 
 
-def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
-    """Read a table with its mapping, see :func:`read_table`."""
+def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Dataset, tuple[Notice, ...]]:
+    """Read a table with its mapping, see :func:`read_noting`."""
     path, content, mapping = files.table, files.content, files.mapping
     whose = _whose(content.joints.are, joints_are, f"{mapping}, joints.are")
     cells = replace(_read(path, content.layout, f"{mapping}, layout"), absent=tuple(content.missing))
@@ -176,9 +185,11 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
         called=called_in(content),
     )
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
+    noticed = tuple(uneven_deviations(cells, content, mapping))
     if content.temperature is None:
-        return data
-    return replace(data, temperature=temperatures(cells, configurations, of_row, content.temperature, mapping))
+        return data, noticed
+    warm = temperatures(cells, configurations, of_row, content.temperature, mapping)
+    return replace(data, temperature=warm), noticed
 
 
 def files_read(path: Path, mapping: Path, joints: Path | None = None) -> tuple[Path, ...]:

@@ -433,7 +433,7 @@ def _tried(made: Guessed, path: Path) -> Guessed:
     """Try an import with a guessed mapping, in memory."""
     content = validated(YAML(typ="safe", pure=True).load(made.text), MappingFile, "the guessed mapping")
     try:
-        data = read_with(TableFiles(path, Path("the guessed mapping"), content, None))
+        data = read_with(TableFiles(path, Path("the guessed mapping"), content, None))[0]
     except InputError as error:
         return replace(made, refusal=str(error))
     return replace(made, configurations=data.configurations, targets=data.targets)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, Literal
@@ -10,7 +11,7 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.dataset import IntArray
-from truearm.measurement.readers.cells import Cells
+from truearm.measurement.readers.cells import Cells, column_letters
 from truearm.measurement.readers.mapping import MappingFile, ReadingEntry
 from truearm.measurement.readers.mapping_entries import SigmaColumns, SigmaRotColumns, TemperatureEntry
 from truearm.measurement.readers.orientation_columns import quaternions_of_angles, quaternions_of_vectors
@@ -21,6 +22,8 @@ from truearm.units import as_number, sized_si
 
 #: Deviations of the coordinates of a reading are called uneven if they are so many times apart in half of all.
 _UNEVEN: Final = 2.0
+#: A unit behind a name.
+_IN_BRACKETS: Final = re.compile(r"[\[({].*")
 #: Temperatures of an arm that are meant [degC].
 _TEMPERATURES: Final = (-100.0, 200.0)
 #: What is taken off a temperature, and by what the rest is multiplied, to have degC.
@@ -32,14 +35,21 @@ def place_of(cells: Cells, column: str, mapping: Path, entry: str) -> int:
     count = cells.names.count(column)
     if count == 1:
         return cells.names.index(column)
-    near = nearest_names(column, cells.names, 1) if cells.header is not None else []
-    raise InputError(
-        f"{cells.source} has {'no such column' if not count else f'{count} columns of this name'}",
-        where=f"{mapping}, {entry}",
-        came=column,
-        allowed=", ".join(name for name in cells.names if name),
-        cure=f"Did you mean {near[0]}?" if near and not count else "Check the header line and the delimiter.",
-    )
+    where, cure = f"{mapping}, {entry}", "Check the header line and the delimiter."
+    if count:
+        places = " and ".join(column_letters(n) if cells.sheet else str(n + 1) for n in _places(cells, column))
+        what = f"{cells.source} has {count} columns of this name, columns {places}"
+        cure = "Give each its own name, or let columns go by number (layout.header: none, and layout.first_row)."
+    else:
+        what = f"{cells.source} has no such column"
+        with_unit = [name for name in cells.names if _IN_BRACKETS.sub("", name).strip() == column]
+        near = with_unit or (nearest_names(column, cells.names, 1) if cells.header is not None else [])
+        cure = f"Did you mean {near[0]}?" if near else cure
+    raise InputError(what, where=where, came=column, allowed=", ".join(name for name in cells.names if name), cure=cure)
+
+
+def _places(cells: Cells, column: str) -> list[int]:
+    return [place for place, name in enumerate(cells.names) if name == column]
 
 
 def numbers_of(

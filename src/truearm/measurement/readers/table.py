@@ -239,17 +239,27 @@ def _read(path: Path, entry: LayoutEntry, where: str) -> Cells:
             cure=f"Remove it, or name a workbook instead of {path}.",
         )
     encoding = "utf-8-sig" if entry.encoding == "utf-8" else entry.encoding
+    content = read_bytes(path)
     try:
-        text = read_bytes(path).decode(encoding)
+        text = content.decode(encoding)
     except (UnicodeError, LookupError) as error:
         raise InputError(
             f"the file is not {entry.encoding} text",
-            where=str(path),
+            where=f"{path}{_place_of_byte(content, error, entry.layout.delimiter)}",
             cure="Name its encoding in the mapping (layout.encoding), such as cp1252 or utf-16.",
         ) from error
     if not text.strip():
         raise InputError("the file is empty", where=str(path), cure="Check that it was exported whole.")
     return read_cells(text, str(path), entry.layout)
+
+
+def _place_of_byte(content: bytes, error: Exception, delimiter: str | None) -> str:
+    """Return the line and the cell of a byte that is no text, where bytes are signs."""
+    if not isinstance(error, UnicodeDecodeError) or error.encoding.startswith("utf-16"):
+        return ""
+    *above, before = content[: error.start].split(b"\n")
+    cell = "" if delimiter is None else f", cell {before.count(delimiter.encode()) + 1}"
+    return f", line {len(above) + 1}{cell}"
 
 
 def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells, dict[str, list[str]]]:

@@ -213,3 +213,15 @@ def test_a_guess_says_if_it_has_not_seen_all(tmp_path: Path, monkeypatch: pytest
     assert "looked at" not in guess_mapping(tmp_path / "table.csv").text
     monkeypatch.setattr("truearm.measurement.readers.guessing.layouts._MOST_LINES", 450)
     assert "# Note: only the first 450 lines were looked at" in guess_mapping(tmp_path / "table.csv").text
+
+
+def test_deviations_are_named_like_the_angles_beside_them(tmp_path: Path) -> None:
+    head = "label;J1;J2;X;Y;Z;A [rad];B [rad];C [rad];sA [mrad];sB [mrad];sC [mrad]"
+    rows = [f"M{n};{100 + n};2{n};80{n};2,5;3{n};0,1;0,2;0,{n};0,1;0,1;0,3" for n in (1, 2)]
+    rows.append("M3;103;23" + ";n.v." * 6 + ";" * 3)
+    (tmp_path / "table.csv").write_text("\n".join([head, *rows]) + "\n")
+    made = guess_mapping(tmp_path / "table.csv")
+    assert 'sigma_rot: {columns: ["sA [mrad]", "sB [mrad]", "sC [mrad]"], unit: mrad}' in made.text
+    assert 'missing: ["n.v."]' in made.text
+    assert made.refusal is None
+    assert made.configurations == 3

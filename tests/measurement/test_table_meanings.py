@@ -99,6 +99,8 @@ def test_texts_that_mean_missing(tmp_path: Path) -> None:
     commas = LONG.replace(",", ";").replace("7;;9", "7,5;n.a.;9")
     layout = "layout: {delimiter: semicolon, decimal: comma}\n"
     assert read(tmp_path, commas, MAP + layout + "missing: [n.a.]\n").has_position.tolist() == [True, True, False]
+    with pytest.raises(InputError, match=r"a number belongs here; got 'n.a.'.*name its text under missing"):
+        read(tmp_path, commas, MAP + layout)
     with pytest.raises(InputError, match=r"line 2, column q1: a number belongs here; got 'n/a'"):
         read(tmp_path, LONG.replace("a,10,20,one", "a,n/a,20,one"), MAP + "missing: [n/a]\n")
     with pytest.raises(InputError, match="name its text under missing in the mapping"):

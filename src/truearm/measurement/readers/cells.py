@@ -173,7 +173,7 @@ class Cells:
 
     def _not_a_number(self, row: int, column: int, *, missing: bool) -> InputError:
         cell, where = self.columns[column][row], self.place(row, column)
-        if self.decimal == "," and "." in cell:
+        if self.decimal == "," and as_number(cell.replace(".", "").replace(",", ".")) is not None:
             return InputError(
                 "the number has a point, and this file has decimal commas",
                 where=where,

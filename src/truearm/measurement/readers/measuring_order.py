@@ -23,7 +23,7 @@ _NUMBERED: Final = re.compile("(?P<before>.*?)(?P<number>[0-9]{1,9})")
 #: Times without a day that lie further apart [s] may have passed midnight.
 _HALF_A_DAY: Final = 12 * 3600.0
 #: What a workbook adds to a day.
-_MIDNIGHT: Final = " 00:00:00"
+MIDNIGHT: Final = " 00:00:00"
 _CANNOT_TELL: Final = "Leave order out of the mapping if nothing tells it."
 #: Numbers of configurations are below.
 _BEYOND: Final = 1e9
@@ -152,7 +152,7 @@ def _moments(cells: Cells, places: Sequence[int], absent: set[str]) -> list[str]
                 allowed="a day and a time, or neither",
             )
         day, time = both
-        made.append("" if lacking else f"{day if cells.sheet is None else day.removesuffix(_MIDNIGHT)} {time}")
+        made.append("" if lacking else f"{day if cells.sheet is None else day.removesuffix(MIDNIGHT)} {time}")
     return made
 
 

@@ -255,6 +255,8 @@ def _write_labels(
     sigma = left.take(deviations_among(left.columns, ("x", "y", "z")))
     turned = bool(quaternion) or angles is not None
     sigma_rot = left.take(deviations_among(left.columns, ("rx", "ry", "rz"))) if turned else []
+    if angles is not None and not sigma_rot:  # sA, sB, sC beside A, B, C
+        sigma_rot = left.take(deviations_among(left.columns, [(column.words or ("",))[-1] for column in angles[0]]))
     unclear = [*quaternion, *(column for column in unclear if column not in left.columns)] if several else []
     temperature = named_like([c for c in left.columns if c.is_numeric], "temperature")
     left.take([temperature] if temperature else [])

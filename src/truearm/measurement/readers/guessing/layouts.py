@@ -41,7 +41,8 @@ UNITS: Final = {
 
 #: Texts that mean that nothing was measured.
 NOTHING: Final = re.compile(
-    r"n\.?/?a\.?|nan|none|null|nil|-+|\?+|\*+|missing|failed|fail|lost|invalid|#n/a|#div/0!|no data|nodata|occluded",
+    r"n\.?/?[avd]\.?|k\.?/?a\.?|verdeckt|ung.ltig|fehlt|nan|none|null|nil|-+|\?+|\*+|"
+    r"missing|failed|fail|lost|invalid|#n/a|#div/0!|no data|nodata|occluded",
     re.IGNORECASE,
 )
 #: Among so many lines there may be headings.

@@ -54,7 +54,9 @@ _LABEL: Final = frozenset(
 _TARGET: Final = frozenset(
     {"target", "ball", "smr", "reflector", "marker", "prism", "nest", "kugel", "feature", "body"}
 )
-_TIME: Final = frozenset({"time", "timestamp", "stamp", "date", "datum", "zeit", "uhrzeit", "datetime", "when"})
+_TIME: Final = frozenset(
+    {"time", "timestamp", "stamp", "date", "datum", "zeit", "uhrzeit", "datetime", "when", "day", "tag", "clock"}
+)
 _VISIT: Final = frozenset({"visit", "round", "pass", "lap", "repeat", "repetition", "umlauf", "durchgang", "runde"})
 _TEMPERATURE: Final = frozenset({"temp", "temperature", "temperatur"})
 #: Angles about three axes by the names of their columns: axes, whether they turn along, and who writes so.

@@ -12,6 +12,7 @@ import numpy as np
 
 from truearm.measurement.readers.guessing.mapping_text import OPEN, named, quoted
 from truearm.measurement.readers.guessing.meanings import Column, named_like
+from truearm.measurement.readers.measuring_order import MIDNIGHT
 
 _CLOCKS: Final = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S,%f", "%I:%M:%S %p", "%H:%M", "%I:%M %p")
 _DAYS: Final = (
@@ -85,7 +86,9 @@ def _running(columns: Sequence[Column]) -> GuessedTime | None:
 def _of_columns(column: Column, clock: Column | None = None) -> GuessedTime:
     if column.is_numeric:
         return GuessedTime((column,), f"{{column: {named(column)}}}", "its name")
-    given = column.given if clock is None else [" ".join(both) for both in zip(column.given, clock.given, strict=True)]
+    given = column.given
+    if clock is not None:
+        given = [f"{_bare_day(day)} {time}" for day, time in zip(column.given, clock.given, strict=True)]
     who = column.name if clock is None else f"{column.name} and {clock.name}"
     formats = [way for way in _FORMATS if all(_reads(text, way) for text in given)]
     if not formats:
@@ -109,7 +112,12 @@ def _is_clock(column: Column) -> bool:
 
 
 def _is_day(text: str) -> bool:
-    return _reads(text, "%Y-%m-%d") or any(_reads(text, way) for way in _DAYS)
+    return any(_reads(_bare_day(text), way) for way in ("%Y-%m-%d", *_DAYS))
+
+
+def _bare_day(text: str) -> str:
+    """Return a day without what a workbook adds to it."""
+    return text.removesuffix(MIDNIGHT)
 
 
 def _reads(text: str, way: str) -> bool:

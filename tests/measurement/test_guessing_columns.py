@@ -225,3 +225,17 @@ def test_deviations_are_named_like_the_angles_beside_them(tmp_path: Path) -> Non
     assert 'missing: ["n.v."]' in made.text
     assert made.refusal is None
     assert made.configurations == 3
+
+
+@pytest.mark.parametrize("letter", ["p", "t", "T"])
+def test_positions_of_one_letter_are_known_where_nothing_else_is_one(tmp_path: Path, letter: str) -> None:
+    names = ",".join(letter + axis for axis in "xyz")
+    (tmp_path / "table.csv").write_text(
+        f"id,J1,J2,{names}\n" + "".join(f"{n},{100 + n},2,80{n},2.5,3\n" for n in (1, 2))
+    )
+    assert f"    x: {letter}x  # guess: its name" in guess_mapping(tmp_path / "table.csv").text
+    beside = f"id,J1,J2,X,Y,Z,{names}\n" + "".join(f"{n},{100 + n},2,80{n},2.5,3,100,0,{n}\n" for n in (1, 2))
+    (tmp_path / "table.csv").write_text(beside)
+    made = guess_mapping(tmp_path / "table.csv")
+    assert "    x: X  # guess: its name" in made.text
+    assert f"# Not used: {letter}x" in made.text

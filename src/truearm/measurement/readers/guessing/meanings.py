@@ -212,6 +212,12 @@ def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
         for key, three in triples_among(columns, "xyz").items()
         if not (_DEVIATION | _DEVIATION_LETTERS | _NO_POSITION) & set(key) and _may_be(three, LENGTH_UNITS)
     }
+    if not found:  # px, py, pz of ROS and tx, ty, tz of trackers, where nothing else is called like a position
+        named = {column.words[0]: column for column in columns if len(column.words) == 1}
+        glued = [[named.get(letter + axis) for axis in "xyz"] for letter in "pt"]
+        for three in ([column for column in names if column is not None] for names in glued):
+            if len(three) == 3 and _may_be(three, LENGTH_UNITS):
+                return {(): (three[0], three[1], three[2])}
     letters = {key for key in found if len("".join(key)) == 1}
     if all(_NO_TARGET & set(key) for key in letters):
         found = {key: three for key, three in found.items() if key not in letters}

@@ -54,15 +54,16 @@ def about(numbers: np.ndarray, order: str) -> np.ndarray:
 def read_otherwise(way: str) -> Dataset:
     data = sound()
     R = rotation_from_quaternion(np.asarray(data.quaternion))
+    numbers = angles(R)
     made = {
-        "columns reversed": lambda: about(angles(R)[:, ::-1], "zyx"),
-        "fixed for moving": lambda: about(angles(R), "xyz"),
-        "zyz": lambda: about(angles(R), "zyz"),
-        "degrees": lambda: about(np.radians(angles(R)), "zyx"),
-        "rotation vector": lambda: rotation_from_vector(angles(R)),
-        "angles for a vector": lambda: about(rotation_vector(R), "zyx"),
-        "transposed": lambda: np.swapaxes(R, 1, 2),
-    }[way]()
+        "columns reversed": about(numbers[:, ::-1], "zyx"),
+        "fixed for moving": about(numbers, "xyz"),
+        "zyz": about(numbers, "zyz"),
+        "degrees": about(np.radians(numbers), "zyx"),
+        "rotation vector": rotation_from_vector(numbers),
+        "angles for a vector": about(rotation_vector(R), "zyx"),
+        "transposed": np.swapaxes(R, 1, 2),
+    }[way]
     return replace(data, quaternion=quaternion_from_rotation(made))
 
 

@@ -331,7 +331,7 @@ def _is_small(column: Column) -> bool:
 
 
 def is_expanded(columns: Sequence[Column]) -> bool:
-    """Return whether names say that deviations are expanded uncertainties, as a U alone does (GUM, 6.2.1)."""
+    """Return whether names say that deviations are expanded uncertainties, as a U alone does (JCGM 100:2008, 6.2)."""
     if len(columns) == 1 and columns[0].name[:1] == "U" and columns[0].words == ("u",) and columns[0].unit:
         return True
     return any(_EXPANDED & {*column.words, *map("".join, pairwise(column.words))} for column in columns)

@@ -244,6 +244,8 @@ def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float
 
 def numbers_argument(values: object, parameter: str, count: int, allowed: str) -> tuple[float, ...]:
     """Return `count` finite numbers."""
+    if isinstance(values, Real) and not isinstance(values, bool) and count != 1:
+        raise InputError(f"{count} numbers belong here", parameter=parameter, came=1, allowed=allowed)
     if not _is_sequence(values):
         raise wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
     found = [*values]
@@ -283,8 +285,9 @@ def length_argument(value: object, parameter: str, lowest: float = -math.inf) ->
     length = finite_number(value, parameter, allowed="a length")
     least, most = accepted_range("m")
     if not max(least, lowest) <= length <= most:
-        span = f"up to {most:g} m" if lowest == -math.inf else f"{lowest:g} m to {most:g} m"
-        raise InputError("the length is out of range", parameter=parameter, came=f"{length:g} m", allowed=span)
+        span = f"{most * 1e3:g} mm" if lowest == -math.inf else f"{lowest * 1e3:g} mm to {most * 1e3:g} mm"
+        allowed = f"up to {span}" if lowest == -math.inf else span
+        raise InputError("the length is out of range", parameter=parameter, came=f"{length * 1e3:g} mm", allowed=allowed)
     return length
 
 

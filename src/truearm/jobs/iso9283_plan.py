@@ -117,7 +117,7 @@ def iso9283_plan(
     choice_argument(plane, "plane", dict.fromkeys(PLANES))
     choice_argument(ahead, "ahead", dict.fromkeys(DIRECTIONS))
     near, low = length_argument(nearest, "nearest"), length_argument(floor, "floor")
-    band = _positive(limit_band, "limit_band", "the limit band is above 0", "a length above 0 [m]")
+    band = _positive(limit_band, "limit_band", "the limit band is above 0", "a length above 0", "mm")
     watched = _positive(hours, "hours", "the drift is watched for a time above 0", "hours above 0")
     shares = _shares(velocities, "velocities", "velocity", may_be_zero=False)
     carried = _shares(loads, "loads", "load", may_be_zero=True)
@@ -228,7 +228,7 @@ def _rated_load(arm: Robot, load: object, warnings: list[Notice]) -> float:
 
 
 def _rated_velocity(velocity: object) -> float:
-    speed = _positive(velocity, "velocity", "the rated velocity is above 0", "a velocity above 0 [m/s]")
+    speed = _positive(velocity, "velocity", "the rated velocity is above 0", "a velocity above 0", "mm/s")
     least, most = _VELOCITIES
     if not least <= speed <= most:
         other = 1e3 if speed < least else 1e-3
@@ -242,10 +242,12 @@ def _rated_velocity(velocity: object) -> float:
     return speed
 
 
-def _positive(value: object, parameter: str, what: str, allowed: str) -> float:
+def _positive(value: object, parameter: str, what: str, allowed: str, thousandths: str = "") -> float:
+    """Return a number above 0; in the refusal it has the unit `thousandths`, of which 1000 make one."""
     (number,) = numbers_argument([value], parameter, 1, allowed)
     if number <= 0.0:
-        raise InputError(what, parameter=parameter, came=Words(f"{number:g}"), allowed=allowed)
+        shown = f"{1e3 * number:g} {thousandths}" if thousandths else f"{number:g}"
+        raise InputError(what, parameter=parameter, came=Words(shown), allowed=allowed)
     return number
 
 

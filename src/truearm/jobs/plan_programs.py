@@ -233,11 +233,11 @@ def _speed(value: Any) -> tuple[float, float]:
     usual = Driving()
     if value is None:
         return usual.speed, usual.share
-    allowed = "a speed of the tip [m/s], and with it a share of the joints' speed: 0.25, 0.1"
+    allowed = "the speed of the tip, and with it a share of the joints' speed"
     single = not isinstance(value, Sequence) or isinstance(value, str)
     values = [value] if single else list(value)
     if len(values) not in (1, 2):
-        raise InputError("one or two numbers belong here", parameter="speed", came=values, allowed=allowed)
+        raise InputError("one or two numbers belong here", parameter="speed", came=len(values), allowed=allowed)
     speed, *shares = numbers_argument(values, "speed", len(values), allowed)
     low, high = _SPEEDS
     if not low <= speed <= high:

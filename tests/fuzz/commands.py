@@ -76,6 +76,7 @@ COMMANDS: Final[tuple[str, ...]] = (
     "--alignment alignment.yaml --noise 0.001 --json --out out",
     "devices",
     "robots",
+    "robots irb-1200 --maker abb --axes 6 --json",
     "show irb120.yaml",
     "show calibrated.yaml --json",
     "show arm.urdf",

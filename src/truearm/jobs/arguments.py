@@ -285,9 +285,13 @@ def length_argument(value: object, parameter: str, lowest: float = -math.inf) ->
     length = finite_number(value, parameter, allowed="a length")
     least, most = accepted_range("m")
     if not max(least, lowest) <= length <= most:
-        span = f"{most * 1e3:g} mm" if lowest == -math.inf else f"{lowest * 1e3:g} mm to {most * 1e3:g} mm"
-        allowed = f"up to {span}" if lowest == -math.inf else span
-        raise InputError("the length is out of range", parameter=parameter, came=f"{length * 1e3:g} mm", allowed=allowed)
+        span = "up to" if lowest == -math.inf else f"{lowest * 1e3:g} mm to"
+        raise InputError(
+            "the length is out of range",
+            parameter=parameter,
+            came=f"{length * 1e3:g} mm",
+            allowed=f"{span} {most * 1e3:g} mm",
+        )
     return length
 
 

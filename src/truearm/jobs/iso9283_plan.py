@@ -23,6 +23,7 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, refuse_stale, written_programs
 from truearm.jobs.tip import tip_argument
+from truearm.library.wider_limits import wider_limits_notices
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
@@ -156,7 +157,7 @@ def iso9283_plan(
     )
     arm = robot_argument(robot)
     arm, target = tip_argument(arm, target, tip, "be measured")
-    warnings: list[Notice] = []
+    warnings = wider_limits_notices(arm)
     rated = _rated_load(arm, load, warnings)
     speed = _ASSUMED_VELOCITY
     if velocity is None:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from truearm.library.wider_limits import wider_limits_notices
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.inclinometer import Inclinations
 from truearm.measurement.readers.canonical import csv_text
@@ -108,7 +109,8 @@ class InclinometerPlan(Record):
         for name, unit, deviation, prior in self._expected():
             known = "stays unknown" if name in self.unseen else f"known to {deviation:.2g} {unit}"
             text.append(f"  {name:<14} {known} (before: {prior:.2g} {unit})")
-        return [*text, *joints_lines(self.joints_are), *notice_lines(beside_notices(self.robot))]
+        notices = (*beside_notices(self.robot), *wider_limits_notices(self.robot))
+        return [*text, *joints_lines(self.joints_are), *notice_lines(notices)]
 
     def csv_text(self) -> str:
         """Return the plan as CSV: one row a configuration, in the order of measurement, and what is read there."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from truearm.errors import InputError
+from truearm.library.wider_limits import wider_limits_notices
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.notices import Notice
@@ -91,7 +92,8 @@ class Plan(Record):
         """What to know of the ways that were checked, and of the program."""
         if self.program is not None:
             return self.program.warnings
-        return () if self.tour is None else tuple(beside_notices(self.made.robot))
+        robot = self.made.robot
+        return (*(() if self.tour is None else beside_notices(robot)), *wider_limits_notices(robot))
 
     @property
     def _there(self) -> tuple[str, ...]:

@@ -119,7 +119,7 @@ def folder_for(names: Iterable[str], out: object, *read: object, parameter: str 
     read
         What the job was given: none of these, as far as they are files, may be overwritten.
     ours
-        Whether only files may be overwritten that truearm has written there.
+        Whether only files may be overwritten that truearm has written there and nobody has changed since.
     """
     return output_folder(out, names, files_of(*read), parameter, ours=ours)
 
@@ -146,9 +146,9 @@ def folder_beside(names: Iterable[str], mark: str, out: object, *read: object) -
     return folder
 
 
-def file_for(out: object, *read: object, parameter: str = "out") -> Path:
-    """Return where a file shall be written, or refuse a place that cannot be; `read` as for :func:`folder_for`."""
-    return output_file(out, files_of(*read), parameter)
+def file_for(out: object, *read: object, parameter: str = "out", ours: bool = False) -> Path:
+    """Return where a file shall be written, or refuse a place that cannot be; the rest as for :func:`folder_for`."""
+    return output_file(out, files_of(*read), parameter, ours=ours)
 
 
 def new_file_for(out: object, parameter: str = "out") -> Path:

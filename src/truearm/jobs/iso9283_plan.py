@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +23,7 @@ from truearm.jobs.arguments import (
     robot_argument,
 )
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, refuse_stale, written_programs
+from truearm.jobs.plans_replaced import replaced_notices
 from truearm.jobs.tip import tip_argument
 from truearm.library.wider_limits import wider_limits_notices
 from truearm.modeling.robot import Robot
@@ -193,12 +195,14 @@ def iso9283_plan(
     programs = None if language is None else written_programs(plan, language, stands, record, warnings)
     found = Iso9283Plan(plan, call, tuple(warnings), inputs, programs)
     if folder is not None:
-        names = tuple(found.contents())
-        if programs is not None:
-            folder_for(names, folder, robot, given_cube, record, ours=True)
+        contents = found.contents()
         refuse_losing_slow_run(folder, record)
-        refuse_stale(folder, names, record)
+        if programs is not None:
+            folder_for(tuple(contents), folder, robot, given_cube, record, ours=True)
+        refuse_stale(folder, tuple(contents), record)
+        replaced = replaced_notices(folder, PLAN, contents[PLAN])
         found.save(folder)
+        found = replace(found, warnings=(*found.warnings, *replaced))
     return found
 
 

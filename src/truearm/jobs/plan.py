@@ -33,6 +33,7 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.driving import cell_argument, finder_argument
 from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
+from truearm.jobs.plans_replaced import plan_files_for, refuse_ways_of_another, replaced_notices
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
@@ -46,6 +47,7 @@ from truearm.planning.choosing.measurement_plan import (
     with_targets,
 )
 from truearm.planning.choosing.observability import INDICES
+from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.constraints.constraints import Constraints, read_constraints
 from truearm.planning.driving.joint_window import on_principal_turn
 from truearm.planning.driving.touring import tour_of, unreached
@@ -225,6 +227,8 @@ def plan(
     # What was measured was reached: such configurations are checked where that is asked for.
     driven = candidates_from is None or wanted_program is not None or no_floor
     driven = driven or any(given is not None for given in (floor, clearance, home))
+    if table is not None and not driven:
+        refuse_ways_of_another(ways_beside(table))
     labels, readings, own, finder = None, None, bool(carrying.targets), None
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
@@ -286,7 +290,10 @@ def plan(
         if planned.program is not None:
             refuse_other_programs(table, planned.program.files, *read)
         progress("writing the files")
+        there = (table.parent, table.name) if planned.program is None else (table, TABLE)
+        replaced = replaced_notices(*there, plan_csv(planned.made, planned.joints_are))
         planned.save(table)
+        planned = replace(planned, replaced=replaced)
     return planned
 
 
@@ -295,8 +302,7 @@ def _files(out: object, *read: object) -> Path:
     table = file_for(out, *read)
     if table.suffix == PAGE:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
-    file_for(table.with_suffix(PAGE), *read)
-    file_for(ways_beside(table), *read)
+    plan_files_for((table.name, table.with_suffix(PAGE).name, ways_beside(table).name), table, *read)
     return table
 
 

@@ -146,7 +146,7 @@ class Iso9283Plan(Record):
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write all files into a folder; return them."""
         contents = self.contents()
-        out = output_folder(folder, contents, self.inputs, "folder")
+        out = output_folder(folder, contents, self.inputs, "folder", ours=True)
         write_files(out, contents, self.command)
         return tuple(out / name for name in contents)
 

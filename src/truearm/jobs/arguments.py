@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from numbers import Integral, Real
 from pathlib import Path
@@ -20,6 +20,7 @@ from truearm.manifest import sets_in
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
+from truearm.measurement.readers.configurations import read_configurations
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
@@ -37,6 +38,7 @@ T = TypeVar("T")
 
 #: Where a force acts that acts on no target.
 FLANGE: Final = "flange"
+_CANONICAL: Final = "a canonical CSV file"
 #: Whose joint positions can be asked for.
 JOINTS_OF: Final[dict[str, JointsOf]] = {"controller": "controller", "model": "model"}
 
@@ -74,8 +76,10 @@ def refuse_swapped(robot: object, data: object, job: str) -> None:
         )
 
 
-def data_argument(data: object, parameter: str = "data") -> Dataset:
-    """Return the dataset that was given, or that a canonical CSV file holds."""
+def data_argument(
+    data: object, parameter: str = "data", read: Callable[[Path], Dataset] = read_csv, allowed: str = _CANONICAL
+) -> Dataset:
+    """Return the dataset that was given, or that a file holds: a canonical CSV, or what `read` reads."""
     if isinstance(data, Dataset):
         return data
     if isinstance(data, str | Path):
@@ -85,12 +89,12 @@ def data_argument(data: object, parameter: str = "data") -> Dataset:
                 "this is a robot, and measurements belong here",
                 parameter=parameter,
                 came=str(data),
-                allowed="a canonical CSV file",
+                allowed=allowed,
                 cure="Exchange robot and measurements, or name the file of measurements.",
             )
         with refusals_of(parameter):
-            return read_csv(path)
-    raise wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
+            return read(path)
+    raise wrong_kind("measurements belong here", data, parameter, f"a Dataset, or {allowed}")
 
 
 def readings_argument(robot: Robot, data: object, parameter: str = "data") -> Dataset:
@@ -98,6 +102,13 @@ def readings_argument(robot: Robot, data: object, parameter: str = "data") -> Da
     measured = data_argument(data, parameter)
     with refusals_of(parameter):
         return in_model_joints(robot, measured)
+
+
+def configurations_argument(robot: Robot, data: object, parameter: str) -> Dataset:
+    """Return where an arm stands, by its model: with measurements, or without them as the table of a plan has it."""
+    found = data_argument(data, parameter, read_configurations, f"{_CANONICAL}, or that of a plan")
+    with refusals_of(parameter):
+        return in_model_joints(robot, found)
 
 
 def joints_argument(joints: object, robot: Robot, parameter: str = "joints") -> JointsOf:

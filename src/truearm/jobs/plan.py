@@ -16,6 +16,7 @@ from truearm.jobs.accuracy_goal import accuracy_goal
 from truearm.jobs.arguments import (
     choice_argument,
     command_argument,
+    configurations_argument,
     count_argument,
     deviation_argument,
     device_argument,
@@ -27,7 +28,6 @@ from truearm.jobs.arguments import (
     payload_argument,
     progress_argument,
     python_call,
-    readings_argument,
     robot_argument,
     whole_argument,
 )
@@ -100,7 +100,8 @@ def plan(
         CSV file to write, and a page beside it; with a program a folder for both, the program and a sheet. None writes
         nothing, see :meth:`Plan.save`.
     candidates_from
-        Readings, or a canonical CSV file, among whose configurations to choose; None draws them within the limits.
+        Readings, a canonical CSV file, or the table of another plan, among whose configurations to choose; None draws
+        them within the limits.
     objective
         ``O1`` to ``O5``, or ``error``: the mean square error where the robot shall be accurate. None is ``error`` if
         that was said, otherwise ``O1``.
@@ -234,7 +235,7 @@ def plan(
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
         own = True
     elif candidates_from is not None:
-        data = readings_argument(carrying, candidates_from, "candidates_from")
+        data = configurations_argument(carrying, candidates_from, "candidates_from")
         if wanted_program is not None:
             wanted_program.check_readings(data)
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels

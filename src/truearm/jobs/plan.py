@@ -9,8 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from truearm.errors import InputError, kind_of, refusals_of
-from truearm.files import path_argument
+from truearm.errors import InputError, kind_of
 from truearm.identification.solving.models import MODELS
 from truearm.jobs.accuracy_goal import accuracy_goal
 from truearm.jobs.arguments import (
@@ -31,7 +30,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
-from truearm.jobs.driving import cell_argument, finder_argument
+from truearm.jobs.driving import cell_argument, constraints_argument, finder_argument
 from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
 from truearm.jobs.plans_replaced import plan_files_for, refuse_ways_of_another, replaced_notices
 from truearm.measurement.dataset import Dataset
@@ -48,7 +47,7 @@ from truearm.planning.choosing.measurement_plan import (
 )
 from truearm.planning.choosing.observability import INDICES
 from truearm.planning.choosing.plan_table import plan_csv
-from truearm.planning.constraints.constraints import Constraints, read_constraints
+from truearm.planning.constraints.constraints import Constraints
 from truearm.planning.driving.joint_window import on_principal_turn
 from truearm.planning.driving.touring import tour_of, unreached
 from truearm.results.plan import PAGE, Plan
@@ -187,7 +186,7 @@ def plan(
             cure="Leave one of them out; `constraints` narrows the choice.",
         )
     instrument = None if device is None else device_argument(device)
-    rules = _rules(constraints)
+    rules = constraints_argument(constraints)
     carried, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
         "plan",
@@ -314,13 +313,6 @@ def _folder(out: object, *read: object) -> Path:
             "a plan with a program needs a folder", parameter="out", came=str(out), cure="Name a folder, or no program."
         )
     return folder_beside((TABLE, PLAN_PAGE, WAYS, SHEET), TABLE, out, *read)
-
-
-def _rules(constraints: object) -> Constraints | None:
-    if constraints is None or isinstance(constraints, Constraints):
-        return constraints
-    with refusals_of("constraints"):
-        return read_constraints(path_argument(constraints, "constraints"))
 
 
 def _count(poses: object) -> int | None:

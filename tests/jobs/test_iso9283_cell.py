@@ -97,7 +97,7 @@ def test_ways_between_clear_poses_that_are_not_clear_are_named(cube: Path, tmp_p
 
 
 def test_the_cube_is_chosen_where_the_ways_are_clear(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = Cube((0.35, 0.0, 0.35), 0.36)
+    whole = Cube((0.35, 0.0, 0.35), 0.3)
     monkeypatch.setattr(planning, "largest_cube", lambda *_, **__: whole)
     robot = truearm.load_robot("irb120")
     given: dict[str, Any] = {"tests": ["AP"], "rated_load": 3.0, "rated_velocity": 1.0}
@@ -114,4 +114,4 @@ def test_the_cube_is_chosen_where_the_ways_are_clear(monkeypatch: pytest.MonkeyP
     assert clear.cube.side < anywhere.cube.side
     assert (np.abs(clear.cube.centre - whole.centre) + clear.cube.side / 2.0 <= whole.side / 2.0 + 1e-12).all()
     with pytest.raises(InputError, match="and keep clear; got 'missed: never"):
-        performance_plan(robot, **given, unsuited=lambda _: "never")
+        performance_plan(robot, **given, cube=clear.cube, unsuited=lambda _: "never")

@@ -50,7 +50,7 @@ _SHRUNK: Final = 0.95
 _SMALLEST: Final = 0.05
 #: The same where cubes are tried everywhere in the largest.
 _SHRUNK_WITHIN: Final = 0.9
-_SMALLEST_WITHIN: Final = 0.25
+_SMALLEST_WITHIN: Final = 0.3
 #: No joint turns, or slides, further than this between two neighbouring points of a path [rad or m].
 _LARGEST_MOVE: Final = 0.35
 _POINTS: Final = 33

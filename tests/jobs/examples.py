@@ -422,6 +422,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "velocity": 0.5,
         "velocities": (50.0,),
         "loads": (100.0,),
+        "clearance": 0.02,
         "out": folder / "performance-plan",
     },
     "iso9283_simulate": lambda _: {

@@ -169,7 +169,9 @@ def performance_plan(
         + (", and keep clear" if kept else ""),
         where=robot.name,
         came=f"missed: {missed}",
-        cure="Take a smaller cube, another centre, plane or orientation.",
+        cure="See that boxes, floor and limits leave the arm room, lower `clearance`, or look in another direction."
+        if find and kept
+        else "Take a smaller cube, another centre, plane or orientation.",
     )
 
 

@@ -13,6 +13,7 @@ from truearm.errors import InputError
 from truearm.jobs.iso9283_cell import StatedCell, stated_cell
 from truearm.planning.constraints.constraints import Constraints, read_constraints
 from truearm.planning.iso9283 import plan as planning
+from truearm.planning.iso9283.criteria import TESTS
 from truearm.planning.iso9283.plan import performance_plan
 from truearm.planning.poses.iso9283 import Cube
 from truearm.results.iso9283_plan import Iso9283Plan
@@ -101,7 +102,7 @@ def test_the_cube_is_chosen_where_the_ways_are_clear(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(planning, "largest_cube", lambda *_, **__: whole)
     robot = truearm.load_robot("irb120")
     given: dict[str, Any] = {"tests": ["AP"], "rated_load": 3.0, "rated_velocity": 1.0}
-    monkeypatch.setattr(planning, "TESTS", {"AP": planning.TESTS["AP"]})
+    monkeypatch.setattr(planning, "TESTS", {"AP": TESTS["AP"]})
     anywhere = performance_plan(robot, **given)
     text = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
     post = Constraints.model_validate(

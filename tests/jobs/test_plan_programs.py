@@ -74,7 +74,10 @@ def test_a_plan_tells_of_its_program(planned: Plan) -> None:
     assert (told["speed_mm_s"], told["joint_speed_percent"], told["dwell_s"]) == (250.0, 10.0, 2.0)
     assert (told["wait"], told["tip"], told["load_kg"]) == ("operator", "2", 1.5)
     assert [notice["code"] for notice in told["warnings"]] == ["tool-assumed", "joint-speed-assumed"]
-    assert "Nobody said the targets of the flange" in told["warnings"][0]["message"]
+    assumed = told["warnings"][0]["message"]
+    assert "Nobody said the targets of the flange" in assumed
+    assert "target 2 at (75, 93.7, 215) mm, target 3 at (150, 0, 125) mm (the first tool of the robot" in assumed
+    assert "kg" not in assumed
 
 
 def test_the_sheet_has_every_configuration_and_room_to_write(planned: Plan, folder: Path) -> None:
@@ -95,6 +98,10 @@ def test_the_sheet_has_every_configuration_and_room_to_write(planned: Plan, fold
     for words in ("Temp. [&deg;C]", "Start x [mm]", "End z [mm]", "operator", "Instrument: serial", "Environment:"):
         assert words in sheet
     assert "<script" not in sheet
+    page = (folder / "plan.html").read_text()
+    assert "`" not in page.split("<main>")[1].split("</main>")[0]
+    assert "give <code>noise</code> where you know better" in page
+    assert '<p class="notice warning"><strong>Warning (tool-assumed):</strong> Nobody said' in page
     assert len(sheet) < 60_000
 
 
@@ -215,6 +222,7 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         assert [notice.level for notice in driven.warnings] == ["warning", "warning", "warning", "note"]
         assert any("compare joints with the pendant" in text for text in driven.files.values())
         assert "Nobody said the load of the flange" in driven.warnings[2].message
+        assert "what is assumed, 0 kg at (0, 0, 0) mm. A wrong load" in driven.warnings[2].message
         by_hand = {"fanuc": "Payload schedule 1 on", "inform": "Tool file 0 on", "val3": "The tool flange on"}
         assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.lines())
 

@@ -44,11 +44,17 @@ _JOINT_SPEEDS: Final = {
 
 
 def written_programs(
-    plan: PerformancePlan, language: Language, dwell: float, slow_run: Path | None, warnings: list[Notice]
+    plan: PerformancePlan,
+    language: Language,
+    dwell: float,
+    slow_run: Path | None,
+    warnings: list[Notice],
+    *,
+    cell_unknown: bool = True,
 ) -> WrittenPrograms:
     """Return the programs of a plan as texts: the slow ones, and the faster ones where the slow run is recorded.
 
-    What is to be said of them is added to `warnings`.
+    What is to be said of them is added to `warnings`; of ways near floor and links only where the cell is unknown.
     """
     refuse_unknown_counts(plan.robot, language.name)
     text = plan_text(plan)
@@ -76,7 +82,8 @@ def written_programs(
                 "note",
             )
         )
-    warnings += _near(plan.robot, found.ways)
+    if cell_unknown:
+        warnings += _near(plan.robot, found.ways)
     count = len(found.slow) + (0 if slow_run is None else len(found.faster))
     return WrittenPrograms(language.name, {**slow, **faster}, record, count, found.share)
 
@@ -102,7 +109,7 @@ def _near(robot: Robot, ways: Mapping[str, Array]) -> list[Notice]:
             "ways-near",
             f"On {len(near)} of {len(looked)} ways the arm comes within {cell.clearance * 1e3:g} mm of the floor or of "
             f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {room * 1e3:.0f} mm. Look at "
-            "these ways first, or plan again in a smaller cube or elsewhere.",
+            "these ways first, or state `constraints` or `clearance`: then they are kept clear.",
         )
     ]
 

@@ -6,7 +6,7 @@ A program begins and ends in P1, slowly. Before each measured pose the robot sto
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -110,6 +110,22 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> Measur
         if test.id != "compliance":
             faster += [one for other in test.velocities if abs(other - share) > 1e-9 for one in made.of(test, other)]
     return MeasuringPrograms(tuple(first), tuple(faster), slow, {**made.moves, **made.routes.driven})
+
+
+def driven_ways(plan: PerformancePlan) -> Mapping[str, Array]:
+    """Return the ways between the stops of all tests, as :attr:`MeasuringPrograms.ways` has them.
+
+    Raises
+    ------
+    InputError
+        If a move cannot be made: with the move.
+    """
+    # A second cycle begins where the first has ended; the others go the same ways.
+    twice = replace(plan, tests=tuple(replace(test, cycles=min(2, test.cycles)) for test in plan.tests))
+    made = _Programs(twice, 0.0, "", 1.0)
+    for test in twice.tests:
+        _Steps(made, test, 1.0).run()
+    return {**made.moves, **made.routes.driven}
 
 
 def _is_calibrated(robot: Robot) -> bool:

@@ -22,16 +22,16 @@ from truearm.notices import Notice
 from truearm.units import from_si
 
 #: At 100 % no joint of an arm is faster than this: of the first three, and of the others [rad/s], nor do they turn the
-#: stretched arm faster [m/s]. Above what ROS-Industrial's packages have for some of the fastest: KUKA KR 3 R540, FANUC
-#: LR Mate 200iD, Yaskawa GP7, Staubli TX2-60.
-_FAST: Final = ((math.radians(600.0), 12.0), (math.radians(1600.0), math.radians(2500.0)))
+#: stretched arm faster [m/s]. Above all that the library knows of; the fastest are FANUC LR Mate 200iD, Yaskawa GP8,
+#: Staubli TX2-60L and TX2-90XL.
+_FAST: Final = ((math.radians(600.0), 15.0), (math.radians(1600.0), math.radians(2500.0)))
 #: At 100 % no joint is slower, of an arm of this length stretched [m] and of longer ones [rad/s]: assumed.
 _SLOW: Final = (2.0, math.radians(100.0), math.radians(50.0))
 #: The same of sliding joints: the slowest and the fastest [m/s].
 _SLIDING: Final = (0.2, 5.0)
 _FIRST_JOINTS: Final = 3
 #: The finest share that a language says; URScript says a speed instead.
-_FINEST: Final = {"KRL": 0.01, "FANUC LS": 0.01, "URScript": 1e-6}
+_FINEST: Final = {"KRL": 0.01, "FANUC LS": 0.01, "URScript": 1e-4 / FASTEST}
 _FINEST_ELSEWHERE: Final = 1e-4
 #: A way is looked at in steps of no more [rad or m].
 _STEP: Final = math.radians(3.0)
@@ -148,7 +148,7 @@ def speed_notices(robot: Robot, assumed: str) -> list[Notice]:
     speeds = known_speeds(robot)
     if speeds is None:
         unknown = [joint.name for joint in robot.joints if joint.max_speed is None]
-        of = f"the joints of {robot.name} are" if len(unknown) == len(robot.joints) else f"{', '.join(unknown)} goes"
+        of = f"the joints of {robot.name} are" if len(unknown) == len(robot.joints) else f"{', '.join(unknown)} go"
         return [
             Notice("joint-speed-assumed", f"How fast {of} at 100 % is not known: {assumed}.", "note"),
         ]

@@ -46,11 +46,10 @@ NO_POINT = {
     "xarm7": "less than to the wrist centre",
 }
 #: Arms whose makers' own URDF has the controller's base and flange under other names than base and tool0.
-OTHER_NAMES = ("aubo_i5", "fr3", "gen3", "m1013", "panda", "rv13frl", "rv4frl", "rv7frl", "xarm6", "xarm7")
-#: Arms whose URDF has another base or tool0 than the others of its package, which are the controller's.
-OTHER_FRAMES = {
-    "m20id_25": "its tool0 is half a turn about z from that of the package's other arms",
-}
+OTHER_NAMES = (
+    *("aubo_i5", "fr3", "gen3", "m1013", "m20id_25", "mz07f"),
+    *("panda", "rv13frl", "rv4frl", "rv7frl", "xarm6", "xarm7"),
+)
 #: Arms without a maker's reach, and why.
 NO_REACH = {
     "katana450": "its flange is an attachment of the thesis",
@@ -64,7 +63,7 @@ def has_controller_s_frames(robot_id: str) -> bool:
     stored = outside.read(robot_id)
     known = load_robot(robot_id).controller != AS_THE_MODEL
     named = (stored.base, stored.tip) == ("base", "tool0") or robot_id in OTHER_NAMES
-    return known and named and robot_id not in OTHER_FRAMES
+    return known and named
 
 
 @pytest.mark.parametrize("robot_id", library())

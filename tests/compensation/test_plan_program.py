@@ -422,12 +422,18 @@ def test_of_joints_whose_speed_is_known_and_of_others_both_count() -> None:
     assert "How fast axis_2, axis_4, axis_5 go at 100 % is not known: this was taken." in notice.message
 
 
-def test_speeds_of_a_urdf_are_to_be_compared() -> None:
-    robot = load_robot("irb120")
+def test_velocities_of_a_urdf_are_not_relied_on() -> None:
+    robot = load_robot("kr5")
+    urdf = replace(robot, convention_name="urdf")
+    assert known_speeds(urdf) is None
+    without = with_speeds(robot, [None] * 6)
+    for one, other in zip(joint_rates(urdf), joint_rates(without), strict=True):
+        assert one.tolist() == other.tolist()
     assert speed_notices(robot, "") == []
-    (notice,) = speed_notices(replace(robot, convention_name="urdf"), "")
-    assert (notice.code, notice.level) == ("joint-speed-of-urdf", "warning")
-    assert "250, 250, 250, 320, 320, 420 deg/s" in notice.message
+    (notice,) = speed_notices(urdf, "this was taken")
+    assert (notice.code, notice.level) == ("joint-speed-assumed", "note")
+    assert "this was taken. The velocities of the URDF are not relied on" in notice.message
+    assert "URDF" not in speed_notices(without, "this was taken")[0].message
 
 
 def test_speeds_are_said_in_the_units_of_joints() -> None:

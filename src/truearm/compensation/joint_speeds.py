@@ -37,9 +37,17 @@ _FINEST_ELSEWHERE: Final = 1e-4
 _STEP: Final = math.radians(3.0)
 
 
+def stated_speeds(robot: Robot) -> list[float | None]:
+    """Return how fast each joint goes at 100 % [rad/s or m/s], as far as that can be relied on.
+
+    Velocities of a URDF cannot: many stand for nothing, and a program that trusts too low ones is too fast.
+    """
+    return [None if robot.convention_name == "urdf" else joint.max_speed for joint in robot.joints]
+
+
 def known_speeds(robot: Robot) -> tuple[float, ...] | None:
     """Return how fast every joint goes at 100 % [rad/s or m/s]; None if the robot file does not say it of each."""
-    known = tuple(joint.max_speed for joint in robot.joints if joint.max_speed is not None)
+    known = tuple(speed for speed in stated_speeds(robot) if speed is not None)
     return known if len(known) == len(robot.joints) else None
 
 
@@ -52,9 +60,9 @@ def joint_rates(robot: Robot) -> tuple[Array, Array]:
     slowest = _SLOW[1] if length <= _SLOW[0] else _SLOW[2]
     fastest = [min(rate, along / length) for rate, along in _FAST]
     slow, fast = [], []
-    for k, joint in enumerate(robot.joints):
+    for k, (joint, stated) in enumerate(zip(robot.joints, stated_speeds(robot), strict=True)):
         bounds = (slowest, fastest[k >= _FIRST_JOINTS]) if joint.kind == "revolute" else _SLIDING
-        low, high = bounds if joint.max_speed is None else (joint.max_speed, joint.max_speed)
+        low, high = bounds if stated is None else (stated, stated)
         slow.append(low)
         fast.append(high)
     return np.array(slow), np.array(fast)
@@ -145,23 +153,19 @@ def speed_notices(robot: Robot, assumed: str) -> list[Notice]:
     assumed
         What was taken where it is not known, in words.
     """
-    speeds = known_speeds(robot)
-    if speeds is None:
-        unknown = [joint.name for joint in robot.joints if joint.max_speed is None]
-        of = f"the joints of {robot.name} are" if len(unknown) == len(robot.joints) else f"{', '.join(unknown)} go"
-        return [
-            Notice("joint-speed-assumed", f"How fast {of} at 100 % is not known: {assumed}.", "note"),
-        ]
-    if robot.convention_name != "urdf":
+    stated = zip(robot.joints, stated_speeds(robot), strict=True)
+    unknown = [joint.name for joint, speed in stated if speed is None]
+    if not unknown:
         return []
-    return [
-        Notice(
-            "joint-speed-of-urdf",
-            f"The joints' speeds at 100 % are those of the URDF, {speed_words(speeds, robot)}, and many URDFs have "
-            "numbers that stand for nothing. Compare them with the maker's data sheet: with too low ones the program "
-            "drives faster than it says.",
+    some = len(unknown) < len(robot.joints)
+    of = f"{', '.join(unknown)} go" if some else f"the joints of {robot.name} are"
+    words = f"How fast {of} at 100 % is not known: {assumed}."
+    if any(joint.max_speed is not None for joint in robot.joints) and not some:
+        words += (
+            " The velocities of the URDF are not relied on, as many stand for nothing: compare them with the maker's "
+            "data sheet, and convert the robot into another convention."
         )
-    ]
+    return [Notice("joint-speed-assumed", words, "note")]
 
 
 def _leading_share(robot: Robot, most: Array, share: float) -> float:
@@ -169,7 +173,7 @@ def _leading_share(robot: Robot, most: Array, share: float) -> float:
 
     URScript says the speed of the joint that goes farthest, and the others go in proportion.
     """
-    top = np.array([FASTEST if joint.max_speed is None else joint.max_speed for joint in robot.joints])
+    top = np.array([FASTEST if speed is None else speed for speed in stated_speeds(robot)])
     longest = float((most / top).max())
     return share if longest <= 0.0 else share * float(most.max()) / (FASTEST * longest)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
-from truearm.compensation.joint_speeds import joint_rates, known_speeds, speed_notices, speed_words
+from truearm.compensation.joint_speeds import joint_rates, known_speeds, speed_notices, speed_words, stated_speeds
 from truearm.compensation.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
 from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.compensation.programs.program import Language
@@ -354,7 +354,7 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
 def _assumed(language: Language, robot: Robot) -> str:
     """Say what was taken for the joints' speed where it is not known."""
     slow, fast = joint_rates(robot)
-    unknown = [joint.max_speed is None for joint in robot.joints]
+    unknown = [speed is None for speed in stated_speeds(robot)]
     if language.name == "URScript":
         words = f"100 % is taken for {math.degrees(FASTEST):.0f} deg/s"
     elif language.name == "RAPID":

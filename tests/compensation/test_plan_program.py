@@ -428,7 +428,7 @@ def test_velocities_of_a_urdf_are_not_relied_on() -> None:
     assert known_speeds(urdf) is None
     without = with_speeds(robot, [None] * 6)
     for one, other in zip(joint_rates(urdf), joint_rates(without), strict=True):
-        assert one.tolist() == other.tolist()
+        assert one == pytest.approx(other)
     assert speed_notices(robot, "") == []
     (notice,) = speed_notices(urdf, "this was taken")
     assert (notice.code, notice.level) == ("joint-speed-assumed", "note")

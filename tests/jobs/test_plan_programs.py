@@ -63,7 +63,8 @@ def test_a_folder_has_the_plan_its_ways_the_sheet_and_the_program(planned: Plan,
 def test_a_plan_tells_of_its_program(planned: Plan) -> None:
     lines = "\n".join(planned.lines())
     assert "Measuring program in RAPID: 10 configurations from Home and back, each approached from one side." in lines
-    assert "At most 250 mm/s and 10 % of the joints' speed; it stands for 2 s, then until the operator starts" in lines
+    speeds = "250, 250, 250, 320, 320, 420 deg/s"
+    assert f"At most 250 mm/s and 10 % of the joints' speed ({speeds}); it stands for 2 s, then until" in lines
     assert "It tells the controller of target 2 at (75, 93.7, 215) mm and of 1.5 kg at (0, 0, 60) mm." in lines
     assert "It is not verified and no safety function" in lines
     told = planned.summary()["program"]
@@ -73,7 +74,8 @@ def test_a_plan_tells_of_its_program(planned: Plan) -> None:
     assert told["approached"] is True
     assert (told["speed_mm_s"], told["joint_speed_percent"], told["dwell_s"]) == (250.0, 10.0, 2.0)
     assert (told["wait"], told["tip"], told["load_kg"]) == ("operator", "2", 1.5)
-    assert [notice["code"] for notice in told["warnings"]] == ["tool-assumed", "joint-speed-assumed"]
+    assert told["joint_speeds"] == speeds
+    assert [notice["code"] for notice in told["warnings"]] == ["tool-assumed"]
     assumed = told["warnings"][0]["message"]
     assert "Nobody said the targets of the flange" in assumed
     assert "target 2 at (75, 93.7, 215) mm, target 3 at (150, 0, 125) mm (the first tool of the robot" in assumed
@@ -163,14 +165,23 @@ def test_what_is_asked_of_a_program_is_taken(planned: Plan) -> None:
     assert named.program is not None
     assert "WaitDI diReady,1" in named.program.files["MEASURE.mod"]
     assert "then for input diReady up to 300 s" in "\n".join(named.lines())
-    assert [notice.code for notice in named.program.warnings] == ["joint-speed-assumed"]
+    assert not named.program.warnings
 
 
 def test_a_speed_below_the_lowest_share_of_a_language_is_told(planned: Plan) -> None:
-    for program, codes in (("krl", ["faster-than-asked", "joint-speed-assumed"]), ("val3", ["joint-speed-assumed"])):
-        slow = with_program(planned, wanted(program=program, speed=(0.01,)), planned.made.robot, weighed=True).program
+    known = planned.made.robot
+    unknown = replace(known, joints=tuple(replace(joint, max_speed=None) for joint in known.joints))
+    for program, robot, codes in (
+        ("krl", unknown, ["faster-than-asked", "joint-speed-assumed"]),
+        ("krl", known, ["faster-than-asked"]),
+        ("val3", unknown, ["joint-speed-assumed"]),
+    ):
+        made = replace(planned, made=replace(planned.made, robot=robot))
+        slow = with_program(made, wanted(program=program, speed=(0.01,)), robot, weighed=True).program
         assert slow is not None
         assert [notice.code for notice in slow.warnings] == codes
+        assert bool(slow.speeds) == (robot is known)
+        assert ("as fast as any" in slow.warnings[0].message) == (program == "krl" and robot is unknown)
         assert (slow.fastest > 0.011) == (program == "krl")
         assert slow.summary()["speed_mm_s"] == 1e3 * slow.fastest
     assert "KRL says no share below 1 %" not in "\n".join(planned.lines())

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
-from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program, shown_speed
+from truearm.compensation.joint_speeds import joint_rates, known_speeds, speed_notices, speed_words, stated_speeds
+from truearm.compensation.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
 from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.compensation.programs.program import Language
 from truearm.compensation.programs.urscript.measuring import FASTEST
@@ -194,17 +195,29 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed:
     assert language.motion is not None
     assert program.carried is not None
     notices = _notices(language, robot, given, weighed=weighed)
+    speeds = known_speeds(robot)
     if fastest > _CLOSE * wanted.driving.speed:
         notices.insert(
             0,
             Notice(
                 "faster-than-asked",
-                f"{language.name} says no share below 1 %: where joints are as fast as any, a target goes at up to "
-                f"{shown_speed(fastest)} mm/s. Set the override of the controller lower, or state a higher `speed`.",
+                f"{language.name} says no share below 1 %: {'' if speeds else 'where joints are as fast as any, '}"
+                f"a target goes at up to {shown_speed(fastest)} mm/s. Set the override of the controller lower, or "
+                "state a higher `speed`.",
             ),
         )
     texts = dict(language.motion(program))
-    written = PlanProgram(language.name, texts, tour, wanted.driving, program.carried, fastest, mark, tuple(notices))
+    written = PlanProgram(
+        language.name,
+        texts,
+        tour,
+        wanted.driving,
+        program.carried,
+        fastest,
+        mark,
+        tuple(notices),
+        speed_words(speeds, robot) if speeds else "",
+    )
     return replace(planned, program=written)
 
 
@@ -353,19 +366,23 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
                 f"assumed, {_taken(robot, given, weighed=weighed)}. {' '.join(cures)}",
             )
         )
+    return [*found, *speed_notices(robot, "" if known_speeds(robot) else _assumed(language, robot))]
+
+
+def _assumed(language: Language, robot: Robot) -> str:
+    """Say what was taken for the joints' speed where it is not known."""
     slow, fast = joint_rates(robot)
-    highest = " and ".join(dict.fromkeys(f"{math.degrees(rate):.0f}" for rate in (fast[0], fast[-1])))
-    words = f"shares are so low that the tip keeps to its speed with joints of up to {highest} deg/s"
+    unknown = [speed is None for speed in stated_speeds(robot)]
     if language.name == "URScript":
         words = f"100 % is taken for {math.degrees(FASTEST):.0f} deg/s"
     elif language.name == "RAPID":
-        words = f"moves take so long that joints of {math.degrees(slow.min()):.0f} deg/s and more keep to the share"
-    found.append(
-        Notice(
-            "joint-speed-assumed",
-            f"How fast the joints of {robot.name} are at 100 % is not known: {words}. It may go more slowly than it "
-            "could; `speed` makes it faster.",
-            "note",
-        )
+        slowest = math.degrees(slow[unknown].min())
+        words = f"moves take so long that joints of {slowest:.0f} deg/s and more keep to the share"
+    else:
+        rates = [fast[unknown][0], fast[unknown][-1]]
+        highest = " and ".join(dict.fromkeys(f"{math.degrees(rate):.0f}" for rate in rates))
+        words = f"shares are so low that the tip keeps to its speed with joints of up to {highest} deg/s"
+    return (
+        f"{words}. It may go more slowly than it could; `speed` makes it faster, and so may max_speed of each joint in "
+        "the robot file"
     )
-    return found

@@ -48,9 +48,7 @@ def plan(
     ] = None,
     clearance: Annotated[
         float | None,
-        typer.Option(
-            metavar="MM", help="Room that ways keep to floor, boxes, links.", show_default="not kept, or 50"
-        ),
+        typer.Option(metavar="MM", help="Room that ways keep to floor, boxes, links.", show_default="not kept, or 50"),
     ] = None,
     program: Annotated[
         str | None,

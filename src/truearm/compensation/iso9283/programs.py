@@ -127,7 +127,7 @@ def driven_ways(plan: PerformancePlan) -> Mapping[str, Array]:
     """
     # A second cycle begins where the first has ended; the others go the same ways.
     twice = replace(plan, tests=tuple(replace(test, cycles=min(2, test.cycles)) for test in plan.tests))
-    made = _Programs(twice, 0.0, "", 1.0)
+    made = _Programs(twice, 0.0, "", 1.0, "")
     for test in twice.tests:
         _Steps(made, test, 1.0).run()
     return {**made.moves, **made.routes.driven}

@@ -22,7 +22,6 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.results.plan import Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.units import as_number
@@ -189,7 +188,7 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed:
     program, fastest = plan_program(tour, robot, language.name, wanted.driving, mark)
     assert language.motion is not None
     assert program.carried is not None
-    notices = _notices(language, robot, given, weighed=weighed)
+    notices = [*_notices(language, robot, given, weighed=weighed), *tour.notices]
     if fastest > _CLOSE * wanted.driving.speed:
         notices.insert(
             0,
@@ -323,7 +322,7 @@ def _taken(robot: Robot) -> str:
 
 
 def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -> list[Notice]:
-    found = [*_overload(robot), *counts_notices(robot), *beside_notices(robot)]
+    found = [*_overload(robot), *counts_notices(robot)]
     unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
     if unsaid:
         cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []

@@ -18,10 +18,9 @@ from truearm.modeling.controller import JointsOf
 from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.inclinometer import TiltingPlan
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
-from truearm.results.record import Record, joints_lines, notice_lines
+from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
 from truearm.results.tour_files import tour_summary, ways_beside
 from truearm.shown import counted, listed
 from truearm.units import SHOWN_AS, from_si
@@ -93,6 +92,7 @@ class InclinometerPlan(Record):
                 for name, unit, deviation, prior in self._expected()
             ],
             "unseen": list(self.unseen),
+            "warnings": notice_summaries(self.tour.notices),
         }
 
     def lines(self) -> list[str]:
@@ -108,7 +108,7 @@ class InclinometerPlan(Record):
         for name, unit, deviation, prior in self._expected():
             known = "stays unknown" if name in self.unseen else f"known to {deviation:.2g} {unit}"
             text.append(f"  {name:<14} {known} (before: {prior:.2g} {unit})")
-        return [*text, *joints_lines(self.joints_are), *notice_lines(beside_notices(self.robot))]
+        return [*text, *joints_lines(self.joints_are), *notice_lines(self.tour.notices)]
 
     def csv_text(self) -> str:
         """Return the plan as CSV: one row a configuration, in the order of measurement, and what is read there."""

@@ -13,7 +13,6 @@ from truearm.notices import Notice
 from truearm.planning.choosing.measurement_plan import ERROR, MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.choosing.prediction import There
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
@@ -91,7 +90,7 @@ class Plan(Record):
         """What to know of the ways that were checked, and of the program."""
         if self.program is not None:
             return self.program.warnings
-        return () if self.tour is None else tuple(beside_notices(self.made.robot))
+        return () if self.tour is None else self.tour.notices
 
     @property
     def _there(self) -> tuple[str, ...]:

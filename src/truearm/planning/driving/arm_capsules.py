@@ -180,7 +180,7 @@ class ArmCapsules:
         return next((row.joint for row in self._rows if 0 <= point - row.first < len(row.places)), point)
 
     def parallel_at(self, point: int) -> int:
-        """Return the first of the joints, from 1, whose parallel axes a point lies beside; 0 for points of the model."""
+        """Return the first of the joints, from 1, along whose parallel axes a point lies; 0 for points of the model."""
         rows = (row for row in self._rows if 0 <= point - row.first < len(row.places))
         return next((row.group.joints[0] for row in rows), 0)
 

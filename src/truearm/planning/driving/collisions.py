@@ -23,6 +23,8 @@ from truearm.planning.driving.cell import FLOOR, Cell
 from truearm.planning.driving.rooms import Measure, Piece, Room
 
 LINKS: Final = "links"
+#: Before the name of a box.
+KEPT_OUT: Final = "keep_out "
 #: What is kept on top of the clearance, so that it holds between the postures that are looked at, too [m].
 MARGIN: Final = 2e-3
 #: A joint that changes a height by less than this for each rad does not count: its axis is upright [m].
@@ -30,6 +32,7 @@ _UPRIGHT: Final = 5e-4
 #: Two places on the arm are kept apart if the way between them along the arm is so many times what they keep.
 APART: Final = 3.0
 _AT_ONCE: Final = 20_000
+_NEAR: Final = " come near each other"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +69,19 @@ class CollisionCheck:
     """
 
     def __init__(self, robot: Robot, cell: Cell) -> None:
-        self.cell, self.arm = cell, ArmCapsules(robot)
+        self.robot, self.cell, self.arm = robot, cell, ArmCapsules(robot)
         self.need = cell.clearance + MARGIN
         self._refuse_held()
+        self._stubs: dict[str, None] = {}
         rooms = [*self._to_the_floor(), *self._to_the_boxes()]
         between = self._between_links()
-        ever = (Measure(between, cell)(self.arm.sampled) >= self.need).any(axis=1)
-        self._rooms = [*rooms, *(room for room, kept in zip(between, ever, strict=True) if kept)]
+        ever = set(np.flatnonzero((Measure(between, cell)(self.arm.sampled) >= self.need).any(axis=1)).tolist())
+        self._rooms = [*rooms, *(room for k, room in enumerate(between) if k in ever)]
         #: What no posture keeps apart, in words.
-        self.left_out = tuple(room.words for room, kept in zip(between, ever, strict=True) if not kept)
+        self.left_out = (
+            *self._stubs,
+            *(room.words.removesuffix(_NEAR) for k, room in enumerate(between) if k not in ever),
+        )
         self._measures: dict[str, Measure] = {}
 
     # -- at postures ---------------------------------------------------------------------------------------
@@ -136,7 +143,7 @@ class CollisionCheck:
         way = np.arange(count)
         while len(way):
             # Ways that have failed are given up, and stretches that their ends answer for are done.
-            spread = self._speeds @ np.abs(ends - starts).T
+            spread = self.spread(starts, ends)
             sure = ((at_start + at_end - spread) / 2.0 >= self.cell.clearance) | (spread <= 2.0 * MARGIN)
             left = np.flatnonzero(~sure.all(axis=0) & (least[way] >= self.need))
             way, starts, ends = way[left], starts[left], ends[left]
@@ -153,6 +160,15 @@ class CollisionCheck:
             starts, ends = np.concatenate([starts, middle]), np.concatenate([middle, ends])
             way = np.concatenate([way, way])
         return Checked(least >= self.need, least, worst)
+
+    def spread(self, starts: Array, ends: Array) -> Array:
+        """Return how much each room changes at most on ways, each end ``(n, joints)`` [m], ``(rooms, n)``."""
+        return np.asarray(self._speeds @ np.abs(ends - starts).T)
+
+    @property
+    def whats(self) -> tuple[str, ...]:
+        """What each room is kept to: the floor, a box or the links."""
+        return tuple(room.what for room in self._rooms)
 
     @cached_property
     def _speeds(self) -> Array:
@@ -222,7 +238,7 @@ class CollisionCheck:
         for number, box in enumerate(self.cell.boxes):
             for capsule in self._moving():
                 words = f"{self._name(capsule)} comes near the box '{box.name}'"
-                rooms.append(Room(f"keep_out {box.name}", words, self._beyond_fixed(capsule, number), box=number))
+                rooms.append(Room(f"{KEPT_OUT}{box.name}", words, self._beyond_fixed(capsule, number), box=number))
         return rooms
 
     def _beyond_fixed(self, capsule: Capsule, box: int) -> Piece:
@@ -241,6 +257,8 @@ class CollisionCheck:
             stub = Capsule(starts[k], starts[k], capsule.radius)
             if (Measure([Room("", "", Piece(stub), box=box)], self.cell)(self.arm.sampled) < self.need).all():
                 out.remove(k)
+                name = self.cell.boxes[box].name
+                self._stubs[f"{self._name(capsule)}, next to its start, and the box '{name}'"] = None
         return Piece(capsule, first, whole=frozenset(out))
 
     def _between_links(self) -> list[Room]:
@@ -251,7 +269,7 @@ class CollisionCheck:
                 surplus = APART * (one.radius + other.radius + self.need) - float(between)
                 pieces = self._without_connection(one, other, max(surplus, 0.0))
                 if pieces is not None:
-                    words = f"{self._name(one)} and {self._name(other)} come near each other"
+                    words = f"{self._name(one)} and {self._name(other)}{_NEAR}"
                     rooms.append(Room(LINKS, words, *pieces))
         return rooms
 

@@ -110,13 +110,14 @@ def beside_notices(robot: Robot) -> list[Notice]:
     notices = []
     for group in links_beside(robot):
         numbers = f"{', '.join(str(j) for j in group.joints[:-1])} and {group.joints[-1]}"
-        low, high = (round(1e3 * at) + 0 for at in (group.low, group.high))
+        low, high = sorted(round(1e3 * group.side * at) for at in (group.low, group.high))
         notices.append(
             Notice(
                 "links-beside",
-                f"The axes of joints {numbers} are parallel, and no model says where along them the links are. The "
-                f"arm keeps clear wherever these lie from {low} to {high} mm beside where joint {group.joints[0]} is in "
-                f"the model. If a drawing of the arm has a link farther out, state a `clearance` larger by that.",
+                f"The axes of joints {numbers} are parallel, and no model says where along them the links are. The arm "
+                f"keeps clear wherever they lie from {low} to {high} mm along the axis of joint {group.joints[0]}, from "
+                "where the model has that joint. If a drawing has a link farther out, state a `clearance` larger by "
+                "that.",
                 "note",
             )
         )

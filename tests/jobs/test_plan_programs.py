@@ -17,6 +17,7 @@ from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, wi
 from truearm.manifest import MANIFEST, hash_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.planning.choosing.measurement_plan import device_candidates
 from truearm.results.plan import Plan
 from truearm.simulation.devices import named_device
@@ -193,6 +194,7 @@ def test_an_arm_of_seven_joints_is_refused_whoever_made_it() -> None:
 
 def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> None:
     robot, tour = a_tour(replace(truearm.load_robot("puma560"), maker=""))
+    tour = replace(tour, notices=(Notice("left-out", "What the ways say is said of the program, too.", "note"),))
     made = replace(
         planned.made,
         robot=robot,
@@ -211,7 +213,7 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         driven = with_program(replace(planned, made=made, tour=tour, program=None), asked, robot, weighed=False).program
         assert driven is not None
         codes = [notice.code for notice in driven.warnings]
-        assert codes == ["controller-counts-assumed", "links-beside", "tool-assumed", "joint-speed-assumed"]
+        assert codes == ["controller-counts-assumed", "tool-assumed", "joint-speed-assumed", "left-out"]
         assert [notice.level for notice in driven.warnings] == ["warning", "warning", "warning", "note"]
         assert any("compare joints with the pendant" in text for text in driven.files.values())
         assert "Nobody said the load of the flange" in driven.warnings[2].message

@@ -258,7 +258,7 @@ class CollisionCheck:
             if (Measure([Room("", "", Piece(stub), box=box)], self.cell)(self.arm.sampled) < self.need).all():
                 out.remove(k)
                 name = self.cell.boxes[box].name
-                self._stubs[f"{self._name(capsule)}, next to its start, and the box '{name}'"] = None
+                self._stubs[f"{self._name(capsule)}, next to {self._point(capsule.start)}, and the box '{name}'"] = None
         return Piece(capsule, first, whole=frozenset(out))
 
     def _between_links(self) -> list[Room]:

@@ -115,8 +115,8 @@ def beside_notices(robot: Robot) -> list[Notice]:
             Notice(
                 "links-beside",
                 f"The axes of joints {numbers} are parallel, and no model says where along them the links are. The arm "
-                f"keeps clear wherever they lie from {low} to {high} mm along the axis of joint {group.joints[0]}, seen "
-                "from where the model has that joint. If a drawing has a link farther out, state a `clearance` larger "
+                f"keeps clear wherever they lie from {low} to {high} mm along the axis of joint {group.joints[0]} "
+                "from where the model has it. If a drawing has a link farther out, state a `clearance` larger "
                 "by that.",
                 "note",
             )

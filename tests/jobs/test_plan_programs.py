@@ -194,7 +194,7 @@ def test_an_arm_of_seven_joints_is_refused_whoever_made_it() -> None:
 
 def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> None:
     robot, tour = a_tour(replace(truearm.load_robot("puma560"), maker=""))
-    tour = replace(tour, notices=(Notice("left-out", "What the ways say is said of the program, too.", "note"),))
+    tour = replace(tour, notices=(Notice("never-apart", "What the ways say is said of the program, too.", "note"),))
     made = replace(
         planned.made,
         robot=robot,
@@ -213,7 +213,7 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         driven = with_program(replace(planned, made=made, tour=tour, program=None), asked, robot, weighed=False).program
         assert driven is not None
         codes = [notice.code for notice in driven.warnings]
-        assert codes == ["controller-counts-assumed", "tool-assumed", "joint-speed-assumed", "left-out"]
+        assert codes == ["controller-counts-assumed", "tool-assumed", "joint-speed-assumed", "never-apart"]
         assert [notice.level for notice in driven.warnings] == ["warning", "warning", "note", "note"]
         assert any("compare joints with the pendant" in text for text in driven.files.values())
         assert "Nobody said the load of the flange" in driven.warnings[1].message

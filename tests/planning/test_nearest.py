@@ -84,7 +84,7 @@ def test_what_no_posture_keeps_apart_is_named() -> None:
     joints = tuple(replace(joint, limits=limits) for joint, limits in zip(robot.joints, folded, strict=True))
     arm_ = replace(robot, joints=joints).with_frames(robot.base, {"tip": (0.0, 0.0, 0.25)})
     (notice,) = cell_notices(CollisionCheck(arm_, Cell()))
-    assert (notice.code, notice.level) == ("left-out", "note")
+    assert (notice.code, notice.level) == ("never-apart", "note")
     assert "the link from joint 1 to joint 2 and what holds target 'tip'" in notice.message
     check = CollisionCheck(arm("ur10"), Cell(boxes=(BENCH,)))
     *_, notice = cell_notices(check)

@@ -20,7 +20,7 @@ def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
     if check.left_out:
         notices.append(
             Notice(
-                "left-out",
+                "never-apart",
                 "Nearer to each other than the clearance whatever the joints do, and so not kept apart: "
                 f"{'; '.join(check.left_out)}.",
                 "note",

@@ -31,7 +31,8 @@ MARGIN: Final = 2e-3
 _UPRIGHT: Final = 5e-4
 #: Two places on the arm are kept apart if the way between them along the arm is so many times what they keep.
 APART: Final = 3.0
-_AT_ONCE: Final = 20_000
+#: So few postures at once that what is computed of them stays in the cache of a processor.
+_AT_ONCE: Final = 1_000
 _NEAR: Final = " come near each other"
 
 

@@ -63,6 +63,14 @@ class CollisionCheck:
     as much of them that the way along the arm between the rest is :data:`APART` times what they keep, their radii and
     the clearance. What no posture keeps apart is left out.
 
+    Links between parallel axes are plates, wide enough to hold the link wherever along the axes it may lie: rooms to
+    them are never more than those to the link.
+
+    Attributes
+    ----------
+    left_out
+        What no posture keeps apart, in words.
+
     Raises
     ------
     InputError
@@ -78,7 +86,6 @@ class CollisionCheck:
         between = self._between_links()
         ever = set(np.flatnonzero((Measure(between, cell)(self.arm.sampled) >= self.need).any(axis=1)).tolist())
         self._rooms = [*rooms, *(room for k, room in enumerate(between) if k in ever)]
-        #: What no posture keeps apart, in words.
         self.left_out = (
             *self._stubs,
             *(room.words.removesuffix(_NEAR) for k, room in enumerate(between) if k not in ever),

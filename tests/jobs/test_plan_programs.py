@@ -17,6 +17,7 @@ from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, wi
 from truearm.manifest import MANIFEST, hash_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.planning.choosing.measurement_plan import device_candidates
 from truearm.results.plan import Plan
 from truearm.simulation.devices import named_device
@@ -211,6 +212,7 @@ def test_an_arm_of_seven_joints_is_refused_whoever_made_it() -> None:
 
 def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> None:
     robot, tour = a_tour(replace(truearm.load_robot("puma560"), maker=""))
+    tour = replace(tour, notices=(Notice("never-apart", "What the ways say is said of the program, too.", "note"),))
     made = replace(
         planned.made,
         robot=robot,
@@ -229,11 +231,11 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         driven = with_program(replace(planned, made=made, tour=tour, program=None), asked, robot, weighed=False).program
         assert driven is not None
         codes = [notice.code for notice in driven.warnings]
-        assert codes == ["controller-counts-assumed", "links-beside", "tool-assumed", "joint-speed-assumed"]
-        assert [notice.level for notice in driven.warnings] == ["warning", "warning", "warning", "note"]
+        assert codes == ["controller-counts-assumed", "tool-assumed", "joint-speed-assumed", "never-apart"]
+        assert [notice.level for notice in driven.warnings] == ["warning", "warning", "note", "note"]
         assert any("compare joints with the pendant" in text for text in driven.files.values())
-        assert "Nobody said the load of the flange" in driven.warnings[2].message
-        assert "what is assumed, 0 kg at (0, 0, 0) mm. A wrong load" in driven.warnings[2].message
+        assert "Nobody said the load of the flange" in driven.warnings[1].message
+        assert "what is assumed, 0 kg at (0, 0, 0) mm. A wrong load" in driven.warnings[1].message
         by_hand = {"fanuc": "Payload schedule 1 on", "inform": "Tool file 0 on", "val3": "The tool flange on"}
         assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.lines())
 

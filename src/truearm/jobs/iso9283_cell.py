@@ -18,7 +18,8 @@ from truearm.planning.constraints.constraints import Constraints, allowed, limit
 from truearm.planning.driving.cell import Cell
 from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.driving.joint_window import joint_window
-from truearm.planning.driving.links_beside import links_beside
+from truearm.planning.driving.nearest import nearest_on
+from truearm.planning.driving.tour_table import distance_words
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.shown import counted
 
@@ -81,13 +82,14 @@ class StatedCell:
 
     def words(self, plan: PerformancePlan) -> str:
         """Say what all ways of a plan keep, that is suited."""
-        rooms = [self.check.ways(joints[:-1], joints[1:]).room for joints in driven_ways(plan).values()]
-        room = min((float(one.min()) for one in rooms if len(one)), default=math.inf)
-        floor = "" if self.cell.floor is None else f"the {self.cell.surface} at {self.cell.floor * 1e3:g} mm, "
-        arm = "the lines of the model with their thickness" if links_beside(self.robot) else "the arm"
-        arm = f"{arm} {'stays' if arm == 'the arm' else 'stay'}"
-        far = "clear of" if math.isinf(room) else f"{math.floor(room * 1e4) / 10:g} mm or more from"
-        return f"On all {counted(len(rooms), 'way')} {arm} {far} {floor}boxes and links."
+        distances: dict[str, float] = {}
+        ways = driven_ways(plan).values()
+        for joints in ways:
+            for what, room in nearest_on(self.check, joints).items():
+                distances[what] = min(room, distances.get(what, math.inf))
+        nearest_first = dict(sorted(distances.items(), key=lambda item: item[1]))
+        near = distance_words(nearest_first, self.cell.floor, self.cell.surface)
+        return f"On all {counted(len(ways), 'way')} the arm stays {near}." if near else ""
 
     def _near(self, number: int, room: float) -> str:
         return f"{self.check.words(number)}, {max(room, 0.0) * 1e3:.0f} mm"

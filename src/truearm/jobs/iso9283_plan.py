@@ -31,7 +31,7 @@ from truearm.library.wider_limits import wider_limits_notices
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.constraints.constraints import Constraints
-from truearm.planning.driving.links_beside import beside_notices
+from truearm.planning.driving.said_of_cells import cell_notices
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
 from truearm.planning.iso9283.plan import performance_plan
 from truearm.planning.iso9283.plan_file import PLAN, read_cube
@@ -214,7 +214,7 @@ def iso9283_plan(
         )
     kept = "" if cell is None else cell.words(plan)
     if cell is not None:
-        warnings += beside_notices(arm)
+        warnings += cell_notices(cell.check)
     plan = replace(plan, robot=arm)
     programs = None
     if language is not None:

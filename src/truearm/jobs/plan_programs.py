@@ -24,7 +24,6 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.results.plan import Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.simulation.truths import DEFAULT_TOOL
@@ -194,7 +193,7 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed:
     program, fastest = plan_program(tour, robot, language.name, wanted.driving, mark)
     assert language.motion is not None
     assert program.carried is not None
-    notices = _notices(language, robot, given, weighed=weighed)
+    notices = [*_notices(language, robot, given, weighed=weighed), *tour.notices]
     speeds = known_speeds(robot)
     if fastest > _CLOSE * wanted.driving.speed:
         notices.insert(
@@ -353,7 +352,7 @@ def _at(point: tuple[float, float, float]) -> str:
 
 
 def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -> list[Notice]:
-    found = [*_overload(robot), *counts_notices(robot), *beside_notices(robot)]
+    found = [*_overload(robot), *counts_notices(robot)]
     found += wider_limits_notices(robot)
     unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
     if unsaid:

@@ -20,7 +20,6 @@ from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.inclinometer import TiltingPlan
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
 from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
@@ -74,7 +73,7 @@ class InclinometerPlan(Record):
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """What to know of its ways, and of the files."""
-        return (*beside_notices(self.robot), *wider_limits_notices(self.robot), *self.replaced)
+        return (*self.tour.notices, *wider_limits_notices(self.robot), *self.replaced)
 
     def _expected(self) -> list[tuple[str, str, float, float]]:
         """Return name, unit, deviation to expect and prior of each constant, as they are shown."""

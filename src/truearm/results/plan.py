@@ -14,7 +14,6 @@ from truearm.notices import Notice
 from truearm.planning.choosing.measurement_plan import ERROR, MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.choosing.prediction import There
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
@@ -96,7 +95,7 @@ class Plan(Record):
         if self.program is not None:
             return self.program.warnings
         robot = self.made.robot
-        return (*(() if self.tour is None else beside_notices(robot)), *wider_limits_notices(robot))
+        return (*(() if self.tour is None else self.tour.notices), *wider_limits_notices(robot))
 
     @property
     def _there(self) -> tuple[str, ...]:

@@ -182,11 +182,17 @@ def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyP
     person.turn_to("Programs")
     person.press("Correct the program")
     person.wait_for("Written to result/corrected: ")
+    person.wait_for("Where the calibrated robot goes with the original and with the corrected program: ")
     person.picture("programs")
     assert (folder / "result/corrected/plate.mod").read_bytes() == (folder / "corrected/plate.mod").read_bytes()
 
+    person.turn_to("Performance")
+    person.press("Evaluate the tests")
+    person.wait_for("no plan is chosen")
+    person.picture("performance", _SIZES)
+
     person.press("light / dark")
-    for name in ("Proof", "Programs"):
+    for name in ("Proof", "Programs", "Performance", "Check", "Calibrate"):
         person.turn_to(name)
         person.picture(f"{name.lower()}-dark")
     assert person.faults == []

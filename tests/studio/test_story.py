@@ -141,7 +141,7 @@ def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyP
         assert (folder / "result" / name).read_bytes() == (tmp_path / "by-command" / name).read_bytes(), name
 
     person.turn_to("Proof")
-    person.page.locator(".js-plotly-plot").first.wait_for()
+    person.page.locator(".js-plotly-plot").locator("visible=true").first.wait_for()
     result = json.loads((folder / "result" / "result.json").read_text())
     said = person.shown()
     for part in ("nominal", "validation", "train"):

@@ -57,7 +57,7 @@ def measuring_order(
         return _by_labels(cells, labels, of_row, where)
     if entry.by == "rows" or place is None:
         return np.arange(1, len(labels) + 1)
-    values = cells.values(place) if entry.time is None else _times(cells, place, entry)
+    values = cells.values(place) if entry.time is None else moments(cells, place, entry)
     first, last, row = _spans(values, of_row, len(labels))
     measured = np.flatnonzero(np.isfinite(first))
     if not len(measured):
@@ -132,7 +132,7 @@ def _by_labels(cells: Cells, labels: Sequence[str], of_row: IntArray, where: str
     return np.array(list(numbers), dtype=np.intp)
 
 
-def _times(cells: Cells, place: int, entry: OrderEntry) -> Array:
+def moments(cells: Cells, place: int, entry: OrderEntry) -> Array:
     """Return moments in seconds since some moment, ``(rows,)``, NaN where there is none."""
     absent = {"", *(cells.absent or ())}
     texts = cells.columns[place]

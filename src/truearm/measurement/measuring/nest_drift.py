@@ -57,6 +57,26 @@ class NestDrift:
         """Mean over the nests of how they moved in each round [m], ``(r, 3)``: what all of them share."""
         return np.asarray(np.nanmean(self.moved, axis=0))
 
+    def noise(self, stated: float | None = None) -> float | None:
+        """Return the standard deviation of a coordinate of a reading without what all nests share [m].
+
+        Parameters
+        ----------
+        stated
+            What the instrument says of itself [m]; else it is found from the nests, if enough of them were read.
+        """
+        if stated is not None:
+            return stated
+        read = np.isfinite(self.moved[:, :, 0])
+        freedoms = 3 * int(read.sum() - read.any(axis=1).sum() - read.any(axis=0).sum() + 1)
+        if freedoms < _LEAST_FREEDOMS:
+            return None
+        # Nests that were read in every round: what is left of each round and each nest is scatter alone.
+        left = self.moved - np.nanmean(self.moved, axis=0, keepdims=True)
+        left = left - np.nanmean(left, axis=1, keepdims=True)
+        spread = float(np.sqrt(np.nansum(left**2) / freedoms))
+        return spread if spread > 0.0 else None
+
 
 def nest_drift(session: Session) -> NestDrift | None:
     """Return how the nests moved, by the readings that are kept; None before one was read."""

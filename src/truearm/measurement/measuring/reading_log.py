@@ -55,6 +55,7 @@ _COLUMNS: Final = (
     "mark",
     "check",
 )
+_HEADER: Final = ",".join(_COLUMNS)
 _ROLES: Final = ("target", "nest")
 _EVENTS: Final = ("reading", "aside", "left")
 
@@ -89,7 +90,7 @@ class ReadingLog:
                 self._stream.truncate(len(content) - self.torn)
                 os.fsync(self._stream.fileno())
             if len(content) == self.torn:
-                self._write(",".join(_COLUMNS[:-1]))
+                self._put(_HEADER)
                 _synchronise(folder)
         except BaseException:
             self._stream.close()
@@ -103,7 +104,8 @@ class ReadingLog:
         InputError
             If it cannot be written.
         """
-        self._write(_line(entry))
+        line = _line(entry)
+        self._put(f"{line},{_check(line)}")
 
     def close(self) -> None:
         """Let another process have it."""
@@ -125,8 +127,8 @@ class ReadingLog:
         except OSError:  # a file system without locks
             pass
 
-    def _write(self, line: str) -> None:
-        whole = f"{line},{_check(line)}\n".encode()
+    def _put(self, line: str) -> None:
+        whole = f"{line}\n".encode()
         try:
             written_bytes = self._stream.write(whole)
             if written_bytes != len(whole):
@@ -138,18 +140,18 @@ class ReadingLog:
     def _read(self, content: bytes) -> tuple[int, tuple[Entry, ...]]:
         """Return how many bytes at the end are a part of a line, and the entries of the lines before."""
         whole, _, rest = content.rpartition(b"\n")
-        lines = whole.split(b"\n") if whole else []
+        header, *lines = whole.split(b"\n") if whole else [_HEADER.encode()]
+        if header != _HEADER.encode():
+            raise InputError("this is no log of readings", where=f"{self.path}, line 1", cure="Choose another `out`.")
         texts = [_unsealed(line) for line in lines]
-        bad = next((number for number, text in enumerate(texts, 1) if text is None), None)
+        bad = next((number for number, text in enumerate(texts, 2) if text is None), None)
         if bad is not None:
             raise InputError(
                 "this line is not as it was written",
                 where=f"{self.path}, line {bad}",
                 cure="A log is not edited: put back the file as it was, or begin in another folder.",
             )
-        if texts and texts[0] != ",".join(_COLUMNS[:-1]):
-            raise InputError("this is no log of readings", where=f"{self.path}, line 1", cure="Choose another `out`.")
-        entries = tuple(self._entry(str(text), number) for number, text in enumerate(texts[1:], 2))
+        entries = tuple(self._entry(str(text), number) for number, text in enumerate(texts, 2))
         return len(rest), entries
 
     def _entry(self, text: str, number: int) -> Entry:

@@ -117,6 +117,7 @@ __all__ = [
     "lines",
     "load_data",
     "load_robot",
+    "measure",
     "new_robot",
     "path",
     "plan",

@@ -58,9 +58,7 @@ def measure(
     payload: PayloadText = None,
     watch: Annotated[
         str | None,
-        typer.Option(
-            metavar="DIR", help="Readings from a folder into which software writes.", rich_help_panel=_REAL
-        ),
+        typer.Option(metavar="DIR", help="Readings from a folder into which software writes.", rich_help_panel=_REAL),
     ] = None,
     mapping: Annotated[
         str | None,

@@ -12,6 +12,7 @@ from types import FrameType
 from typing import Any, Final
 
 from truearm.arrays import finite_number
+from truearm.errors import wrong_kind
 from truearm.jobs.arguments import progress_argument
 from truearm.jobs.open_campaign import OpenCampaign, Sight, open_campaign, sight
 from truearm.modeling.parts import Payload
@@ -116,6 +117,8 @@ def measure(
         If anything cannot be used, the folder holds the measuring of another plan, or the log cannot be written.
     """
     progress_argument(progress)
+    if not callable(tell):
+        raise wrong_kind("a function belongs here", tell, "tell", "a function that takes a text")
     patience = None if wait is None else finite_number(wait, "wait", lowest=0.0, allowed="seconds, 0 or more")
     given: dict[str, Any] = {
         "device": device,
@@ -164,7 +167,7 @@ def _begun(campaign: OpenCampaign, tell: Callable[[str], None], *, told_token: b
 
     session = campaign.session
     if campaign.before:
-        tell(f"Going on after {campaign.before} entries of the log: {session.outstanding} readings are still to be taken.")
+        tell(f"Going on after {campaign.before} entries of the log: {session.outstanding} readings are still to come.")
     if isinstance(campaign.source, Listener):
         said = f", token {campaign.source.token}" if told_token else ""
         tell(f"Listening on {HOST} port {campaign.source.port}{said}")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.arrays import finite_number
-from truearm.errors import InputError, refusals_of
-from truearm.files import path_argument, read_text
+from truearm.errors import InputError, did_you_mean, refusals_of
+from truearm.files import path_argument
 from truearm.jobs.arguments import (
     command_argument,
     deviation_argument,
@@ -26,6 +24,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.jobs.measuring_begun import BEGUN, begin
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.measuring.about import About, read_about
@@ -41,17 +40,14 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.printable import is_one_line
 from truearm.results.measured import DATA, PAGE, Measured
-from truearm.writing import write_text
 
 if TYPE_CHECKING:
     from truearm.measurement.measuring.watched_folder import WatchedFolder
 
-#: What was fixed when the measuring began.
-BEGUN: Final = "measuring.json"
-_SCHEMA: Final = "truearm-measuring/1"
 _LONGEST_NAME: Final = 100
 _MOST_DISTURBED: Final = 0.9
 _LONGEST_ROUND: Final = 10_000
+_MOST_SAMPLES: Final = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +89,15 @@ class OpenCampaign(Campaign):
     """
 
     def __init__(
-        self, session: Session, source: Source, folder: Path, *, robot: Robot, placed: Robot | None, plan: _Plan, said: _Said
+        self,
+        session: Session,
+        source: Source,
+        folder: Path,
+        *,
+        robot: Robot,
+        placed: Robot | None,
+        plan: _Plan,
+        said: _Said,
     ) -> None:
         super().__init__(session, source, folder)
         self.robot, self.placed, self.joints = robot, placed, plan.joints
@@ -170,11 +174,19 @@ def open_campaign(
     kind = _one_source(device, watch, listen)
     _refuse_beside(
         kind,
-        device={"truth": truth, "noise": noise, "seed": seed, "disturbed": disturbed, "drift": drift, "payload": payload},
+        device={
+            "truth": truth,
+            "noise": noise,
+            "seed": seed,
+            "disturbed": disturbed,
+            "drift": drift,
+            "payload": payload,
+        },
         watch={"mapping": mapping},
         listen={"token": token},
     )
     between = whole_argument(every, "every", 1, _LONGEST_ROUND)
+    folder_for((LOG, BEGUN), out, path, robot, truth, mapping, about)
     folder = folder_for((DATA, PAGE), out, path, robot, truth, mapping, about, ours=True)
     nominal = robot_argument(robot)
     with refusals_of("plan"):
@@ -184,7 +196,7 @@ def open_campaign(
     quality = Quality(
         None if most_deviation is None else length_argument(most_deviation, "most_deviation", 0.0),
         None if most_settling is None else length_argument(most_settling, "most_settling", 0.0),
-        1 if fewest_samples is None else whole_argument(fewest_samples, "fewest_samples", 1),
+        1 if fewest_samples is None else whole_argument(fewest_samples, "fewest_samples", 1, _MOST_SAMPLES),
     )
     source: Source
     placed: Robot | None = None
@@ -203,7 +215,11 @@ def open_campaign(
         known: tuple[str, ...] | None = tuple(target.name for target in placed.targets)
         if asked["targets"] is not None and (unknown := [n for n in asked["targets"] if n not in (known or ())]):
             raise InputError(
-                "the tool has no such target", parameter="targets", came=unknown[0], allowed=", ".join(known or ())
+                "the tool has no such target",
+                parameter="targets",
+                came=unknown[0],
+                allowed=", ".join(known or ()),
+                cure=did_you_mean(unknown[0], known or ()),
             )
         quality = _of_device(quality, source, most_deviation, most_settling, fewest_samples)
         virtual, instrument = made.entries(), f"virtual {device}, a twin measured"
@@ -223,7 +239,7 @@ def open_campaign(
         names = asked["targets"] or tuple(target.name for target in nominal.targets if device is None) or known or ()
         _refuse_names(names, nests_named)
         session = Session(planned.configurations.labels, names, nests_named, between, quality)
-        _begin(folder, planned, nominal, session, virtual, said)
+        begin(folder, planned.configurations, planned.joints, nominal, session, virtual, said)
         call = command_argument(command) or f"truearm.measure({str(path)!r}, .., out={str(folder)!r})"
         return OpenCampaign(
             session,
@@ -428,73 +444,8 @@ def _watched(watch: object, mapping: object, planned: _Plan, out: Path) -> Watch
             cure="Let `truearm import guess` write one for a file of the instrument.",
         )
     if folder.exists() and out.exists() and folder.resolve() == out.resolve():
-        raise InputError("the folder that is watched is written to", parameter="out", came=str(out), cure="Choose another.")
+        raise InputError(
+            "the folder that is watched is written to", parameter="out", came=str(out), cure="Choose another."
+        )
     with refusals_of("mapping"):
         return WatchedFolder(folder, path_argument(mapping, "mapping"), planned.configurations.labels)
-
-
-# -- what was fixed at the start -------------------------------------------------------------------------------
-
-
-def _begin(
-    folder: Path, planned: _Plan, robot: Robot, session: Session, virtual: dict[str, Any] | None, about: About
-) -> None:
-    """Write down what is fixed from now on, or refuse what is not as it was when the measuring began."""
-    now: dict[str, Any] = {
-        "truearm": _SCHEMA,
-        "plan": _hash([[*planned.configurations.labels], planned.joints.tolist()]),
-        "robot": f"{robot.name} {_hash([[p.name, p.value] for p in robot.parameters.values()])}",
-        "targets": [*session.targets],
-        "nests": [*session.nests],
-        "every": session.every,
-        "quality": session.quality.__dict__,
-        "source": virtual or "instrument",
-        "about": about.fixed,
-    }
-    path = folder / BEGUN
-    if not path.exists():
-        if (folder / LOG).exists():
-            raise InputError(
-                "there are readings in this folder, and nothing says of which plan",
-                parameter="out",
-                where=str(folder / LOG),
-                cure="Choose another folder.",
-            )
-        write_text(path, json.dumps(now, indent=2) + "\n")
-        return
-    with refusals_of("out"):
-        then = _then(path)
-    for name, value in now.items():
-        was = then.get(name)
-        if name == "about":
-            changed = [k for k, v in value.items() if v is not None and was.get(k) not in (None, v)]
-            if not changed:
-                continue
-            value, was = value[changed[0]], f"{was[changed[0]]} ({changed[0]})"
-        elif was == json.loads(json.dumps(value)):
-            continue
-        raise InputError(
-            f"the measuring in this folder began with another {_CALLED.get(name, name)}",
-            parameter="out",
-            where=str(path),
-            came="another one" if name in ("plan", "robot") else json.dumps(value),
-            allowed=None if name in ("plan", "robot") else f"{was if name == 'about' else json.dumps(was)}",
-            cure="Go on as it began, or measure into another folder.",
-        )
-
-
-_CALLED: Final = {"quality": "limit of what is kept", "source": "source of readings", "about": "instrument or robot"}
-
-
-def _then(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(read_text(path))
-    except ValueError as error:
-        content = error
-    if isinstance(content, dict) and content.get("truearm") == _SCHEMA and isinstance(content.get("about"), dict):
-        return content
-    raise InputError("this does not say how a measuring began", where=str(path), cure="Choose another folder.")
-
-
-def _hash(content: object) -> str:
-    return hashlib.sha256(json.dumps(content).encode()).hexdigest()

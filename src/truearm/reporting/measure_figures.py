@@ -27,9 +27,7 @@ def drift_figure(session: Session) -> Figure | None:
         for number, (name, distance) in enumerate(zip(drift.names, drift.distance, strict=True))
     ]
     traces.append(_line("together", minutes, np.sqrt((drift.common**2).sum(axis=1)), AFTER, "solid"))
-    return figure(
-        traces, _HEIGHT, xaxis=axis("time since the nests were read first [min]"), yaxis=axis("moved [mm]")
-    )
+    return figure(traces, _HEIGHT, xaxis=axis("time since the nests were read first [min]"), yaxis=axis("moved [mm]"))
 
 
 def quality_figure(session: Session) -> Figure | None:

@@ -18,12 +18,17 @@ def measure_report(measured: Measured) -> str:
     states += [(reason, str(count), REASONS[reason]) for reason, count in counts.items()]
     asked = [
         ("deviation of a sample", "not asked" if quality.deviation is None else f"{quality.deviation * 1e3:.4f} mm"),
-        ("between the halves of a dwell", "not asked" if quality.settling is None else f"{quality.settling * 1e3:.4f} mm"),
+        (
+            "between the halves of a dwell",
+            "not asked" if quality.settling is None else f"{quality.settling * 1e3:.4f} mm",
+        ),
         ("fewest samples", str(quality.samples)),
     ]
     tables = [
         Figures("Readings", ("state", "count", "why"), tuple(states), (2,)),
-        Figures("Measured with", ("what", "value"), (("readings from", measured.instrument), *measured.about.rows()), (1,)),
+        Figures(
+            "Measured with", ("what", "value"), (("readings from", measured.instrument), *measured.about.rows()), (1,)
+        ),
         Figures("Asked of a reading", ("what", "at most"), tuple(asked), (1,)),
     ]
     if session.left_out:
@@ -35,7 +40,11 @@ def measure_report(measured: Measured) -> str:
         for entry in session.entries
         if entry.event == "reading" and session.reason_of(entry)
     ]
-    details = [Figures("Set aside, one by one", ("number", "configuration", "point", "reason", "words"), tuple(aside), (1, 2, 3, 4))]
+    details = [
+        Figures(
+            "Set aside, one by one", ("number", "configuration", "point", "reason", "words"), tuple(aside), (1, 2, 3, 4)
+        )
+    ]
     pictures = []
     if (drift := drift_figure(session)) is not None:
         words = (
@@ -44,13 +53,15 @@ def measure_report(measured: Measured) -> str:
         )
         pictures.append(Drawing("drift", "Nests", words, drift))
     if (scatter := quality_figure(session)) is not None:
-        words = "Scatter of the samples while the arm stood, reading by reading. It says nothing of how well a reading fits."
+        words = (
+            "Scatter of the samples while the arm stood, reading by reading. It does not say how well a reading fits."
+        )
         pictures.append(Drawing("dwell", "Dwells", words, scatter))
-    words = [line for line in measured.lines() if line not in notice_lines(measured.warnings)]
+    said = notice_lines(measured.warnings)
     return picture_page(
         f"Measured: {measured.title}",
         f"The plan {measured.plan}. No reading was kept or set aside for how well it fits a model.",
-        words,
+        [line for line in measured.lines() if line not in said],
         measured.command,
         pictures=pictures,
         tables=tables,

@@ -176,7 +176,7 @@ class Measured(Record):
 
     def _moved(self) -> list[Notice]:
         drift = self.drift
-        if drift is None or (noise := drift.noise(self.sigma.own and self._stated() or None)) is None:
+        if drift is None or (noise := drift.noise((self.sigma.own and self._stated()) or None)) is None:
             return []
         far = self._together(drift)
         if far <= 5.0 * noise * math.sqrt(2.0 / len(drift.names)):

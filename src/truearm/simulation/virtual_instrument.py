@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
+from truearm.errors import InputError, did_you_mean
 from truearm.measurement.measuring.readings import Reading, dwell_figures
 from truearm.measurement.measuring.session import Session
 from truearm.measurement.measuring.sources import Incoming
@@ -45,8 +45,8 @@ class VirtualInstrument:
     """A source of readings: a device, simulated, that measures a twin at the configurations of a plan.
 
     Each reading is the mean of the samples of a dwell. The device's deviation is that of the mean about the truth: a
-    sample scatters by it about the dwell's own place, so that the scatter of a dwell looks as small as the real one does
-    and says little of the whole. What it reads depends on the seed and on how many readings there are, so measuring
+    sample scatters by it about the dwell's own place, so that the mean of many samples looks better than it is, as with
+    a real instrument. What it reads depends on the seed and on how many readings there are, so measuring
     that was stopped goes on as if it had not been.
 
     Parameters
@@ -192,5 +192,5 @@ def virtual_device(name: str) -> Device:
         parameter="device",
         came=name,
         allowed=", ".join(VIRTUAL),
-        cure="Measure a twin with it by `truearm simulate`." if touches else None,
+        cure="Measure a twin with it by 'truearm simulate'." if touches else did_you_mean(name, VIRTUAL),
     )

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import Final
+from typing import Final, Self
 
 from truearm.errors import InputError
 from truearm.measurement.measuring.reading_log import ReadingLog
-from truearm.measurement.measuring.readings import Reading
 from truearm.measurement.measuring.session import Entry, Session
 from truearm.measurement.measuring.sources import Source
 from truearm.notices import Notice
@@ -51,7 +51,7 @@ class Campaign:
         #: How many entries there were when it was opened.
         self.before = len(session)
 
-    def __enter__(self) -> Campaign:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -115,7 +115,7 @@ def session_notices(session: Session) -> list[Notice]:
     """Return what to know about how a plan was measured: nothing of it asks how well a reading fits."""
     readings = [entry for entry in session.entries if entry.reading is not None]
     found = []
-    if back := _gone_back([entry.reading for entry in readings if entry.reading is not None]):
+    if back := _gone_back(readings):
         found.append(
             Notice(
                 "clock-back",
@@ -163,15 +163,16 @@ def session_notices(session: Session) -> list[Notice]:
     return found
 
 
-def _gone_back(readings: Sequence[Reading]) -> list[int]:
-    """Return the numbers of the readings, from 1, whose time is before that of the one before."""
-    return [k + 2 for k, (a, b) in enumerate(zip(readings, readings[1:], strict=False)) if b.time < a.time]
+def _gone_back(entries: Sequence[Entry]) -> list[int]:
+    """Return the numbers of the readings whose time is before that of the one before."""
+    times = [(entry.number, entry.reading.time) for entry in entries if entry.reading is not None]
+    return [number for (_, before), (number, time) in pairwise(times) if time < before]
 
 
 def _out_of_order(session: Session) -> list[str]:
     places = {label: number for number, label in enumerate(session.labels)}
     first = list(dict.fromkeys(e.label for e in session.kept if not e.is_nest))
-    return [b for a, b in zip(first, first[1:], strict=False) if places[b] < places[a]]
+    return [b for a, b in pairwise(first) if places[b] < places[a]]
 
 
 def _numbers(numbers: Sequence[int]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def kept_readings(session: Session, configurations: Configurations, source: str)
     """Return the readings that are kept, as a dataset; None if there is none of a target.
 
     Configurations come in the order in which the robot came to them. One to which it came again has visits. A target
-    that was left out at a configuration is a missing reading there. Configurations to which it never came are not there.
+    that was left out at a configuration is a missing reading there. Configurations to which it never came are left out.
     Nests are reference points, at the configuration at which they were measured.
 
     Parameters
@@ -74,7 +75,7 @@ def kept_readings(session: Session, configurations: Configurations, source: str)
     found = {(entry.label, entry.name): entry for entry in targets}
     rows = [(label, name, found.get((label, name))) for label in visits.order for name in names]
     sigma = stated_sigma(session)
-    common = {
+    common: dict[str, Any] = {
         "source": source,
         "labels": visits.order,
         "joints": configurations.joints[places],
@@ -86,10 +87,10 @@ def kept_readings(session: Session, configurations: Configurations, source: str)
     if nests:
         labels = [entry.label if entry.label in visits.order else visits.order[0] for entry in nests]
         references = Dataset(
-            **common,  # type: ignore[arg-type]
+            **common,
             **_fields([(label, entry.name, entry) for label, entry in zip(labels, nests, strict=True)], visits, sigma),
         )
-    data = Dataset(**common, **_fields(rows, visits, sigma), references=references)  # type: ignore[arg-type]
+    data = Dataset(**common, **_fields(rows, visits, sigma), references=references)
     return in_order(data, np.arange(1, len(places) + 1))
 
 
@@ -132,7 +133,7 @@ def _visits(session: Session) -> _Visits:
     return _Visits(tuple(visits), of)
 
 
-def _fields(rows: list[tuple[str, str, Entry | None]], visits: _Visits, sigma: StatedSigma) -> dict[str, object]:
+def _fields(rows: list[tuple[str, str, Entry | None]], visits: _Visits, sigma: StatedSigma) -> dict[str, Any]:
     """Return the fields of a dataset that belong to its readings."""
     names = tuple(dict.fromkeys(name for _, name, _ in rows))
     entries = [entry for _, _, entry in rows]

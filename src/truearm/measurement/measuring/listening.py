@@ -117,8 +117,8 @@ class Listener:
             found.append(
                 Notice(
                     "cut-off",
-                    f"{counted(self._cut_off, 'connection')} sent too much at once, or connected beside too many others, "
-                    "and was cut off.",
+                    f"{counted(self._cut_off, 'connection')} sent too much at once, or connected beside too many "
+                    "others, and was cut off.",
                 )
             )
         return tuple(found)
@@ -348,7 +348,10 @@ def _listening_socket(port: int) -> socket.socket:
         bound.close()
         if isinstance(error, PermissionError):
             raise InputError(
-                "this port cannot be used by everyone", parameter="listen", came=port, allowed="1024 to 65535, 0 for any"
+                "this port cannot be used by everyone",
+                parameter="listen",
+                came=port,
+                allowed="1024 to 65535, 0 for any",
             ) from error
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as other:
             other.bind((HOST, 0))

@@ -15,7 +15,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Final
 
 import numpy as np
 
@@ -79,7 +79,7 @@ class ReadingLog:
         try:
             if self.path.is_symlink() or (self.path.exists() and not self.path.is_file()):
                 raise InputError("a log of readings belongs here, and this is none", where=str(self.path))
-            self._stream: BinaryIO = self.path.open("ab", buffering=0)  # type: ignore[assignment]
+            self._stream = self.path.open("ab", buffering=0)
         except OSError as error:
             raise _unwritable(self.path, error) from error
         try:

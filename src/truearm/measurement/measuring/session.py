@@ -358,7 +358,7 @@ class Session:
             return place is not None and place not in self._held
         return True
 
-    def _refusal(self, reading: Reading, place: int | None) -> tuple[str, str]:
+    def _refusal(self, reading: Reading, place: Place | None) -> tuple[str, str]:
         """Return why a reading is set aside, with more words; nothing if it is kept."""
         if reading.name not in (*self.targets, *self.nests):
             return "unknown-name", f"allowed: {', '.join((*self.targets, *self.nests))}"

@@ -155,7 +155,9 @@ class WatchedFolder:
             words = "; ".join(f"{name}: {why}" for name, why in sorted(counts.not_read.items())[:_NAMED])
             rest = len(counts.not_read) - _NAMED
             found.append(
-                Notice("not-read", f"Not read in {self.folder}: {words}{f' and {rest} more' if rest > 0 else ''}.", "note")
+                Notice(
+                    "not-read", f"Not read in {self.folder}: {words}{f' and {rest} more' if rest > 0 else ''}.", "note"
+                )
             )
         open_ends = [name for name, file in self._files.items() if file.open_end]
         if open_ends:
@@ -202,7 +204,7 @@ class WatchedFolder:
 
     def _there(self) -> list[tuple[Path, tuple[int, int]]]:
         """Return the files that are read with their size and time, the oldest first."""
-        found = []
+        found: list[tuple[Path, tuple[int, int]]] = []
         try:
             paths = sorted(self.folder.iterdir())
         except OSError:
@@ -443,4 +445,3 @@ def _digest(lines: list[str]) -> bytes:
 
 def _mark(line: str) -> str:
     return hashlib.sha256(line.strip().encode("utf-8", "surrogatepass")).hexdigest()[:_MARK]
-

@@ -88,16 +88,16 @@ class Measured(Record):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Names of the files that are written."""
-        return (PAGE,) if self.data is None else (DATA, PAGE)
+        """Names of the files that are written: none before a reading of a target is kept."""
+        return () if self.data is None else (DATA, PAGE)
 
     def write(self) -> None:
-        """Write measurements and report into the folder."""
+        """Write measurements and report into the folder, if there are any."""
         from truearm.reporting.measure_report import measure_report
 
         data = self.data
-        files = {} if data is None else {DATA: csv_text(data)}
-        write_files(self.folder, {**files, PAGE: measure_report(self)}, self.command)
+        if data is not None:
+            write_files(self.folder, {DATA: csv_text(data), PAGE: measure_report(self)}, self.command)
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

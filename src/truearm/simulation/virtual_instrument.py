@@ -30,7 +30,7 @@ _PACE: Final = 10.0
 #: How far about the base nests stand [m].
 _NEST_CIRCLE: Final = 0.6
 #: A disturbed reading: so many deviations more scatter, or so many of unrest that dies out, or a beam that breaks.
-_UNREST: Final = 40.0
+_UNREST: Final = 15.0
 _SCATTER: Final = 8.0
 #: Readings in a row that may be disturbed; then the point is left out.
 _MOST_TRIES: Final = 20

@@ -13,8 +13,8 @@ from truearm.modeling.chain import Array
 REASONS: Final[dict[str, str]] = {
     "beam-break": "the beam was interrupted",
     "few-samples": "too few samples were taken",
-    "not-settled": "it still moved while it was measured",
     "scatter": "it scattered too much while the arm stood",
+    "not-settled": "it still moved while it was measured",
     "no-reading": "nothing was measured",
     "unknown-name": "there is no target or nest of this name",
     "unknown-configuration": "the plan has no configuration of this name",
@@ -134,8 +134,8 @@ class Quality:
         if reading.samples is not None and reading.samples < self.samples:
             return "few-samples", f"{reading.samples}, {self.samples} or more are needed"
         for reason, came, most in (
-            ("not-settled", reading.settling, self.settling),
             ("scatter", reading.deviation, self.deviation),
+            ("not-settled", reading.settling, self.settling),
         ):
             if came is not None and most is not None and came > most:
                 return reason, f"{came * 1e3:.4f} mm, up to {most * 1e3:.4f} mm is allowed"

@@ -353,7 +353,7 @@ class Session:
 
     def _follows(self, entry: Entry, place: Place | None) -> bool:
         if entry.event == "aside":
-            return place is not None and self._held.get(place) == entry.of
+            return place is not None and place[2] == entry.name and self._held.get(place) == entry.of
         if entry.event == "left" or entry.kept:
             return place is not None and place not in self._held
         return True

@@ -222,7 +222,7 @@ def open_campaign(
                 cure=did_you_mean(unknown[0], known or ()),
             )
         quality = _of_device(quality, source, most_deviation, most_settling, fewest_samples)
-        virtual, instrument = made.entries(), f"virtual {device}, a twin measured"
+        virtual, instrument = made.entries(), f"a virtual {device} that measures a twin"
     elif watch is not None:
         folder_watched = _watched(watch, mapping, planned, folder)
         source, instrument = folder_watched, f"files in {folder_watched.folder}"

@@ -14,6 +14,7 @@ from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figu
 from truearm.reporting.numbers import rounded_to
 
 _HEIGHT: Final = 340
+_TOGETHER: Final = "#2b2f33"
 
 
 def drift_figure(session: Session) -> Figure | None:
@@ -26,7 +27,7 @@ def drift_figure(session: Session) -> Figure | None:
         _line(name, minutes, distance, COLOURS[number % len(COLOURS)], "dot")
         for number, (name, distance) in enumerate(zip(drift.names, drift.distance, strict=True))
     ]
-    traces.append(_line("together", minutes, np.sqrt((drift.common**2).sum(axis=1)), AFTER, "solid"))
+    traces.append(_line("together", minutes, np.sqrt((drift.common**2).sum(axis=1)), _TOGETHER, "solid"))
     return figure(traces, _HEIGHT, xaxis=axis("time since the nests were read first [min]"), yaxis=axis("moved [mm]"))
 
 

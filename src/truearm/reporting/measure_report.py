@@ -17,34 +17,35 @@ def measure_report(measured: Measured) -> str:
     states = [("kept", str(kept), "")]
     states += [(reason, str(count), REASONS[reason]) for reason, count in counts.items()]
     asked = [
-        ("deviation of a sample", "not asked" if quality.deviation is None else f"{quality.deviation * 1e3:.4f} mm"),
+        ("deviation of a sample, at most", "not asked" if quality.deviation is None else f"{quality.deviation * 1e3:.4f} mm"),
         (
-            "between the halves of a dwell",
+            "between the halves of a dwell, at most",
             "not asked" if quality.settling is None else f"{quality.settling * 1e3:.4f} mm",
         ),
-        ("fewest samples", str(quality.samples)),
+        ("samples, at least", str(quality.samples)),
     ]
     tables = [
         Figures("Readings", ("state", "count", "why"), tuple(states), (2,)),
         Figures(
             "Measured with", ("what", "value"), (("readings from", measured.instrument), *measured.about.rows()), (1,)
         ),
-        Figures("Asked of a reading", ("what", "at most"), tuple(asked), (1,)),
+        Figures("Asked of a reading", ("what", "limit"), tuple(asked), (1,)),
     ]
-    if session.left_out:
-        tables.append(
-            Figures("Left out", ("configuration", "target"), tuple(session.left_out), (1,)),
-        )
     aside = [
         (str(entry.number), entry.label, entry.name, session.reason_of(entry), entry.words)
         for entry in session.entries
         if entry.event == "reading" and session.reason_of(entry)
     ]
-    details = [
-        Figures(
-            "Set aside, one by one", ("number", "configuration", "point", "reason", "words"), tuple(aside), (1, 2, 3, 4)
-        )
-    ]
+    details = []
+    if session.left_out:
+        places: dict[str, list[str]] = {}
+        for label, name in session.left_out:
+            places.setdefault(name, []).append(label)
+        rows = [(name, str(len(labels)), ", ".join(labels)) for name, labels in places.items()]
+        details.append(Figures("Left out", ("target", "count", "at the configurations"), tuple(rows), (2,)))
+    if aside:
+        heading = ("number", "configuration", "point", "reason", "words")
+        details.append(Figures("Set aside, one by one", heading, tuple(aside), (1, 2, 3, 4)))
     pictures = []
     if (drift := drift_figure(session)) is not None:
         words = (
@@ -65,6 +66,6 @@ def measure_report(measured: Measured) -> str:
         measured.command,
         pictures=pictures,
         tables=tables,
-        details=details if aside else (),
+        details=details,
         notices=measured.warnings,
     )

@@ -372,7 +372,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "payload": "1kg,0mm,0mm,50mm",
     },
     "measure": lambda folder: {
-        "plan": _written(folder / "plan.csv", MEASURED_PLAN),
+        "plan": _written(folder / "measured-plan.csv", MEASURED_PLAN),
         "robot": "irb120",
         "out": folder / "measured",
         "device": "measurement-arm",

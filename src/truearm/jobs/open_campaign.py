@@ -185,6 +185,7 @@ def open_campaign(
         watch={"mapping": mapping},
         listen={"token": token},
     )
+    call = command_argument(command) or f"truearm.measure({str(path)!r}, .., out={str(out)!r})"
     between = whole_argument(every, "every", 1, _LONGEST_ROUND)
     folder_for((LOG, BEGUN), out, path, robot, truth, mapping, about)
     folder = folder_for((DATA, PAGE), out, path, robot, truth, mapping, about, ours=True)
@@ -240,7 +241,6 @@ def open_campaign(
         _refuse_names(names, nests_named)
         session = Session(planned.configurations.labels, names, nests_named, between, quality)
         begin(folder, planned.configurations, planned.joints, nominal, session, virtual, said)
-        call = command_argument(command) or f"truearm.measure({str(path)!r}, .., out={str(folder)!r})"
         return OpenCampaign(
             session,
             source,

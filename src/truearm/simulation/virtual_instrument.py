@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice, takewhile
 from typing import Final
 
 import numpy as np
@@ -32,7 +33,7 @@ _NEST_CIRCLE: Final = 0.6
 #: A disturbed reading: so many deviations more scatter, or so many of unrest that dies out, or a beam that breaks.
 _UNREST: Final = 15.0
 _SCATTER: Final = 8.0
-#: Readings in a row that may be disturbed; then the point is left out.
+#: So often a point is read in a row; then it is left out.
 _MOST_TRIES: Final = 20
 
 #: Instruments that read where targets are, without touching them: by name.
@@ -96,7 +97,6 @@ class VirtualInstrument:
         around = _NEST_CIRCLE * np.column_stack([np.cos(turn), np.sin(turn), 0.1 * np.arange(len(nests))])
         base = twin.robot.base
         self._nests = dict(zip(nests, around @ base.rotation.T + base.translation, strict=True))
-        self._tries = 0
 
     @property
     def waiting(self) -> str:
@@ -129,12 +129,11 @@ class VirtualInstrument:
             index = [target.name for target in self.placed.targets].index(name)
             if not self.visible(k)[index]:
                 return [Incoming(left=(step.label, name, f"the {self.device.name} does not see it"))]
-        if self._tries >= _MOST_TRIES:
-            self._tries = 0
-            return [Incoming(left=(step.label, name, "every try was disturbed"))]
+        tries = takewhile(lambda entry: (entry.label, entry.name) == (step.label, name), reversed(session.entries))
+        if sum(1 for _ in islice(tries, _MOST_TRIES)) == _MOST_TRIES:
+            return [Incoming(left=(step.label, name, f"{_MOST_TRIES} readings in a row were set aside"))]
         rng = np.random.default_rng([self._seed, 1, len(session)])
         mishap = int(rng.integers(3)) if rng.random() < self._disturbed else -1
-        self._tries = self._tries + 1 if mishap >= 0 else 0
         reading = self._read(name, k, rng, mishap, _PACE * len(session))
         return [Incoming(replace(reading, label=step.label))]
 

@@ -176,6 +176,8 @@ class Session:
         self._positions: dict[tuple[str, bytes], Entry] = {}
         self._visited: dict[int, None] = {}  # configurations in the order in which the robot came to them first
         self._at: int | None = None  # where it stands
+        self._whole: set[tuple[Kind, int]] = set()  # rounds and configurations of which nothing is left
+        self._from = 0  # no configuration before this one has anything left
 
     # -- what there is -------------------------------------------------------------------------------------
 
@@ -342,6 +344,11 @@ class Session:
             elif entry.kept and entry.reading is not None:
                 self._held[place] = entry.number
                 self._positions.setdefault((entry.name, entry.reading.position.tobytes()), entry)
+            if self._open(*place[:2]):
+                self._whole.discard(place[:2])
+                self._from = min(self._from, place[1]) if place[0] == "configuration" else self._from
+            else:
+                self._whole.add(place[:2])
             if place[0] == "configuration" and entry.event != "aside":
                 self._at = place[1]
                 self._visited.setdefault(self._at)
@@ -404,16 +411,16 @@ class Session:
         """Return the configuration at which a target is measured that names none; None if all are."""
         if self._at is not None and self._open("configuration", self._at):
             return self._at
-        return next((k for k in range(len(self.labels)) if self._open("configuration", k)), None)
+        while self._from < len(self.labels) and ("configuration", self._from) in self._whole:
+            self._from += 1
+        return self._from if self._from < len(self.labels) else None
 
     def _open(self, kind: Kind, k: int) -> tuple[str, ...]:
         names = self.nests if kind == "nests" else self.targets
         return tuple(n for n in names if (kind, k, n) not in self._held and (kind, k, n) not in self._left)
 
     def _step(self, kind: Kind, k: int, names: tuple[str, ...]) -> Step:
-        whole = sum(not self._open("configuration", k) for k in range(len(self.labels)))
-        whole += sum(not self._open("nests", r) for r in range(self.rounds))
-        return Step(kind, k, self.labels[k], names, whole + 1, len(self.labels) + self.rounds)
+        return Step(kind, k, self.labels[k], names, len(self._whole) + 1, len(self.labels) + self.rounds)
 
 
 def counted_reasons(counts: dict[str, int] | Iterable[tuple[str, int]]) -> str:

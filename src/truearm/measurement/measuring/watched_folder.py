@@ -305,7 +305,8 @@ class WatchedFolder:
         content, layout = self.content, self.content.layout
         chosen = {*new, *(() if layout.header is None else (layout.header - 1,))}
         last = max(chosen, default=-1)
-        text = "".join(line if number in chosen else "\n" for number, line in enumerate(lines[: last + 1]))
+        bare = ((line.rstrip("\r\n") if number in chosen else "") for number, line in enumerate(lines[: last + 1]))
+        text = "".join(f"{line}\n" for line in bare)
         cells = read_cells(text, path.name, layout.layout)
         try:
             rows = mapped_rows(cells, content, self.mapping)

@@ -158,7 +158,8 @@ def _rows(folder: Path) -> None:
         assert all(notice.message for notice in campaign.notices)
     log = ReadingLog(folder)
     log.close()
-    assert [entry.reason for entry in log.entries] == [entry.reason for entry in entries], "the log holds other readings"
+    reasons = [[entry.reason for entry in some] for some in (log.entries, entries)]
+    assert reasons[0] == reasons[1], "the log holds other readings"
     Session(("P1", "P2", "P3"), ("smr",), ("floor",), 2, Quality()).add(*log.entries)
 
 

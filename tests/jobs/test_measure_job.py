@@ -48,7 +48,8 @@ def plan(tmp_path: Path) -> Path:
 
 
 def arm(plan: Path, out: Path, **more: Any) -> Any:
-    return truearm.measure(plan, "irb120", out=out, **{"device": "measurement-arm", "nests": ["n"], "every": 2} | more)
+    given: dict[str, Any] = {"device": "measurement-arm", "nests": ["n"], "every": 2} | more
+    return truearm.measure(plan, "irb120", out=out, **given)
 
 
 def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(planned: Path, tmp_path: Path) -> None:
@@ -76,6 +77,7 @@ def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(
     assert set(data.sigma[data.has_reading].tolist()) == {VIRTUAL["tracker"].sigma}
     assert data.references is not None
     calibration = truearm.calibrate("irb120", tmp_path / DATA, train=18)
+    assert calibration.validation is not None
     assert calibration.validation.position is not None
     assert calibration.validation.position.mean < 1e-4
     page = (tmp_path / PAGE).read_text()
@@ -116,7 +118,9 @@ def test_what_was_stopped_goes_on_to_the_same_files(plan: Path, tmp_path: Path) 
         ({"most_deviation": 1e-3}, "limit of what is kept"),
     ],
 )
-def test_a_folder_that_began_otherwise_is_refused(plan: Path, tmp_path: Path, change: dict[str, Any], word: str) -> None:
+def test_a_folder_that_began_otherwise_is_refused(
+    plan: Path, tmp_path: Path, change: dict[str, Any], word: str
+) -> None:
     out = tmp_path / "out"
     arm(plan, out)
     with pytest.raises(InputError, match=f"began with another {word}") as refusal:
@@ -234,7 +238,7 @@ def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_p
         for entry in campaign.session.kept:
             assert entry.reading is not None
             k = campaign.session.labels.index(entry.label)
-            place, turned = campaign.placed.world_poses(campaign.joints[k : k + 1], entry.name)
+            place, _ = campaign.placed.world_poses(campaign.joints[k : k + 1], entry.name)
             np.testing.assert_allclose(entry.reading.position, place[0], atol=1e-7)
             assert (entry.reading.quaternion is None) == (device in ("tracker", "measurement-arm"))
         found = campaign.measured()
@@ -255,6 +259,19 @@ def test_what_an_instrument_that_drifts_does_to_the_nests_is_said(plan: Path, tm
     assert "nests-moved" not in {n.code for n in calm.warnings}
     summary = json.loads(json.dumps(found.summary()))
     assert summary["nests"]["rounds"] == len(drift.rounds)
+
+
+def test_a_point_of_which_no_reading_can_be_kept_is_left_out_after_twenty(plan: Path, tmp_path: Path) -> None:
+    found = arm(plan, tmp_path / "out", most_settling=0.0, nests=[])
+    assert found.session.aside_by_reason == {"not-settled": 60}
+    assert len(found.session.left_out) == 3
+    assert found.files == ()
+
+
+def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        arm(plan, tmp_path / "out", command="")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

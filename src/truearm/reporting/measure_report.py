@@ -17,7 +17,10 @@ def measure_report(measured: Measured) -> str:
     states = [("kept", str(kept), "")]
     states += [(reason, str(count), REASONS[reason]) for reason, count in counts.items()]
     asked = [
-        ("deviation of a sample, at most", "not asked" if quality.deviation is None else f"{quality.deviation * 1e3:.4f} mm"),
+        (
+            "deviation of a sample, at most",
+            "not asked" if quality.deviation is None else f"{quality.deviation * 1e3:.4f} mm",
+        ),
         (
             "between the halves of a dwell, at most",
             "not asked" if quality.settling is None else f"{quality.settling * 1e3:.4f} mm",

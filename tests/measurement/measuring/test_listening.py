@@ -120,7 +120,9 @@ def test_a_line_that_cannot_be_taken_is_refused_and_counted(port: Port, line: st
     assert port.say(stream, "reading a 1 2 3 mm").startswith("kept 1")
 
 
-@pytest.mark.parametrize("greeting", ["token wrong", "token", f"reading a 1 2 3 mm {TOKEN}", f"TOKEN {TOKEN}", "\ud83d"])
+@pytest.mark.parametrize(
+    "greeting", ["token wrong", "token", f"reading a 1 2 3 mm {TOKEN}", f"TOKEN {TOKEN}", "\ud83d"]
+)
 def test_without_the_token_nothing_is_taken(port: Port, greeting: str) -> None:
     stream = port.connect(None)
     stream.sendall(greeting.encode("utf-8", "surrogatepass") + b"\nreading a 1 2 3 mm\n")

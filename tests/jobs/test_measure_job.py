@@ -35,8 +35,15 @@ joints: {file: plan.csv}
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A plan of configurations at which the tracker sees a reflector."""
-    path = tmp_path_factory.mktemp("planned") / "plan.csv"
-    truearm.plan("irb120", poses=24, candidates=200, device="tracker", out=path)
+    return seen_by("tracker", 24, tmp_path_factory.mktemp("planned"))
+
+
+def seen_by(device: str, poses: int, folder: Path) -> Path:
+    """Write a plan of configurations that a device can measure."""
+    data = truearm.simulate("irb120", truth="nominal", poses=poses, device=device).data
+    rows = (",".join(map(repr, row)) for row in np.degrees(data.joints).tolist())
+    path = folder / "plan.csv"
+    path.write_text(MEASURED_PLAN.splitlines()[0] + "\n" + "".join(f"{k},{row}\n" for k, row in enumerate(rows, 1)))
     return path
 
 
@@ -107,6 +114,17 @@ def test_what_was_stopped_goes_on_to_the_same_files(plan: Path, tmp_path: Path) 
     before = (whole / DATA).read_bytes()
     assert arm(plan, whole, seed=1, disturbed=0.3).finished
     assert (whole / DATA).read_bytes() == before
+
+
+def test_a_torn_line_is_said_and_measured_again(plan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arm(plan, out)
+    log, data = (out / LOG).read_bytes(), (out / DATA).read_bytes()
+    (out / LOG).write_bytes(log[:-7])
+    found = arm(plan, out)
+    (notice,) = [notice for notice in found.warnings if notice.code == "torn-line"]
+    assert notice.level == "note"
+    assert ((out / LOG).read_bytes(), (out / DATA).read_bytes()) == (log, data)
 
 
 @pytest.mark.parametrize(
@@ -225,8 +243,7 @@ def test_a_program_sends_readings_to_a_port(plan: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("device", VIRTUAL)
 def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_path: Path) -> None:
-    plan = tmp_path / "plan.csv"
-    truearm.plan("irb120", poses=12, candidates=60, device=device, out=plan)
+    plan = seen_by(device, 12, tmp_path)
     with open_campaign(plan, "irb120", tmp_path / "out", device=device, truth="nominal", noise=1e-9) as campaign:
         source = campaign.source
         assert isinstance(source, VirtualInstrument)

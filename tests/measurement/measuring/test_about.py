@@ -52,6 +52,7 @@ def test_what_nobody_said_is_named() -> None:
         (("humidity: 45", "humidity: 145"), r"environment\[1\].humidity"),
         (("length: mm", "length: furlong"), "units.length"),
         (("serial:", "seriel:"), "seriel"),
+        (("at: start", 'at: "st\\x07art"'), "one line of text"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_with_its_place(tmp_path: Path, change: tuple[str, str], word: str) -> None:

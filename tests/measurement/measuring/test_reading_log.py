@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +125,29 @@ def test_a_link_or_a_folder_is_no_log(tmp_path: Path) -> None:
     (tmp_path / LOG).mkdir()
     with pytest.raises(InputError, match="this is none"):
         ReadingLog(tmp_path)
+
+
+def test_a_line_that_says_nothing_is_refused_although_its_checksum_fits(tmp_path: Path) -> None:
+    write(tmp_path)
+    body = "6,guess,,P1,a,target,,,,,,,,,,,,,,,,,,"
+    with (tmp_path / LOG).open("a") as stream:
+        stream.write(f"{body},{zlib.crc32(body.encode()):08x}\n")
+    with pytest.raises(InputError, match="line 7: this line cannot be understood"):
+        ReadingLog(tmp_path)
+
+
+def test_a_disk_that_does_not_take_a_line_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    log = ReadingLog(tmp_path)
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        log.append(ENTRIES[0])
+    monkeypatch.undo()
+    log.close()
+    with pytest.raises(InputError, match="cannot be written"):
+        ReadingLog(tmp_path / "nowhere")
 
 
 def test_one_process_at_a_time_has_it(tmp_path: Path) -> None:

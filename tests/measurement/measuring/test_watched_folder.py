@@ -155,6 +155,15 @@ def test_going_on_passes_over_what_the_log_holds(watched: Folder) -> None:
     assert len(watched.campaign.session) == 3
 
 
+def test_a_log_of_another_plan_is_refused(watched: Folder) -> None:
+    watched.write(HEADER + row("P1", "a"))
+    watched.step()
+    watched.campaign.close()
+    other = Session(("Q1", "Q2"), ("a",), ("n1",), 2, Quality())
+    with pytest.raises(InputError, match="does not belong to this plan"):
+        Campaign(other, watched.campaign.source, watched.out)
+
+
 def test_a_file_that_shrinks_or_is_replaced_is_told_and_what_was_read_stays(watched: Folder) -> None:
     watched.write(HEADER + row("P1", "a") + row("P2", "a", 2.0))
     watched.step()

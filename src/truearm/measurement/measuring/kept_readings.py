@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.measuring.nest_drift import nest_drift
 from truearm.measurement.measuring.session import Entry, Session
@@ -165,10 +164,3 @@ def _fields(rows: list[tuple[str, str, Entry | None]], visits: _Visits, sigma: S
         "quaternion": each("quaternion", 4) if turned else None,
         **deviations,
     }
-
-
-def refuse_nothing(data: Dataset | None, where: str) -> Dataset:
-    """Return the data, or refuse a session in which no target was kept."""
-    if data is None:
-        raise InputError("no reading of a target was kept", where=where, cure="Measure on, or look at why in the log.")
-    return data

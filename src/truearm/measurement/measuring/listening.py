@@ -48,6 +48,8 @@ MOST_LINES: Final = 50
 #: How long a connection may be without its token [s].
 PATIENCE: Final = 5.0
 _WORDS: Final = 200
+#: So much is told at once; more is counted alone.
+_MOST_SAID: Final = 20
 _KEYS: Final = ("at", "time", "sigma", "samples", "deviation", "settling", "breaks", "q")
 
 
@@ -150,6 +152,10 @@ class Listener:
         self._selector.close()
         self._bound.close()
 
+    def _tell(self, words: str) -> None:
+        if len(self._said) < _MOST_SAID:
+            self._said.append(words)
+
     def _accept(self) -> None:
         try:
             stream, _ = self._bound.accept()
@@ -217,7 +223,7 @@ class Listener:
             self._answer(client, f"ok{self._what_next()}")
             return []
         self._wrong_tokens += 1
-        self._said.append("a connection without the right token was refused")
+        self._tell("a connection without the right token was refused")
         _send(client.stream, "refused this is not the token")
         self._end(client)
         return []
@@ -245,7 +251,7 @@ class Listener:
 
     def _refuse(self, client: _Client, said: str) -> None:
         self._refused += 1
-        self._said.append(f"a line was refused: {said}")
+        self._tell(f"a line was refused: {said}")
         self._answer(client, f"refused {said}")
 
     def _answer(self, client: _Client, text: str) -> None:
@@ -254,7 +260,7 @@ class Listener:
 
     def _cut(self, client: _Client) -> None:
         self._cut_off += 1
-        self._said.append("a connection that sent too much was cut off")
+        self._tell("a connection that sent too much was cut off")
         _send(client.stream, f"refused more than {LONGEST_LINE} bytes in a line, or {MOST_LINES} lines a second")
         self._end(client)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -370,7 +370,7 @@ class Session:
         if reading.name not in (*self.targets, *self.nests):
             return "unknown-name", f"allowed: {', '.join((*self.targets, *self.nests))}"
         if reading.name in self.targets and reading.label is not None and reading.label not in self._index:
-            return "unknown-configuration", reading.label
+            return "unknown-configuration", f"{reading.label}; the plan begins with {self.labels[0]}"
         fault = self.quality.fault(reading)
         if fault[0]:
             return fault
@@ -421,11 +421,6 @@ class Session:
 
     def _step(self, kind: Kind, k: int, names: tuple[str, ...]) -> Step:
         return Step(kind, k, self.labels[k], names, len(self._whole) + 1, len(self.labels) + self.rounds)
-
-
-def counted_reasons(counts: dict[str, int] | Iterable[tuple[str, int]]) -> str:
-    """Return how many readings were set aside for each reason, in words."""
-    return ", ".join(f"{count} {reason}" for reason, count in dict(counts).items())
 
 
 def _one_line(words: str) -> str:

@@ -325,9 +325,10 @@ class WatchedFolder:
     def _time(self, cells: Cells) -> Array:
         """Return when each row was measured [s], ``(rows,)``: by its column of times, or when it was found."""
         order = self.content.order
-        if order is None or order.column is None or order.time is None:
+        if order is None or order.time is None:
             return np.full(len(cells.lines), self._now())
-        return moments(cells, place_of(cells, order.column, self.mapping, "order.column"), order)
+        places = [place_of(cells, column, self.mapping, f"order.{name}") for name, column in order.names.items()]
+        return moments(cells, places, order)
 
 
 def _readings_of(

@@ -56,8 +56,8 @@ class ImportedBag(Record):
             Notice(
                 "messages-missing",
                 f"About {lost} of {lost + kept} messages of the joints are missing, by the times of the others. "
-                "Motions shorter than the gaps are not seen. Lighten the load of the network or of the recorder, or let "
-                "the topic be published reliably.",
+                "Motions shorter than the gaps are not seen. Lighten the load of the network or of the recorder, or "
+                "let the topic be published reliably.",
             ),
         )
 

@@ -196,7 +196,7 @@ def _as_read(taken: str | None, meant: str | None) -> list[str | None]:
     """
     if taken is None:
         return [None]
-    return [f"{taken} moving"] + ([f"{taken[::-1]} fixed"] if meant is None else [])
+    return [f"{taken} moving", *([f"{taken[::-1]} fixed"] if meant is None else [])]
 
 
 def _rotations(numbers: Array, meant: str | None) -> Array:

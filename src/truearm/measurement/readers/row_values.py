@@ -195,7 +195,8 @@ def _of_radians(large: Array, what: str, entry: str) -> Notice:
     return Notice(
         "radians-unlikely",
         f"The angles of {what} are read as radians and go beyond a full turn in {rows} of "
-        f"{counted(len(large), 'row')}, up to {large.max():.4g}: they look like degrees. Correct {entry} in the mapping, if they are.",
+        f"{counted(len(large), 'row')}, up to {large.max():.4g}: they look like degrees. Correct {entry} in the "
+        "mapping, if they are.",
     )
 
 

@@ -184,9 +184,10 @@ def unlikely_radians(cells: Cells, content: MappingFile, joints: Cells | None, m
     ]
     if joints is not None and turning:
         named = {f"columns[{n}]": column for n, column in enumerate(turning, 1)}
+        of_unit = "joints.unit" if content.joints.units is None else "joints.units"
         large = np.abs(numbers_of(joints, named, "rad", mapping, "joints")).max(axis=1)
         if float(np.mean(large > _FULL_TURN)) >= _OFTEN:
-            found.append(_of_radians(large, f"joints ({', '.join(turning)})", "joints.unit"))
+            found.append(_of_radians(large, f"joints ({', '.join(turning)})", of_unit))
     return found
 
 

@@ -313,6 +313,13 @@ class Scene:
         )
         return [plane, label]
 
+    def show_line(self, name: str, points: Array | None, colour: Colour = (214, 140, 60)) -> None:
+        """Draw a line through points ``(n, 3)`` [m] in the world in one upload; None takes it away."""
+        self._clear(name)
+        if points is not None and len(points) > 1:
+            segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+            self._parts[name] = [self._scene.add_line_segments(f"/{name}", segments, colour, thickness=2.0)]
+
     def _clear(self, name: str) -> None:
         for part in reversed(self._parts.get(name, [])):
             part.remove()

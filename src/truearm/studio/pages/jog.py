@@ -12,6 +12,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import exists
+from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.notices import Notice
@@ -92,7 +93,7 @@ class JogPage:
         ghost = calibrated if same_arm else None
         if self.scene.show(nominal, ghost, dark=window.project.settings.dark) or self.jogging is None:
             assert self.scene.solid is not None
-            self._stop()
+            self.stop()
             self._arms = {"nominal": self.scene.solid.robot}
             if ghost is not None:
                 self._arms["calibrated"] = ghost
@@ -116,7 +117,7 @@ class JogPage:
         self._branch.on_update(window.action(self._take_branch))
         self._list.on_update(window.action(self._show_recorded))
         self._record.on_click(window.action(lambda: self._recording(self._record.value)))
-        self._play.on_click(window.action(lambda: self._start() if self._play.value == "play" else self._stop()))
+        self._play.on_click(window.action(lambda: self._start() if self._play.value == "play" else self.stop()))
 
     def _newest(self, name: str, do: Callable[[], None]) -> Callable[[Any], None]:
         """Return a callback of an element that is dragged: of events that wait for each other the last is done."""
@@ -208,7 +209,7 @@ class JogPage:
     # What follows from where the arm is --------------------------------------------------------------------------
 
     def _jogged(self) -> Jogging:
-        self._stop()
+        self.stop()
         if self.jogging is None:
             raise InputError("there is no robot to move", cure="Choose one on the page Cell.")
         return self.jogging
@@ -291,12 +292,41 @@ class JogPage:
 
     def _start(self) -> None:
         """Play the configurations of the file, from where the arm is."""
-        arm, known = self._jogged(), self._read()
-        if known is None:
-            raise InputError("there is nothing to play", parameter="File", came=self._list.value, cure="Record a pose.")
-        for joints in known.joints:
-            Jogging(arm.robot).go(joints)
-        motion = Motion.through(np.concatenate([arm.joints[None], known.joints]), float(self._speed.value), arm.robot)
+        self.play_file(self._window.project.relative(self._file()), float(self._speed.value))
+
+    def play_file(self, name: str, speed: float, *, from_its_start: bool = False) -> Array:
+        """Play the configurations of a file, from where the arm is or from the first of them.
+
+        Parameters
+        ----------
+        speed
+            Of the fastest joint [deg/s, or mm/s for prismatic joints].
+
+        Returns
+        -------
+        Configurations on the way, ``(n, joints)`` [rad or m].
+        """
+        arm, file = self._jogged(), self._window.project.path(name)
+        if not exists(file):
+            raise InputError("there is nothing to play", parameter="File", came=name, cure="Record a pose.")
+        joints = read_recorded(file, arm.robot).joints
+        if not from_its_start:
+            joints = np.concatenate([arm.joints[None], joints])
+        motion = Motion.through(joints, speed, arm.robot)
+        self.play(motion)
+        return motion.on_the_way()
+
+    def play(self, motion: Motion) -> None:
+        """Play a motion.
+
+        Raises
+        ------
+        InputError
+            If it leads beyond the limits of a joint.
+        """
+        tried = Jogging(self._jogged().robot)
+        for joints in motion.joints:
+            tried.go(joints)
         self._playing = over = threading.Event()
         threading.Thread(target=self._run, args=(motion, over), daemon=True).start()
 
@@ -314,7 +344,8 @@ class JogPage:
                     return
             over.wait(_PICTURE)
 
-    def _stop(self) -> None:
+    def stop(self) -> None:
+        """End a motion that is played."""
         if self._playing is not None:
             self._playing.set()
             self._playing = None

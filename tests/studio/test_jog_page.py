@@ -269,7 +269,7 @@ def test_another_robot_is_drawn_anew_and_fixtures_beside_it(studio: Studio, page
     assert len(page._sliders) == 5
     assert len(page.scene._parts["fixtures"]) == 6
     page.scene.show_boxes({"table": (np.array([-np.inf, 0.1, -0.2]), np.array([np.inf, 0.5, 0.0]))})
-    assert len(page.scene._parts["boxes"]) == 1
+    assert len(page.scene._parts["boxes"]) == 2  # and its name
     studio.window.edit(dark=True)
     assert page.scene.solid is not None
     assert page.scene.solid.robot.name == "katana450"

@@ -13,6 +13,7 @@ from tests.cli.conftest import Truearm
 from tests.cli.conftest import truearm as truearm
 from tests.studio.conftest import Serving
 from tests.studio.test_jog_page import act, eventually
+from tests.studio.typing_in import typed as type_in
 
 from truearm.errors import InputError
 from truearm.studio.pages.jog import JogPage
@@ -35,14 +36,7 @@ def page_of(studio: Studio) -> PlanPage:
 
 def typed(studio: Studio, name: str, value: Any) -> None:
     """Give a field a value as somebody does who types it, and wait for it to be taken."""
-    element = page_of(studio).fields.element(name)
-    act(element, value)
-    assert eventually(lambda: not _waiting(element))
-
-
-def _waiting(element: Any) -> bool:
-    cells = [cell.cell_contents for callback in element._impl.update_cb for cell in callback.__closure__ or ()]
-    return any(timer.is_alive() for cell in cells if isinstance(cell, list) for timer in cell)
+    type_in(studio, page_of(studio).fields.element(name), value)
 
 
 def said(studio: Studio) -> str:
@@ -113,7 +107,7 @@ def test_what_is_no_number_is_refused_and_the_field_shows_what_holds(
 ) -> None:
     before = studio.window.project.settings
     typed(studio, name, value)
-    assert eventually(lambda: words in said(studio))
+    assert words in said(studio)
     assert studio.window.project.settings == before
     assert page_of(studio).fields.element(name).value != value
 

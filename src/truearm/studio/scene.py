@@ -17,6 +17,7 @@ from truearm.modeling.fixtures import Fixture
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, quaternion_from_rotation
+from truearm.printable import printable
 from truearm.studio.arrows import Arrows
 from truearm.studio.robot_shape import link_poses, robot_shape
 from truearm.studio.solids import frame_about
@@ -111,6 +112,7 @@ class Scene:
         self._parts: dict[str, list[Any]] = {}
         self._dark = False
         self._looked: Array | None = None
+        self._boxes: dict[str, tuple[Array, Array]] = {}
 
     @property
     def length(self) -> float:
@@ -135,6 +137,7 @@ class Scene:
                 self._draw_robots(nominal, calibrated)
             if nominal is not None:
                 self._surroundings(nominal if calibrated is None else calibrated)
+                self.show_boxes(self._boxes)
         return other_arm
 
     def move(self, at: Postures, of: Robot) -> None:
@@ -165,24 +168,31 @@ class Scene:
 
     def show_boxes(self, boxes: Mapping[str, tuple[Array, Array]]) -> None:
         """Draw boxes to keep clear of: lowest and highest corners in the base frame [m], by name."""
+        self._boxes = dict(boxes)
         self._clear("boxes")
         if self.solid is None:
             return
         base = self.solid.robot.base
         far = 2.0 * self.length
-        for number, (low, high) in enumerate(boxes.values()):
-            low, high = (np.clip(corner, -far, far) for corner in (low, high))
-            self._parts["boxes"].append(
+        for number, (name, corners) in enumerate(self._boxes.items()):
+            low, high = (np.clip(corner, -far, far) for corner in corners)
+            middle = (low + high) / 2.0
+            self._parts["boxes"] += [
                 self._scene.add_box(
                     f"/boxes/{number}",
                     color=_BOX,
                     dimensions=tuple((high - low).tolist()),
                     opacity=_SEE_THROUGH,
                     cast_shadow=False,
-                    position=base.rotation @ ((low + high) / 2.0) + base.translation,
+                    position=base.rotation @ middle + base.translation,
                     wxyz=base.quaternion,
-                )
-            )
+                ),
+                self._scene.add_label(
+                    f"/boxes/{number}/name",
+                    printable(name),
+                    position=(0.0, 0.0, float(high[2] - middle[2])),
+                ),
+            ]
 
     def show_arrows(self, name: str, arrows: Arrows | None) -> None:
         """Draw arrows in one upload, with the words that say how much they are magnified; None takes them away."""

@@ -18,6 +18,8 @@ from truearm.modeling.transform import quaternion_from_rotation, rotation_from_q
 from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.jogging import JOG_FRAMES, Branch, JogFrame, Jogging
+from truearm.studio.pages.jog_path import JogPath
+from truearm.studio.pages.jog_views import JogViews
 from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
@@ -80,6 +82,8 @@ class JogPage:
             self._recorded = gui.add_html("")
             self._speed = gui.add_number("Speed [deg/s, mm/s]", 45.0, min=0.1, max=1000.0, step=1.0)
             self._play = gui.add_button_group("Motion", ("play", "stop"))
+        self.views = JogViews(window, self.scene)
+        self.path = JogPath(window, self.scene, self._jogged, self.play, self.stop)
         self._handle: Any = None
         self._callbacks()
 
@@ -101,6 +105,7 @@ class JogPage:
             self._ghost.disabled = ghost is None
             self._take("calibrated" if self._arm.value == "calibrated" and ghost is not None else "nominal")
         self._show_recorded()
+        self.path.refresh()
 
     # Elements ----------------------------------------------------------------------------------------------------
 
@@ -187,6 +192,8 @@ class JogPage:
         self._branches = self._jogged().branches()
         names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
         self._branch.options = (_NEAREST, *names)
+        if not names:
+            self._said.content += words.paragraph("No other way to this pose was found.")
 
     def _take_branch(self) -> None:
         names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
@@ -243,6 +250,7 @@ class JogPage:
                     slider.value = min(max(number, low), high)
             self._place.value, self._turns.value = arm.pose_numbers(self._frame.value)
             self._said.content = "".join(words.paragraph(text) for text in arm.words())
+            self.views.moved(arm)
 
     def _show_handle(self) -> None:
         self._handle.visible = self._handle_on.value

@@ -56,6 +56,8 @@ class Settings(BaseModel):
         File of boxes to keep clear of and of what else a configuration must keep; None for none.
     path
         File of a path that the arm follows in the scene; None for none yet.
+    meshes
+        URDF whose meshes show the robot; None for the robot's own, if it is one.
     plan
         What the page Plan says.
     dark
@@ -79,6 +81,7 @@ class Settings(BaseModel):
     corrected: _Name = "result/corrected"
     constraints: _Name | None = None
     path: _Name | None = None
+    meshes: _Name | None = None
     plan: PlanFields = PlanFields()
     dark: bool = False
 
@@ -94,7 +97,7 @@ class Settings(BaseModel):
 
 
 #: Settings that name a file of the folder, or a folder in it.
-_PATHS: Final = ("data", "result", "program", "cell", "corrected", "constraints", "path")
+_PATHS: Final = ("data", "result", "program", "cell", "corrected", "constraints", "path", "meshes")
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from truearm.modeling.transform import Transform, quaternion_from_rotation
 from truearm.printable import printable
 from truearm.studio.arrows import Arrows
 from truearm.studio.robot_shape import link_poses, robot_shape
-from truearm.studio.solids import frame_about
+from truearm.studio.solids import Mesh, frame_about
 
 Colour = tuple[int, int, int]
 #: One colour for all, or one each.
@@ -54,9 +54,17 @@ class DrawnRobot:
         Where it stands in its base frame: 0, or below where its base frame is in its shoulder [m].
     """
 
-    def __init__(self, scene: viser.SceneApi, name: str, robot: Robot, *, ghost: bool = False) -> None:
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        robot: Robot,
+        meshes: Mapping[str, Mesh] | None = None,
+        *,
+        ghost: bool = False,
+    ) -> None:
         self.robot = robot
-        shape = robot_shape(robot)
+        shape = robot_shape(robot, meshes)
         self.length, self.floor = shape.layout.length, -shape.layout.pedestal
         self._root = scene.add_frame(name, show_axes=False)
         self._links: list[Any] = []
@@ -112,6 +120,7 @@ class Scene:
         self._parts: dict[str, list[Any]] = {}
         self._dark = False
         self._looked: Array | None = None
+        self._meshes: Mapping[str, Mesh] | None = None
         self._boxes: dict[str, tuple[Array, Array]] = {}
 
     @property
@@ -119,16 +128,29 @@ class Scene:
         """Of the arm along its links [m]; 1 m without one."""
         return 1.0 if self.solid is None else self.solid.length
 
-    def show(self, nominal: Robot | None, calibrated: Robot | None, *, dark: bool) -> bool:
+    def show(
+        self,
+        nominal: Robot | None,
+        calibrated: Robot | None,
+        meshes: Mapping[str, Mesh] | None = None,
+        *,
+        dark: bool,
+    ) -> bool:
         """Draw robots; return whether they are others than before.
 
         A calibrated robot stands where the instrument has found it. The nominal one is put there, too, so that they
         can be compared and both stand right to what was measured.
+
+        Parameters
+        ----------
+        meshes
+            What their links look like, as :func:`truearm.studio.robot_shape.robot_shape` takes it.
         """
         if nominal is not None and calibrated is not None:
             nominal = standing_at(nominal, calibrated)
         before = [None if one is None else one.robot for one in (self.solid, self.ghost)]
-        other_arm = before != [nominal, calibrated]
+        other_arm = before != [nominal, calibrated] or meshes is not self._meshes
+        self._meshes = meshes
         if not other_arm and dark == self._dark:
             return False
         self._dark = dark
@@ -243,8 +265,10 @@ class Scene:
         if self._tip is not None:
             self._tip.remove()
             self._tip = None
-        self.solid = None if nominal is None else DrawnRobot(self._scene, "/nominal", nominal)
-        self.ghost = None if calibrated is None else DrawnRobot(self._scene, "/calibrated", calibrated, ghost=True)
+        self.solid = None if nominal is None else DrawnRobot(self._scene, "/nominal", nominal, self._meshes)
+        self.ghost = (
+            None if calibrated is None else DrawnRobot(self._scene, "/calibrated", calibrated, self._meshes, ghost=True)
+        )
 
     def _surroundings(self, robot: Robot) -> None:
         """Draw frames, floor and fixtures around a robot, and say from where it is looked at first."""

@@ -11,7 +11,7 @@ from truearm.studio import words
 from truearm.studio.cell_rules import CellRules
 from truearm.studio.pages.cell_boxes import CellBoxes
 from truearm.studio.pages.cell_places import CellPlaces
-from truearm.studio.pages.choices import offer
+from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
@@ -26,6 +26,7 @@ class CellPage:
         self._window = window
         gui = window.gui
         self._robot = gui.add_dropdown("Robot", (window.project.settings.robot,))
+        self._meshes: Any = gui.add_dropdown("Meshes of", (NONE,), hint="a URDF whose meshes show the robot")
         self._payload: Any = gui.add_text(
             "Payload", "", hint="mass and place of its centre, such as 2.7kg,50mm,25mm,100mm"
         )
@@ -37,6 +38,7 @@ class CellPage:
         with gui.add_folder("What is known of the robot", expand_by_default=False):
             self._about = gui.add_html("")
         self._robot.on_update(window.action(lambda: window.edit(robot=self._robot.value)))
+        self._meshes.on_update(window.action(lambda: window.edit(meshes=chosen(self._meshes))))
         self._payload.on_update(window.settled(self._weigh))
         self._upload.on_upload(window.action(self._take_in))
 
@@ -45,6 +47,8 @@ class CellPage:
         window, settings = self._window, self._window.project.settings
         files = window.project.names(".yaml", ".yml", ".urdf", ".xacro", ".xml")
         offer(self._robot, [*library(), *files], settings.robot, None)
+        offer(self._meshes, window.project.names(".urdf"), settings.meshes)
+        self._meshes.visible = len(self._meshes.options) > 1
         self._payload.value = settings.payload or ""
         self.places.refresh()
         self.boxes.refresh()

@@ -8,7 +8,7 @@ from typing import Any
 
 from truearm.errors import InputError
 from truearm.files import exists
-from truearm.library import load_robot
+from truearm.library import load_robot, urdf_source
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.studio import words
@@ -150,7 +150,8 @@ class CellPlaces:
             )
         write_text(path, text)
         window.project.look(name)
-        window.edit(robot=name)
+        looks = settings.meshes if urdf_source(settings.robot) is None else settings.robot
+        window.edit(robot=name, meshes=looks)
         window.refresh()
 
 

@@ -20,6 +20,7 @@ from truearm.studio import words
 from truearm.studio.jogging import JOG_FRAMES, Branch, JogFrame, Jogging
 from truearm.studio.pages.jog_path import JogPath
 from truearm.studio.pages.jog_views import JogViews
+from truearm.studio.pages.robot_looks import RobotLooks
 from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
@@ -43,6 +44,7 @@ class JogPage:
     def __init__(self, window: Window) -> None:
         self._window = window
         self.scene = Scene(window.server)
+        self._looks = RobotLooks(window)
         self.jogging: Jogging | None = None
         self._arms: dict[str, Robot] = {}
         self._branches: list[Branch] = []
@@ -95,7 +97,8 @@ class JogPage:
         nominal, calibrated = window.robot(), window.calibrated()
         same_arm = calibrated is None or len(calibrated.joints) == len(nominal.joints)
         ghost = calibrated if same_arm else None
-        if self.scene.show(nominal, ghost, dark=window.project.settings.dark) or self.jogging is None:
+        meshes = self._looks.meshes(nominal)
+        if self.scene.show(nominal, ghost, meshes, dark=window.project.settings.dark) or self.jogging is None:
             assert self.scene.solid is not None
             self.stop()
             self._arms = {"nominal": self.scene.solid.robot}

@@ -111,7 +111,7 @@ def test_packages_are_looked_for_in_the_project(project: Project, place: str) ->
         ("link.stl", "no place in the project's folder"),
         ("missing.stl", "there is no such mesh"),
         ("part.dae", "meshes of this kind are not read"),
-        ("broken.stl", "cannot be read"),
+        ("broken.stl", "cannot be read|no triangles"),
         ("empty.obj", "cannot be read|no triangles"),
         ("points.obj", "cannot be read|no triangles"),
         ("beyond.obj", "cannot be read|no triangles"),

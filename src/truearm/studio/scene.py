@@ -352,7 +352,9 @@ class Scene:
         self._clear(name)
         if points is not None and len(points) > 1:
             segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-            self._parts[name] = [self._scene.add_line_segments(f"/{name}", segments, colour, thickness=2.0)]
+            self._parts[name] = [
+                self._scene.add_line_segments(f"/{name}", segments, colour, thickness=2.0, thickness_units="screen")
+            ]
 
     def _clear(self, name: str) -> None:
         for part in reversed(self._parts.get(name, [])):

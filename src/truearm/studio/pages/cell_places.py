@@ -25,6 +25,8 @@ from truearm.studio.cell_places import (
 from truearm.studio.window import Window
 from truearm.writing import write_text
 
+#: Where a new fixture stands [mm], and how far beside it the next one.
+_FIRST, _ASIDE = (500.0, -300.0, 0.0), 100.0
 _PLACE, _TURNS = "x, y, z [mm]", "rx, ry, rz [deg]"
 
 
@@ -120,7 +122,8 @@ class CellPlaces:
         kind, robot = self._add.value, self._robot()
         taken = {thing.name for thing in things_of(robot)}
         name = next(f"{kind}_{k}" for k in range(1, len(taken) + 2) if f"{kind}_{k}" not in taken)
-        self._write(with_thing(robot, Thing(name, kind, (0.0, 0.0, 100.0) if kind == "target" else (0.0, 0.0, 0.0))))
+        x, y, z = _FIRST if kind != "target" else (0.0, 0.0, 100.0)
+        self._write(with_thing(robot, Thing(name, kind, (x, y + _ASIDE * len(taken), z))))
 
     def _moved(self) -> None:
         place, turns = tuple(self._base.value), tuple(self._turns.value)

@@ -10,6 +10,7 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.files import exists
 from truearm.identification.solving.models import MODELS
+from truearm.manifest import MANIFEST
 from truearm.modeling.chain import Array
 from truearm.planning.choosing.measurement_plan import ERROR
 from truearm.planning.choosing.observability import INDICES
@@ -128,7 +129,7 @@ class PlanPage:
 
     def _done(self, found: Planned) -> None:
         self._planned, self._of = found, self._window.project.settings.robot
-        self._window.project.look(*found.outcome.files)
+        self._window.project.look(*found.outcome.files, MANIFEST, self._window.project.settings.plan.out)
         self._said.content = words.lines([*found.outcome.lines, f"Written: {', '.join(found.outcome.files)}"])
         self._drawn = ()
 

@@ -325,7 +325,8 @@ class Scene:
         kinematics = robot.fixture_kinematics(fixture.name)
         position, turned = kinematics.position[:, 0], kinematics.matrix()[0]
         size = _TRIAD * self.length
-        label = self._scene.add_label(f"{name}/name", fixture.name, position=position)
+        # Not below the fixture's own name: it would be moved with that once more.
+        label = self._scene.add_label(f"{name}-name", printable(fixture.name), position=position)
         if fixture.kind == "frame":
             quaternion = quaternion_from_rotation(turned)
             return [

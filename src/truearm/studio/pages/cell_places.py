@@ -122,8 +122,9 @@ class CellPlaces:
         kind, robot = self._add.value, self._robot()
         taken = {thing.name for thing in things_of(robot)}
         name = next(f"{kind}_{k}" for k in range(1, len(taken) + 2) if f"{kind}_{k}" not in taken)
-        x, y, z = _FIRST if kind != "target" else (0.0, 0.0, 100.0)
-        self._write(with_thing(robot, Thing(name, kind, (x, y + _ASIDE * len(taken), z))))
+        x, y, z = _FIRST
+        place = {"target": (0.0, 0.0, 100.0), "plane": (0.0, 0.0, -100.0)}.get(kind, (x, y + _ASIDE * len(taken), z))
+        self._write(with_thing(robot, Thing(name, kind, place)))
 
     def _moved(self) -> None:
         place, turns = tuple(self._base.value), tuple(self._turns.value)

@@ -75,8 +75,10 @@ class PlanPage:
         self._file: Any = gui.add_dropdown("File", (NONE,), visible=False)
         self._download = gui.add_button("Download the file", visible=False)
         with gui.add_folder("In the scene"):
-            self._cloud: Any = gui.add_checkbox("Predicted error and chosen configurations", True)
-            self._among: Any = gui.add_checkbox("Candidates", False)
+            self._cloud: Any = gui.add_checkbox("Predicted error", True, hint="and the chosen configurations, red")
+            self._among: Any = gui.add_checkbox(
+                "Candidates", False, hint="where the flange is at those that are usable"
+            )
             self._speed: Any = gui.add_number("Speed [deg/s, mm/s]", 60.0, min=0.1, max=1000.0, step=1.0)
             self._tour: Any = gui.add_button_group("Ways", ("drive", "stop"))
         self._run.on_click(window.action(self._plan))
@@ -98,6 +100,7 @@ class PlanPage:
         seen = self._seen()
         if seen != self._drawn:
             self._drawn = seen
+            self._jog().scene.show_line("ways", None)
             self._draw()
 
     # The fields --------------------------------------------------------------------------------------------------
@@ -141,7 +144,6 @@ class PlanPage:
         files = self._written()
         for name in ("predicted", "chosen", "candidates"):
             scene.show_points(name, None)
-        scene.show_line("ways", None)
         if scene.solid is None:
             return
         robot = scene.solid.robot

@@ -47,7 +47,8 @@ class JogViews:
         of = (id(arm.robot), arm.tip) if self.workspace.value else ()
         if of != self._of:
             self._of = of
-            self._scene.show_points("workspace", reached_points(arm.robot, arm.tip) if of else None, _REACHED)
+            points = reached_points(arm.robot, arm.tip) if of else None
+            self._scene.show_points("workspace", points, _REACHED, small=True)
 
     def _draw_loads(self, arm: Jogging) -> None:
         self._said.visible = bool(self.loads.value)

@@ -379,7 +379,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "wrench_at": "flange",
     },
     "inverse": _poses,
-    "robots": lambda _: {},
+    "robots": lambda _: {"text": "irb1200", "maker": "ABB", "axes": 6},
     "devices": lambda _: {},
     "axes": lambda folder: {"robot": "kr5", "data": _axis_runs(folder), "frame": "robot"},
     "tolerance": lambda folder: {"robot": _joint_errors(folder), "depth": 0.05, "lean": (1e-5,) * 6, "position": 1e-4},
@@ -422,6 +422,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "velocity": 0.5,
         "velocities": (50.0,),
         "loads": (100.0,),
+        "clearance": 0.02,
         "out": folder / "performance-plan",
     },
     "iso9283_simulate": lambda _: {

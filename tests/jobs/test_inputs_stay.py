@@ -126,6 +126,9 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "iso9283_plan": lambda folder: {
         "robot": _robot(folder),
         "slow_run": _written(folder / "slow.yaml", "{}"),
+        "constraints": _written(
+            folder / "c.yaml", f"truearm: truearm-constraints/1\n{_UNITS}limits: {{1: [-99, 99]}}\n"
+        ),
         "program": "rapid",
     },
     "iso9283_evaluate": lambda folder: {"compare": _written(folder / "other.json", "{}")},

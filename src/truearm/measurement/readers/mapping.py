@@ -22,6 +22,7 @@ from truearm.measurement.readers.mapping_entries import (
     SigmaRotEntry,
     TemperatureEntry,
     Text,
+    VisitEntry,
 )
 from truearm.modeling.controller import JointsOf
 from truearm.shown import counted
@@ -219,6 +220,7 @@ class MappingFile(Entry):
     sigma_rot: SigmaRotEntry | None = None
     missing: list[Text] = Field(default=[])
     order: OrderEntry | None = None
+    visit: VisitEntry | None = None
     temperature: TemperatureEntry | None = None
     confirmed: Annotated[bool, BeforeValidator(_yes_or_no)] = True
 
@@ -265,6 +267,8 @@ class MappingFile(Entry):
         used += [(column, entry) for (column, _), entry in shared.items()]
         if self.temperature is not None:
             used.append((self.temperature.column, "temperature.column"))
+        if self.visit is not None:
+            used.append((self.visit.column, "visit.column"))
         joints = [(column, f"joints.columns[{number}]") for number, column in enumerate(self.joints.columns, 1)]
         for group in [[*used, *joints]] if self.joints.file is None else [used, joints]:
             first: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Entries of a mapping file that stand for themselves: layout, orientations, deviations, order and temperature."""
+"""Entries of a mapping file that stand for themselves: layout, orientations, deviations, order and others."""
 
 from __future__ import annotations
 
@@ -173,19 +173,36 @@ _DAYS: Final = ("%d", "%j", "%c", "%x", "%u", "%w", "%a", "%A")
 
 
 class OrderEntry(Entry):
-    """What tells the order in which configurations were measured."""
+    """What tells the order in which configurations were measured; of two columns one has the day, one the time."""
 
     by: Literal["labels", "rows"] | None = None
     column: Column | None = None
+    columns: list[Column] | None = None
     time: Text | None = None
 
     @model_validator(mode="after")
     def _one(self) -> OrderEntry:
-        if (self.by is None) == (self.column is None):
-            raise ValueError("give either by: labels, by: rows, or column: NAME")
-        if self.time is not None and self.column is None:
+        if sum(given is not None for given in (self.by, self.column, self.columns)) != 1:
+            raise ValueError("give either by: labels, by: rows, column: NAME, or columns: [DAY, TIME]")
+        if self.time is not None and self.by is not None:
             raise ValueError("time is the format of a column; name it with column:")
+        if self.columns is not None:
+            if len(set(self.columns)) != 2 or len(self.columns) != 2:
+                raise InputError(
+                    "these are not one column with the day and one with the time",
+                    came=", ".join(self.columns) or "none",
+                    allowed="two different columns",
+                )
+            if self.time is None:
+                raise ValueError("two columns tell a day and a time: give their format, the two with a blank between")
         return self
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Return the columns that tell it, by their entries."""
+        if self.columns is not None:
+            return {f"columns[{number}]": column for number, column in enumerate(self.columns, 1)}
+        return {} if self.column is None else {"column": self.column}
 
     @validator_of("time")
     @classmethod
@@ -211,6 +228,12 @@ def _is_format(time: str) -> bool:
         return "%" in time and datetime.strptime(moment.strftime(time), time) != datetime(1900, 1, 1)
     except (ValueError, re.error):
         return False
+
+
+class VisitEntry(Entry):
+    """The column with the number of the visit on which a row was measured."""
+
+    column: Column
 
 
 class TemperatureEntry(Entry):

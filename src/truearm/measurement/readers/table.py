@@ -13,6 +13,7 @@ from truearm.errors import InputError, did_you_mean, nearest_names
 from truearm.files import exists, read_bytes, read_yaml
 from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.readers.canonical_rows import visits_of
 from truearm.measurement.readers.cells import Cells, read_cells
 from truearm.measurement.readers.columns import joints_in_file
 from truearm.measurement.readers.mapping import MappingFile, NamesEntry, name_pattern
@@ -27,11 +28,13 @@ from truearm.measurement.readers.row_values import (
     quaternions,
     refuse_second_header,
     temperatures,
+    uneven_deviations,
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.measurement.readers.sheets import is_workbook, read_sheet
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
+from truearm.notices import Notice
 from truearm.shown import counted
 
 
@@ -118,11 +121,18 @@ def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, jo
     InputError
         If a file cannot be used, or the mapping says that the joint positions are another's.
     """
+    return read_with(_files(path, mapping, joints), joints_are)[0]
+
+
+def read_noting(
+    path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None
+) -> tuple[Dataset, tuple[Notice, ...]]:
+    """Read a table as :func:`read_table` does, and say what data cannot hold of it."""
     return read_with(_files(path, mapping, joints), joints_are)
 
 
-def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
-    """Read a table with its mapping, see :func:`read_table`."""
+def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Dataset, tuple[Notice, ...]]:
+    """Read a table with its mapping, see :func:`read_noting`."""
     path, content, mapping = files.table, files.content, files.mapping
     whose = _whose(content.joints.are, joints_are, f"{mapping}, joints.are")
     cells = replace(_read(path, content.layout, f"{mapping}, layout"), absent=tuple(content.missing))
@@ -148,6 +158,10 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
     quaternion = quaternions(cells, content, mapping)
     sigma, sigma_rot = (deviations(cells, content, mapping, name) for name in ("sigma", "sigma_rot"))
 
+    visit = None
+    if content.visit is not None:
+        visit = np.repeat(visits_of(cells, place_of(cells, content.visit.column, mapping, "visit.column")), entries)
+
     reference = _is_reference(targets, content.references, f"{mapping}, references")
     absent = np.setdiff1d(np.arange(len(configurations.labels)), of_row)
     kept = list(dict.fromkeys(compress(targets, ~reference)))
@@ -167,12 +181,15 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
         quaternion=None if quaternion is None else padded(quaternion),
         sigma=None if sigma is None else padded(sigma, same=content.sigma is not None),
         sigma_rot=None if sigma_rot is None else padded(sigma_rot, same=content.sigma_rot is not None),
+        visit=None if visit is None else np.concatenate([visit, np.full(added, visit[0])]),
         called=called_in(content),
     )
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
+    noticed = tuple(uneven_deviations(cells, content, mapping))
     if content.temperature is None:
-        return data
-    return replace(data, temperature=temperatures(cells, configurations, of_row, content.temperature, mapping))
+        return data, noticed
+    warm = temperatures(cells, configurations, of_row, content.temperature, mapping)
+    return replace(data, temperature=warm), noticed
 
 
 def files_read(path: Path, mapping: Path, joints: Path | None = None) -> tuple[Path, ...]:
@@ -198,10 +215,10 @@ def _order(cells: Cells, configurations: Configurations, of_row: IntArray, files
     entry = files.content.order
     if entry is None:
         return None
-    place = None if entry.column is None else place_of(cells, entry.column, files.mapping, "order.column")
+    places = [place_of(cells, column, files.mapping, f"order.{name}") for name, column in entry.names.items()]
     if entry.by == "rows" and files.joints is None:
         refuse_returns(cells, configurations.labels, of_row, f"{files.mapping}, order.by")
-    return measuring_order(entry, cells, place, configurations.labels, of_row, f"{files.mapping}, order")
+    return measuring_order(entry, cells, places, configurations.labels, of_row, f"{files.mapping}, order")
 
 
 def _read(path: Path, entry: LayoutEntry, where: str) -> Cells:
@@ -222,17 +239,27 @@ def _read(path: Path, entry: LayoutEntry, where: str) -> Cells:
             cure=f"Remove it, or name a workbook instead of {path}.",
         )
     encoding = "utf-8-sig" if entry.encoding == "utf-8" else entry.encoding
+    content = read_bytes(path)
     try:
-        text = read_bytes(path).decode(encoding)
+        text = content.decode(encoding)
     except (UnicodeError, LookupError) as error:
         raise InputError(
             f"the file is not {entry.encoding} text",
-            where=str(path),
+            where=f"{path}{_place_of_byte(content, error, entry.layout.delimiter)}",
             cure="Name its encoding in the mapping (layout.encoding), such as cp1252 or utf-16.",
         ) from error
     if not text.strip():
         raise InputError("the file is empty", where=str(path), cure="Check that it was exported whole.")
     return read_cells(text, str(path), entry.layout)
+
+
+def _place_of_byte(content: bytes, error: Exception, delimiter: str | None) -> str:
+    """Return the line and the cell of a byte that is no text, where bytes are signs."""
+    if not isinstance(error, UnicodeDecodeError) or error.encoding.startswith("utf-16"):
+        return ""
+    *above, before = content[: error.start].split(b"\n")
+    cell = "" if delimiter is None else f", cell {before.count(delimiter.encode()) + 1}"
+    return f", line {len(above) + 1}{cell}"
 
 
 def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells, dict[str, list[str]]]:

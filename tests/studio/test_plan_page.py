@@ -77,7 +77,8 @@ def test_a_plan_with_its_program_is_the_commands_byte_by_byte(
     for name in ("plan.csv", "plan.html", "plan-ways.csv", "sheet.html", "MEASURE.mod"):
         assert (folder / "plan" / name).read_bytes() == (folder / "by-command" / name).read_bytes(), name
     assert printed.splitlines()[0] in page._said.content
-    assert set(page._file.options) >= {"plan/sheet.html", "plan/MEASURE.mod", "plan/plan.csv", "plan/plan.html"}
+    wanted = {"plan/sheet.html", "plan/MEASURE.mod", "plan/plan.csv", "plan/plan.html"}
+    assert eventually(lambda: set(page._file.options) >= wanted)
 
 
 def test_fields_are_kept_are_undone_and_shown_again(studio: Studio) -> None:
@@ -128,9 +129,26 @@ def test_texts_that_cannot_be_are_refused_by_their_parameter(said: dict[str, Any
 
 
 def test_a_file_outside_the_folder_is_no_place_of_a_plan(studio: Studio) -> None:
-    for name in ("candidates_from", "accurate_at"):
+    for name in ("candidates_from", "accurate_at", "out"):
         with pytest.raises(InputError, match="no place in the project's folder"):
             studio.window.edit(plan={name: "../part.mod"})
+
+
+def test_a_plan_is_written_where_it_is_said(studio: Studio) -> None:
+    window, page = studio.window, page_of(studio)
+    (window.project.folder / "plan.csv").write_text("mine")
+    window.edit(plan={"poses": "8", "candidates": 40})
+    act(page._run)
+    assert window.wait(60.0)
+    assert eventually(lambda: "plan.csv" in said(studio))
+    assert (window.project.folder / "plan.csv").read_text() == "mine"
+    typed(studio, "out", "plans/first.csv")
+    act(page._run)
+    assert window.wait(60.0)
+    names = ("plans/first.csv", "plans/first.html", "plans/first-ways.csv")
+    assert eventually(lambda: page._file.options == names), said(studio)
+    assert f"Written: {', '.join(names)}" in page._said.content
+    assert [one.name for one in window.project.changes()] == ["plan.csv"]
 
 
 def test_the_ways_are_driven_from_home_and_shown_after_reopening(

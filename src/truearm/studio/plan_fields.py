@@ -41,11 +41,12 @@ class PlanFields(BaseModel):
     speed: _Text | None = None
     dwell: _Number | None = None
     wait: _Text | None = None
+    out: _Text | None = None
 
     @property
-    def out(self) -> str:
+    def place(self) -> str:
         """Where the plan is written in the project: a file, or a folder where a program drives it."""
-        return "plan.csv" if self.program is None else "plan"
+        return self.out or ("plan.csv" if self.program is None else "plan")
 
     def said(self, cell: str | None, constraints: str | None, payload: str | None) -> dict[str, Any]:
         """Return what is given to the command beside robot and poses, by the names of parameters, in its order.

@@ -71,17 +71,17 @@ def planned(
         found = plan(
             robot,
             poses=int(poses) if poses.isdecimal() else poses,  # type: ignore[arg-type]
-            out=fields.out,
+            out=fields.place,
             command=plan_command(robot, poses, said),
             progress=progress,
             **plan_arguments(robot, said),
         )
     made, base = found.made, found.made.robot.base
     if found.program is not None:
-        files = tuple(f"{fields.out}/{name}" for name in found.contents())
+        files = tuple(f"{fields.place}/{name}" for name in found.contents())
     else:
-        stem = Path(fields.out).stem
-        files = (fields.out, f"{stem}.html", *(() if found.tour is None else (f"{stem}-ways.csv",)))
+        stem = fields.place.removesuffix(Path(fields.place).suffix)
+        files = (fields.place, f"{stem}.html", *(() if found.tour is None else (f"{stem}-ways.csv",)))
     return Planned(
         Outcome(tuple(found.lines()), found.warnings, files),
         made.robot.forward(made.joints)[0],

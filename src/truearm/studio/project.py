@@ -370,7 +370,7 @@ def _check_paths(project: Project, settings: Settings) -> None:
         value = getattr(settings, name)
         if value is not None:
             project.path(value, name)
-    for name in ("candidates_from", "accurate_at"):
+    for name in ("candidates_from", "accurate_at", "out"):
         value = getattr(settings.plan, name)
         if value is not None:
             project.path(value, name)

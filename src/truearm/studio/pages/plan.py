@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from pathlib import PurePosixPath
 from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import exists
 from truearm.identification.solving.models import MODELS
 from truearm.manifest import MANIFEST
 from truearm.modeling.chain import Array
@@ -69,6 +69,7 @@ class PlanPage:
             fields.text("speed", "Speed [mm/s, %]", "highest one of the tip, and of the joints; 250,10 if not said")
             fields.number("dwell", "Dwell [s]", "how long it stands in each configuration; 2 if not said")
             fields.text("wait", "Wait", "what for then: time, operator, or input 3,300s; time if not said")
+        fields.text("out", "Write to", "plan.csv if not said; with a program a folder: plan")
         self._run = gui.add_button("Plan")
         self._said = gui.add_html(words.paragraph("There is no plan of this window yet."))
         self._enough = Picture(window, "How many poses are enough")
@@ -132,7 +133,8 @@ class PlanPage:
 
     def _done(self, found: Planned) -> None:
         self._planned, self._of = found, self._window.project.settings.robot
-        self._window.project.look(*found.outcome.files, MANIFEST, self._window.project.settings.plan.out)
+        place = PurePosixPath(found.outcome.files[0])
+        self._window.project.look(*found.outcome.files, str(place.parent / MANIFEST))
         self._said.content = words.lines([*found.outcome.lines, f"Written: {', '.join(found.outcome.files)}"])
         self._drawn = ()
 
@@ -170,7 +172,7 @@ class PlanPage:
         if self._tour.value == "stop":
             jog.stop()
             return
-        name = self._table().replace("plan.csv", "plan-ways.csv")
+        name = self._ways()
         if name not in self._written():
             raise InputError("there are no ways to drive yet", where=name, cure="Plan first.")
         joints = jog.play_file(name, float(self._speed.value), from_its_start=True)
@@ -184,21 +186,24 @@ class PlanPage:
     # The files ---------------------------------------------------------------------------------------------------
 
     def _table(self) -> str:
-        out = self._window.project.settings.plan.out
-        return out if out.endswith(".csv") else f"{out}/plan.csv"
+        plan = self._window.project.settings.plan
+        return plan.place if plan.program is None else f"{plan.place}/plan.csv"
+
+    def _ways(self) -> str:
+        return f"{self._table().removesuffix('.csv')}-ways.csv"
 
     def _written(self) -> list[str]:
         """Return the files of the plan: with a program all of their folder."""
-        out, project = self._window.project.settings.plan.out, self._window.project
-        if out.endswith(".csv"):
-            names = [out, out.replace(".csv", ".html"), out.replace(".csv", "-ways.csv")]
-            return [name for name in names if exists(project.path(name))]
-        return [name for name in project.names() if name.startswith(f"{out}/")]
+        plan, project = self._window.project.settings.plan, self._window.project
+        if plan.program is None:
+            names = [plan.place, f"{plan.place.removesuffix('.csv')}.html", self._ways()]
+            return [name for name in names if project.path(name).is_file()]
+        return [name for name in project.names() if name.startswith(f"{plan.place}/")]
 
     def _seen(self) -> tuple[Any, ...]:
         """Return what is drawn: of which plan and which robot."""
         path = self._window.project.path(self._table())
-        stamp = path.stat().st_mtime_ns if exists(path) else None
+        stamp = path.stat().st_mtime_ns if path.is_file() else None
         scene = self._jog().scene
         return (id(self._planned), stamp, self._table(), None if scene.solid is None else id(scene.solid))
 

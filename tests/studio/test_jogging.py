@@ -123,11 +123,6 @@ def test_all_branches_lead_to_the_pose(arm: Jogging) -> None:
         assert turned == pytest.approx(R, abs=1e-9)
 
 
-def test_branches_without_names_are_refused_in_words() -> None:
-    with pytest.raises(InputError, match="branches have no names"):
-        Jogging(load_robot("fr3")).branches()
-
-
 @pytest.mark.parametrize("name", ["irb120", "katana450", "li3", "fr3"])
 def test_the_singular_value_is_that_of_inverse_kinematics(name: str) -> None:
     robot = load_robot(name)

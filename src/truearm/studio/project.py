@@ -16,6 +16,7 @@ from truearm.limits import refuse_beyond
 from truearm.manifest import MANIFEST, hash_of
 from truearm.printable import is_one_line
 from truearm.schemas import validated
+from truearm.studio.plan_fields import PlanFields
 from truearm.writing import put_back_old, writable_folder, write_files, write_text
 
 #: What makes a folder a project.
@@ -51,6 +52,14 @@ class Settings(BaseModel):
         Likewise.
     corrected
         Folder of the corrected program.
+    constraints
+        File of boxes to keep clear of and of what else a configuration must keep; None for none.
+    path
+        File of a path that the arm follows in the scene; None for none yet.
+    meshes
+        URDF whose meshes show the robot; None for the robot's own, if it is one.
+    plan
+        What the page Plan says.
     dark
         Whether the window is dark.
     """
@@ -70,6 +79,10 @@ class Settings(BaseModel):
     taught: tuple[_Name, ...] | None = None
     controller_kinematics: _Name | None = None
     corrected: _Name = "result/corrected"
+    constraints: _Name | None = None
+    path: _Name | None = None
+    meshes: _Name | None = None
+    plan: PlanFields = PlanFields()
     dark: bool = False
 
     def text(self) -> str:
@@ -79,13 +92,12 @@ class Settings(BaseModel):
 
         stream, yaml = StringIO(), YAML()
         yaml.default_flow_style = False
-        said = {name: list(value) if isinstance(value, tuple) else value for name, value in self if value is not None}
-        yaml.dump(said, stream)
+        yaml.dump(self.model_dump(mode="json", exclude_none=True), stream)
         return str(stream.getvalue())
 
 
 #: Settings that name a file of the folder, or a folder in it.
-_PATHS: Final = ("data", "result", "program", "cell", "corrected")
+_PATHS: Final = ("data", "result", "program", "cell", "corrected", "constraints", "path", "meshes")
 
 
 @dataclass(frozen=True)
@@ -356,6 +368,10 @@ def _check_paths(project: Project, settings: Settings) -> None:
 
     for name in _PATHS:
         value = getattr(settings, name)
+        if value is not None:
+            project.path(value, name)
+    for name in ("candidates_from", "accurate_at", "out"):
+        value = getattr(settings.plan, name)
         if value is not None:
             project.path(value, name)
     if settings.robot not in library():

@@ -16,6 +16,7 @@ from truearm.limits import refuse_beyond
 from truearm.manifest import MANIFEST, hash_of
 from truearm.printable import is_one_line
 from truearm.schemas import validated
+from truearm.studio.measure_fields import MeasureFields
 from truearm.studio.plan_fields import PlanFields
 from truearm.writing import put_back_old, writable_folder, write_files, write_text
 
@@ -88,6 +89,8 @@ class Settings(BaseModel):
         URDF whose meshes show the robot; None for the robot's own, if it is one.
     plan
         What the page Plan says.
+    measure
+        What the page Measure says.
     performance
         Files of tests by ISO 9283.
     dark
@@ -114,6 +117,7 @@ class Settings(BaseModel):
     path: _Name | None = None
     meshes: _Name | None = None
     plan: PlanFields = PlanFields()
+    measure: MeasureFields = MeasureFields()
     performance: TestedFiles = TestedFiles()
     dark: bool = False
 
@@ -125,8 +129,9 @@ class Settings(BaseModel):
         stream, yaml = StringIO(), YAML()
         yaml.default_flow_style = False
         said = self.model_dump(mode="json", exclude_none=True)
-        if self.performance == TestedFiles():
-            del said["performance"]
+        for name, unsaid in (("measure", MeasureFields()), ("performance", TestedFiles())):
+            if getattr(self, name) == unsaid:
+                del said[name]
         yaml.dump(said, stream)
         return str(stream.getvalue())
 
@@ -457,6 +462,10 @@ def _check_paths(project: Project, settings: Settings) -> None:
             project.path(value, name)
     for name in ("candidates_from", "accurate_at", "out"):
         value = getattr(settings.plan, name)
+        if value is not None:
+            project.path(value, name)
+    for name in ("plan", "truth", "watch", "mapping", "about", "out"):
+        value = getattr(settings.measure, name)
         if value is not None:
             project.path(value, name)
     for name in _TESTED:

@@ -137,6 +137,15 @@ class Window:
             if self.gate.is_working(connection):
                 client.add_notification("Refused", text, color="red", auto_close_seconds=20)
 
+    def show_once(self, title: str, texts: Sequence[str]) -> None:
+        """Show something to the window that works, and nowhere else: it is not kept, and not among the notices."""
+        for client, connection in [*self._windows.values()]:
+            if self.gate.is_working(connection):
+                modal = client.gui.add_modal(title)
+                with modal:
+                    client.gui.add_html(words.lines(texts))
+                    client.gui.add_button("Close").on_click(lambda _, modal=modal: modal.close())  # type: ignore[misc]
+
     def start(
         self,
         title: str,
@@ -212,6 +221,10 @@ class Window:
     def stopped(self) -> bool:
         """Whether nothing is served any more."""
         return self._stopped.is_set()
+
+    def rest(self, seconds: float) -> None:
+        """Do nothing for some time, or until nothing is served any more."""
+        self._stopped.wait(seconds)
 
     def wait(self, seconds: float) -> bool:
         """Wait for the long action to end; return whether it has, for tests."""

@@ -24,14 +24,14 @@ from truearm.studio.measure_fields import MeasureFields, measure_arguments, meas
 from truearm.studio.project import Project
 
 #: Of points that are set aside, and of points of which nothing says how they were taken.
-ASIDE: Final = (214, 69, 61)
+ASIDE: Final = (205, 60, 180)
 UNTOLD: Final = (70, 130, 180)
 #: Lines of sight: to a target that is next, to one that is hidden, to one of which nothing is asked any more.
 _NEXT: Final = (46, 160, 67)
 _HIDDEN: Final = (214, 69, 61)
 _OTHER: Final = (150, 158, 170)
 #: What stands above the columns of the last readings.
-HEAD: Final = ("no.", "at", "point", "deviation [mm]", "settling [mm]", "breaks", "what became of it")
+HEAD: Final = ("no.", "at", "point", "dev. [mm]", "settling [mm]", "breaks", "became")
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +90,14 @@ class Measuring:
         settings = project.settings
         self.fields: MeasureFields = settings.measure
         self._project, self._robot = project, robot
+        self._called, self._source = settings.robot, project.robot_source()
+        self._said = self.fields.said(settings.payload)
         self._about = self._about_text()
-        self.campaign: OpenCampaign = self._opened(settings.robot, settings.payload)
-        self._how = (settings.robot, settings.payload)
+        self.campaign: OpenCampaign = self._opened()
 
-    def _opened(self, robot: str, payload: str | None) -> OpenCampaign:
-        project, fields = self._project, self.fields
-        plan, said = fields.planned(), fields.said(payload)
+    def _opened(self) -> OpenCampaign:
+        project, fields, said = self._project, self.fields, self._said
+        plan = fields.planned()
         given = measure_arguments(said)
         for name in ("watch", "about"):
             if name in given:
@@ -106,9 +107,9 @@ class Measuring:
                 given[name] = project.path(given[name], name)
         return open_campaign(
             project.path(plan, "plan"),
-            project.robot_source(),
+            self._source,
             project.path(fields.out, "out"),
-            command=measure_command(plan, robot, said),
+            command=measure_command(plan, self._called, said),
             **given,
         )
 
@@ -131,11 +132,11 @@ class Measuring:
             return []
         return [f"{HOST} port {source.port}", f"token {source.token}"]
 
-    def step(self, most: int = 1) -> tuple[tuple[Entry, ...], list[str]]:
-        """Take what has come, of a virtual instrument up to some readings; return it, and what could not be read."""
+    def step(self, most: int) -> tuple[tuple[Entry, ...], list[str]]:
+        """Take up to some readings of those that have come; return them, and what could not be read."""
         entries: list[Entry] = []
         for _ in range(most if self.is_virtual else 1):
-            entries += self.campaign.step()
+            entries += self.campaign.step(most=most)
         return tuple(entries), self.campaign.source.told()
 
     def finish(self) -> Measured:
@@ -155,7 +156,7 @@ class Measuring:
         now = self._about_text()
         if now != self._about:
             self.campaign.close()
-            self.campaign, self._about = self._opened(*self._how), now
+            self.campaign, self._about = self._opened(), now
 
     @property
     def data(self) -> str:
@@ -194,6 +195,11 @@ class Measuring:
         """Return the last entries, the newest first, as the rows of a table."""
         session = self.campaign.session
         return [_row(entry, session.reason_of(entry)) for entry in reversed(session.entries[-most:])]
+
+    def last_words(self) -> str:
+        """Return the last entry with all its figures and words, as the command prints it; empty before the first."""
+        entries = self.campaign.session.entries
+        return entries[-1].line().strip() if entries else ""
 
     def reasons(self) -> list[Sequence[object]]:
         """Return how many readings are not kept, for each reason with its meaning."""
@@ -261,13 +267,12 @@ def _row(entry: Entry, reason: str) -> Sequence[object]:
     if reading is not None:
         figures = [_mm(reading.deviation), _mm(reading.settling), reading.breaks or ""]
     if entry.event == "aside":
-        became = f"reading {entry.of} set aside by the operator"
-    elif not reason:
-        became = "kept"
+        became = f"takes back {entry.of}"
+    elif entry.event == "left":
+        became = "left out"
     else:
-        became = f"{'left out' if entry.event == 'left' else 'set aside'}: {REASONS[reason]}"
-    words = f" ({entry.words})" if entry.words and (entry.reason == reason) else ""
-    return (entry.number, entry.label or "?", entry.name, *figures, became + words)
+        became = f"aside: {reason}" if reason else "kept"
+    return (entry.number, entry.label or "?", entry.name, *figures, became)
 
 
 def _mm(length: float | None) -> str:

@@ -247,8 +247,13 @@ class Scene:
         size
             By the length of the arm.
         """
-        self._clear(name)
         if points is None or not len(points):
+            self._clear(name)
+            return
+        if known := self._parts.get(name):  # one that is taken away and drawn again flickers
+            with self._server.atomic():
+                known[0].points, known[0].colors = points.astype(np.float32), np.asarray(colours, np.uint8)
+                known[0].point_size = size * self.length
             return
         shown = self._scene.add_point_cloud(
             f"/{name}",
@@ -268,12 +273,17 @@ class Scene:
         colours
             One for all, or one each ``(n, 3)`` from 0 to 255.
         """
-        self._clear(name)
         if segments is None or not len(segments):
+            self._clear(name)
             return
         # What viser takes for the colour of a line is proportional to its light.
         light = (255.0 * (np.asarray(colours, float) / 255.0) ** 2.2).astype(np.uint8)
         each = np.ascontiguousarray(np.broadcast_to(light.reshape(-1, 1, 3), (len(segments), 2, 3)))
+        if (known := self._parts.get(name)) and known[0].points.shape == segments.shape:
+            with self._server.atomic():
+                known[0].points, known[0].colors = segments.astype(np.float32), each
+            return
+        self._clear(name)
         shown = self._scene.add_line_segments(
             f"/{name}", segments.astype(np.float32), each, thickness=0.005 * self.length
         )
@@ -296,6 +306,11 @@ class Scene:
 
     def show_names(self, name: str, places: Mapping[str, Array]) -> None:
         """Write words at places [m] in the world; none take them away."""
+        if len(known := self._parts.get(name, [])) == len(places):
+            with self._server.atomic():
+                for label, (words, place) in zip(known, places.items(), strict=True):
+                    label.text, label.position = words, place
+            return
         self._clear(name)
         for number, (words, place) in enumerate(places.items()):
             self._parts[name].append(self._scene.add_label(f"/{name}/{number}", words, position=place))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
@@ -10,6 +11,7 @@ from truearm.files import confined_reads, exists
 from truearm.measurement.measuring.reading_log import LOG
 from truearm.notices import Notice
 from truearm.reporting.measure_figures import drift_figure, quality_figure
+from truearm.results.measured import DATA, PAGE
 from truearm.shown import counted
 from truearm.studio import words
 from truearm.studio.measure_fields import SOURCES
@@ -24,6 +26,9 @@ from truearm.studio.window import Window
 #: So often a source is asked [s], and in every so manyth of these turns the pictures are drawn anew.
 _TURN: Final = 0.2
 _PICTURES: Final = 10
+#: So many readings of a real instrument are taken in a turn, and so many of those that could not be read are told.
+_MOST: Final = 20
+_TOLD: Final = 5
 #: So many of the last readings stand in the table.
 _ROWS: Final = 12
 _RULE: Final = (
@@ -92,12 +97,13 @@ class MeasurePage:
         gui, fields = self._window.gui, self.fields
         with self._of_source["virtual instrument"]:
             fields.choice("device", "Device", list(VIRTUAL), "that reads where targets are", none=None)
-            fields.text("truth", "Truth", "the twin that is measured, or a file of it; random if not said")
-            fields.number("noise", "Noise [mm]", "of a coordinate; that of the device if not said")
-            fields.number("seed", "Seed", "of all that is drawn", optional=False, whole=True)
-            fields.number("disturbed", "Disturbed", "share of readings that go wrong, up to 0.9")
-            fields.number("drift", "Drift [mm]", "how far the instrument moves till the end")
             self._pace: Any = gui.add_slider("Readings a second", 1, 50, 1, 5)
+            with gui.add_folder("What it measures, and how well", expand_by_default=False):
+                fields.text("truth", "Truth", "the twin that is measured, or a file of it; random if not said")
+                fields.number("noise", "Noise [mm]", "of a coordinate; that of the device if not said")
+                fields.number("seed", "Seed", "of all that is drawn", optional=False, whole=True)
+                fields.number("disturbed", "Disturbed", "share of readings that go wrong, up to 0.9")
+                fields.number("drift", "Drift [mm]", "how far the instrument moves till the end")
         with self._of_source["watched folder"]:
             fields.text("watch", "Folder", "of the project, into which software writes rows: its name")
             fields.text("mapping", "Mapping", "what the columns mean: a file of the project, or a known program's name")
@@ -123,7 +129,9 @@ class MeasurePage:
             folder.visible = source == said.source
         self._show()
         self._pictures()
+        first = [f"{said.out}/{name}" for name in (DATA, PAGE)]
         files = [name for name in self._window.project.names() if name.startswith(f"{said.out}/")]
+        files.sort(key=lambda name: first.index(name) if name in first else len(first))
         self._file.visible = self._download.visible = bool(files)
         if files:
             offer(self._file, files, self._file.value if self._file.value in files else files[0], None)
@@ -164,20 +172,30 @@ class MeasurePage:
                 try:
                     self._taken(measuring)
                 except InputError as error:
-                    self._close()
-                    self._window.refuse(error)
-                    self._window.refresh()
+                    self._given_up(error)
+                    return
+                except Exception as error:  # it is told, and its place is on standard error
+                    traceback.print_exc()
+                    what = f"this failed in an unforeseen way ({type(error).__name__}: {error})"
+                    cure = "Run 'truearm measure' on the same files, and report what it says."
+                    self._given_up(InputError(what, cure=cure))
                     return
             self._window.rest(_TURN)
 
+    def _given_up(self, error: InputError) -> None:
+        self._close()
+        self._window.refuse(error)
+        self._window.refresh()
+
     def _taken(self, measuring: Measuring) -> None:
         """Take what has come, show it, and write the files once all is measured."""
-        self._due = min(self._due + float(self._pace.value) * _TURN, 50.0)
-        most = int(self._due) if measuring.is_virtual else 1
-        self._due -= most
-        entries, told = measuring.step(most) if most else ((), [])
-        for text in told:
-            self._window.tell(Notice("not-taken", text, "warning"))
+        self._due += float(self._pace.value) * _TURN
+        most = int(self._due) if measuring.is_virtual else _MOST
+        self._due %= 1.0
+        entries, told = measuring.step(most)
+        if told:
+            more = f" and {len(told) - _TOLD} more" if len(told) > _TOLD else ""
+            self._window.tell(Notice("not-taken", f"{' '.join(told[:_TOLD])}{more}", "warning"))
         if not measuring.is_virtual or entries:
             self._noted()
         self._turn += 1
@@ -276,13 +294,16 @@ class MeasurePage:
         kept = f"{done} of {of} steps done; {counted(len(session.kept), 'reading')} kept."
         self._next.content = "".join(words.paragraph(text) for text in [*measuring.next_words(), kept])
         reasons = measuring.reasons()
-        self._last.content = words.table(HEAD, measuring.rows(_ROWS)) + (
-            words.table(("readings", "why not kept", "what it means"), reasons) if reasons else ""
+        self._last.content = (
+            words.paragraph(measuring.last_words())
+            + words.table(HEAD, measuring.rows(_ROWS))
+            + (words.table(("readings", "why not kept", "what it means"), reasons) if reasons else "")
         )
         warnings = [one for one in measuring.measured().warnings if one.code != "unfinished"]
         self._notices.content = words.notices(warnings)
         step = session.next
-        offer(self._point, () if step is None else step.names, None)
+        points = (NONE,) if step is None else step.names
+        offer(self._point, points, self._point.value if self._point.value in points else points[0], None)
         self.scene.show(measuring)
 
     def _before_start(self) -> str:

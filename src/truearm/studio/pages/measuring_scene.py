@@ -14,12 +14,13 @@ from truearm.studio.window import Window
 
 _LEGEND: Final = (
     "Readings that are kept go from dark (they scatter by nothing) to yellow (by as much as is allowed), blue where "
-    "nothing says how they were taken; red ones are set aside. Lines of sight are green to what is next, and red to "
+    "nothing says how they were taken; violet ones are set aside. Lines of sight are green to what is next, and red to "
     "what the instrument does not see."
 )
 _KEPT, _ASIDE, _LINES, _NAMES = "measured-kept", "measured-aside", "measured-sight", "measured-names"
 #: Of a point, by the length of the arm.
 _SIZE: Final = 0.01
+_ASIDE_SIZE: Final = 0.014
 
 
 class MeasuringScene:
@@ -51,7 +52,7 @@ class MeasuringScene:
 
         points = measuring.points() if self._points.value else None
         scene.show_points(_KEPT, None if points is None else in_scene(points.kept), *_colours(points), _SIZE)
-        scene.show_points(_ASIDE, None if points is None else in_scene(points.aside), ASIDE, _SIZE)
+        scene.show_points(_ASIDE, None if points is None else in_scene(points.aside), ASIDE, _ASIDE_SIZE)
         step = measuring.campaign.session.next
         at = -1 if step is None else step.configuration
         joints = measuring.campaign.joints

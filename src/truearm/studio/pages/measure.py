@@ -134,7 +134,8 @@ class MeasurePage:
         files.sort(key=lambda name: first.index(name) if name in first else len(first))
         self._file.visible = self._download.visible = bool(files)
         if files:
-            offer(self._file, files, self._file.value if self._file.value in files else files[0], None)
+            chosen_now = self._file.value in files and self._file.options[0] == files[0]
+            offer(self._file, files, self._file.value if chosen_now else files[0], None)
 
     def _now(self) -> dict[str, Any]:
         return self._window.project.settings.measure.model_dump()

@@ -32,7 +32,14 @@ from truearm.studio.serving import Studio
 from truearm.studio.window import Window
 
 FILES = ("measuring.json", "readings.csv", "measurements.csv", "measure.html", "truearm.manifest.json")
-ARM = {"plan": "plan.csv", "device": "measurement-arm", "nests": "n1, n2", "every": 2, "disturbed": 0.3, "seed": 4}
+ARM: dict[str, Any] = {
+    "plan": "plan.csv",
+    "device": "measurement-arm",
+    "nests": "n1, n2",
+    "every": 2,
+    "disturbed": 0.3,
+    "seed": 4,
+}
 MAPPING = """\
 truearm: truearm-mapping/1
 configuration: {column: Pose}
@@ -89,7 +96,7 @@ def session(page: MeasurePage) -> Any:
 def frozen(page: MeasurePage, entries: int) -> None:
     """Start, and take no more than some readings: nothing comes by itself."""
     page._pace._impl.value = 5  # one in a turn
-    page._run = lambda _: None  # type: ignore[method-assign]
+    page._run = lambda measuring: None  # type: ignore[method-assign]
     act(page._begin)
     with page._window.lock:
         for _ in range(entries):
@@ -154,7 +161,9 @@ def test_what_is_next_and_what_came_is_said_and_drawn(page: MeasurePage) -> None
     assert len(parts["measured-kept"][0].points) == drawn.kept.sum()
     assert len(parts["measured-aside"][0].points) == (~drawn.kept).sum()
     assert tuple(parts["measured-aside"][0].colors.tolist()) == ASIDE
-    base = going(page).campaign.placed.base
+    placed = going(page).campaign.placed
+    assert placed is not None
+    base = placed.base
     first = drawn.position[np.flatnonzero(drawn.kept)[0]]
     at = base.rotation.T @ (first - np.array(base.translation))
     assert parts["measured-kept"][0].points[0] == pytest.approx(at, abs=1e-5)

@@ -75,7 +75,7 @@ class MeasurePage:
             fields.text("out", "Write to", "a folder of the project, for log, measurements and report")
         self._begin = gui.add_button("Start")
         self._stop: Any = gui.add_button_group("Measuring", ("stop", "finish"), visible=False)
-        self._bar = gui.add_progress_bar(0.0, visible=False)
+        self._bar: Any = gui.add_progress_bar(0.0, visible=False)
         self._next = gui.add_html("")
         self._last = gui.add_html("")
         with gui.add_folder("By the operator's word", visible=False) as self._by_hand:

@@ -51,8 +51,12 @@ class MeasuringScene:
             return np.asarray(points @ base.rotation.T + np.array(base.translation))
 
         points = measuring.points() if self._points.value else None
-        scene.show_points(_KEPT, None if points is None else in_scene(points.kept), *_colours(points), _SIZE)
-        scene.show_points(_ASIDE, None if points is None else in_scene(points.aside), ASIDE, _ASIDE_SIZE)
+        if points is None:
+            scene.show_points(_KEPT, None)
+            scene.show_points(_ASIDE, None)
+        else:
+            scene.show_points(_KEPT, in_scene(points.kept), points.colours, _SIZE)
+            scene.show_points(_ASIDE, in_scene(points.aside), ASIDE, _ASIDE_SIZE)
         step = measuring.campaign.session.next
         at = -1 if step is None else step.configuration
         joints = measuring.campaign.joints
@@ -60,7 +64,10 @@ class MeasuringScene:
             jog.go_to_joints(joints[at])
         self._at = at
         lines = measuring.lines_of_sight() if self._lines.value else None
-        scene.show_lines(_LINES, None if lines is None else in_scene(lines.segments), *_colours(lines))
+        if lines is None:
+            scene.show_lines(_LINES, None)
+        else:
+            scene.show_lines(_LINES, in_scene(lines.segments), lines.colours)
         names = {} if lines is None else lines.names
         scene.show_names(_NAMES, {words.one_line(name): in_scene(place) for name, place in names.items()})
 
@@ -68,7 +75,3 @@ class MeasuringScene:
         self._at = -1
         if self._measuring is not None:
             self.show(self._measuring)
-
-
-def _colours(drawn: Any) -> tuple[Any, ...]:
-    return ((0, 0, 0),) if drawn is None else (drawn.colours,)

@@ -372,8 +372,9 @@ def test_what_it_was_measured_with_is_asked_for_and_written(page: MeasurePage, t
     assert file.read_text() == text
     page._window._undo_edit()
     assert file.read_text().count("temperature: 20.5") == 1
-    ask(page, plan="plan.csv", device="measurement-arm", about="about.yaml")
+    ask(page, plan="plan.csv", device="measurement-arm")
     frozen(page, 3)
+    ask(page, **{**page._now(), "about": "about.yaml"})
     with_it._when._impl.value, with_it._air["temperature"]._impl.value = "at the end", "22.5"
     act(with_it._add)
     act(page._stop, "finish")

@@ -91,6 +91,7 @@ class Measuring:
         self.fields: MeasureFields = settings.measure
         self._project, self._robot = project, robot
         self._called, self._source = settings.robot, project.robot_source()
+        self._payload = settings.payload
         self._said = self.fields.said(settings.payload)
         self._about = self._about_text()
         self.campaign: OpenCampaign = self._opened()
@@ -152,9 +153,12 @@ class Measuring:
         return replace(found, plan=self.fields.planned(), instrument=found.instrument.replace(here, ""), told=told)
 
     def with_what_is_said_now(self) -> None:
-        """Open it again if the file of serial numbers and air was changed since."""
+        """Open it again if the file of serial numbers and air is another one, or was changed since."""
+        about, before = self._project.settings.measure.about, self.fields
+        self.fields = before.model_copy(update={"about": about})
         now = self._about_text()
-        if now != self._about:
+        if now != self._about or self.fields != before:
+            self._said = self.fields.said(self._payload)
             self.campaign.close()
             self.campaign, self._about = self._opened(), now
 

@@ -23,9 +23,9 @@ _LABELS: Final = {
     "reflector_offset": ("Its offset [mm]", "of its centre from where the nest holds it"),
 }
 _AIR_LABELS: Final = {
-    "temperature": "Temperature [degC]",
-    "pressure": "Pressure [hPa]",
-    "humidity": "Humidity [percent]",
+    "temperature": ("Air [degC]", "its temperature"),
+    "pressure": ("Air [hPa]", "its pressure"),
+    "humidity": ("Air [percent]", "its humidity"),
 }
 
 
@@ -51,7 +51,9 @@ class MeasuredWith:
                 add(name, label, hint)
             with gui.add_folder("The air, as often as it is read"):
                 self._when: Any = gui.add_text("When", "start")
-                self._air: dict[str, Any] = {name: gui.add_text(_AIR_LABELS[name], "") for name in AIR}
+                self._air: dict[str, Any] = {
+                    name: gui.add_text(_AIR_LABELS[name][0], "", hint=_AIR_LABELS[name][1]) for name in AIR
+                }
                 self._add = gui.add_button("Add the reading of the air")
             self._said = gui.add_html("")
         self._add.on_click(window.action(self._add_air))

@@ -277,7 +277,10 @@ class Jogging:
         It is 0 in a singular posture, and as ``ik`` has it for a whole pose.
         """
         jacobian = self.robot.joint_jacobian(self.at, self.tip)[0].copy()
-        jacobian[:3] /= reach(self.robot, self.tip)
+        length = reach(self.robot, self.tip)
+        if length == 0.0:  # all in one point: nothing moves it
+            return 0.0
+        jacobian[:3] /= length
         if self.orientation == "free":
             jacobian = jacobian[:3]
         elif self.orientation == "axis":

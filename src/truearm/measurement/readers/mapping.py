@@ -11,6 +11,7 @@ from truearm.errors import InputError
 from truearm.measurement.readers.mapping_entries import (
     AnglesEntry,
     Column,
+    DwellEntry,
     Entry,
     LayoutEntry,
     OrderEntry,
@@ -222,6 +223,7 @@ class MappingFile(Entry):
     order: OrderEntry | None = None
     visit: VisitEntry | None = None
     temperature: TemperatureEntry | None = None
+    dwell: DwellEntry | None = None
     confirmed: Annotated[bool, BeforeValidator(_yes_or_no)] = True
 
     @model_validator(mode="after")

@@ -241,3 +241,21 @@ class TemperatureEntry(Entry):
 
     column: Column
     unit: Literal["degC", "degF", "K"]
+
+
+class DwellEntry(Entry):
+    """Columns that say how a reading was taken: scatter and settling, number of samples, breaks of the beam."""
+
+    deviation: Column | None = None
+    settling: Column | None = None
+    unit: Literal["mm", "m", "um", "in"] | None = None
+    samples: Column | None = None
+    breaks: Column | None = None
+
+    @model_validator(mode="after")
+    def _units(self) -> DwellEntry:
+        if (self.unit is None) != (self.deviation is None and self.settling is None):
+            raise ValueError("unit belongs to deviation and settling: give both, or neither")
+        if not self.model_fields_set:
+            raise ValueError("give deviation, settling, samples or breaks")
+        return self

@@ -59,7 +59,7 @@ def measuring_order(
         return _by_labels(cells, labels, of_row, where)
     if entry.by == "rows" or not places:
         return np.arange(1, len(labels) + 1)
-    values = cells.values(places[0]) if entry.time is None else _times(cells, places, entry)
+    values = cells.values(places[0]) if entry.time is None else moments(cells, places, entry)
     first, last, row = _spans(values, of_row, len(labels))
     measured = np.flatnonzero(np.isfinite(first))
     if not len(measured):
@@ -138,7 +138,7 @@ def _where(cells: Cells, row: int, places: Sequence[int]) -> str:
     return " and ".join([cells.place(row, places[0]), *(cells.names[place] for place in places[1:])])
 
 
-def _moments(cells: Cells, places: Sequence[int], absent: set[str]) -> list[str]:
+def _texts_of_moments(cells: Cells, places: Sequence[int], absent: set[str]) -> list[str]:
     """Return the text of each moment, empty where there is none; a day and a time have a blank between them."""
     if len(places) == 1:
         return ["" if text in absent else text for text in cells.columns[places[0]]]
@@ -156,9 +156,9 @@ def _moments(cells: Cells, places: Sequence[int], absent: set[str]) -> list[str]
     return made
 
 
-def _times(cells: Cells, places: Sequence[int], entry: OrderEntry) -> Array:
+def moments(cells: Cells, places: Sequence[int], entry: OrderEntry) -> Array:
     """Return moments in seconds since some moment, ``(rows,)``, NaN where there is none."""
-    texts = _moments(cells, places, {"", *(cells.absent or ())})
+    texts = _texts_of_moments(cells, places, {"", *(cells.absent or ())})
     known: dict[str, datetime | None] = {"": None}
     for row, text in enumerate(texts):
         if text in known:

@@ -66,8 +66,8 @@ class TableFiles:
         return (self.table, *mapping, *(() if self.joints is None else (self.joints,)))
 
 
-def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
-    """Return the files of a table, or refuse a mapping that nobody confirmed."""
+def read_mapping(mapping: Path) -> MappingFile:
+    """Return what a mapping file, or a preset, says, or refuse one that nobody confirmed."""
     path = mapping_path(mapping)
     if not path.suffix and not exists(path):
         raise InputError(
@@ -86,6 +86,12 @@ def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
             allowed="yes",
             cure="Look at every line marked with a guess, correct it, and write confirmed: yes.",
         )
+    return content
+
+
+def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
+    """Return the files of a table, or refuse a mapping that nobody confirmed."""
+    path, content = mapping_path(mapping), read_mapping(mapping)
     named = content.joints.file
     if joints is not None and named is None:
         raise InputError(
@@ -135,28 +141,16 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
     """Read a table with its mapping, see :func:`read_noting`."""
     path, content, mapping = files.table, files.content, files.mapping
     whose = _whose(content.joints.are, joints_are, f"{mapping}, joints.are")
-    cells = replace(_read(path, content.layout, f"{mapping}, layout"), absent=tuple(content.missing))
-    found: dict[str, list[str]] = {}
-    if content.names is not None:
-        cells, found = _split_names(cells, content.names, mapping)
-    refuse_second_header(cells, content)
-    labels = found.get("configuration") or [str(number) for number in range(1, len(cells.lines) + 1)]
-    if content.configuration is not None and content.configuration.column is not None:
-        labels = list(cells.texts(place_of(cells, content.configuration.column, mapping, "configuration.column")))
+    cells, labels, found = _named_rows(_read(path, content.layout, f"{mapping}, layout"), content, mapping)
+    if labels is None:
+        labels = [str(number) for number in range(1, len(cells.lines) + 1)]
     configurations, of_row = _configurations(cells, labels, files, whose, joints_are)
-    targets = _targets(cells, content, found.get("target"), mapping)
+    rows = _mapped(cells, labels, found, content, mapping)
+    targets, position, quaternion = list(rows.targets), rows.position, rows.quaternion
+    sigma, sigma_rot = rows.sigma, rows.sigma_rot
     entries = len(content.readings)
-    position = np.stack(
-        [
-            numbers_of(cells, entry.position, content.length_unit, mapping, f"readings[{number}]")
-            for number, entry in enumerate(content.readings, 1)
-        ],
-        axis=1,
-    ).reshape(-1, 3)
     configuration = np.repeat(of_row, entries)
     lines = [line for line in cells.lines for _ in range(entries)]
-    quaternion = quaternions(cells, content, mapping)
-    sigma, sigma_rot = (deviations(cells, content, mapping, name) for name in ("sigma", "sigma_rot"))
 
     visit = None
     if content.visit is not None:
@@ -190,6 +184,78 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
         return data, noticed
     warm = temperatures(cells, configurations, of_row, content.temperature, mapping)
     return replace(data, temperature=warm), noticed
+
+
+@dataclass(frozen=True, eq=False)
+class MappedRows:
+    """What the rows of a table hold, row by row; a row has as many readings as the mapping has entries of them.
+
+    Attributes
+    ----------
+    cells
+        The rows, those to be skipped left out.
+    labels
+        Of each row's configuration, ``(rows,)``; None where every row is a configuration of its own.
+    targets
+        Of each reading, ``(readings,)``.
+    position
+        [m], ``(readings, 3)``, NaN where nothing is.
+    quaternion
+        (w, x, y, z) as the table has it, ``(readings, 4)``; None if there is none.
+    sigma, sigma_rot
+        Standard deviations [m], [rad], ``(readings,)``; None if the table has none.
+    """
+
+    cells: Cells
+    labels: tuple[str, ...] | None
+    targets: tuple[str, ...]
+    position: Array
+    quaternion: Array | None
+    sigma: Array | None
+    sigma_rot: Array | None
+
+
+def mapped_rows(cells: Cells, content: MappingFile, mapping: Path) -> MappedRows:
+    """Return what the rows of a table hold, whatever configurations there are.
+
+    Raises
+    ------
+    InputError
+        If a column is missing, or a cell cannot be what its column holds.
+    """
+    named, labels, found = _named_rows(cells, content, mapping)
+    return _mapped(named, labels, found, content, mapping)
+
+
+def _named_rows(
+    cells: Cells, content: MappingFile, mapping: Path
+) -> tuple[Cells, list[str] | None, dict[str, list[str]]]:
+    """Return the rows that are meant, their labels, None if they have none, and what the pattern finds in names."""
+    cells, found = replace(cells, absent=tuple(content.missing)), dict[str, list[str]]()
+    if content.names is not None:
+        cells, found = _split_names(cells, content.names, mapping)
+    refuse_second_header(cells, content)
+    labels = found.get("configuration")
+    if content.configuration is not None and content.configuration.column is not None:
+        labels = list(cells.texts(place_of(cells, content.configuration.column, mapping, "configuration.column")))
+    return cells, labels, found
+
+
+def _mapped(
+    cells: Cells, labels: list[str] | None, found: dict[str, list[str]], content: MappingFile, mapping: Path
+) -> MappedRows:
+    targets = _targets(cells, content, found.get("target"), mapping)
+    position = np.stack(
+        [
+            numbers_of(cells, entry.position, content.length_unit, mapping, f"readings[{number}]")
+            for number, entry in enumerate(content.readings, 1)
+        ],
+        axis=1,
+    ).reshape(-1, 3)
+    turned = quaternions(cells, content, mapping)
+    sigma, sigma_rot = (deviations(cells, content, mapping, name) for name in ("sigma", "sigma_rot"))
+    named = None if labels is None else tuple(labels)
+    return MappedRows(cells, named, tuple(targets), position, turned, sigma, sigma_rot)
 
 
 def files_read(path: Path, mapping: Path, joints: Path | None = None) -> tuple[Path, ...]:

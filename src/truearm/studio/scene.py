@@ -236,7 +236,7 @@ class Scene:
         self._parts[name] = [shown, self._scene.add_label(f"/{name}/words", arrows.words, position=place)]
 
     def show_points(
-        self, name: str, points: Array | None, colours: Colours = (70, 130, 180), *, small: bool = False
+        self, name: str, points: Array | None, colours: Colours = (70, 130, 180), size: float = 0.012
     ) -> None:
         """Draw points ``(n, 3)`` [m] in the world in one upload; None takes them away.
 
@@ -244,8 +244,8 @@ class Scene:
         ----------
         colours
             One for all, or one each ``(n, 3)`` from 0 to 255.
-        small
-            Whether what is among them shall be seen through them.
+        size
+            By the length of the arm.
         """
         self._clear(name)
         if points is None or not len(points):
@@ -254,7 +254,7 @@ class Scene:
             f"/{name}",
             points.astype(np.float32),
             np.asarray(colours, np.uint8),
-            point_size=(0.004 if small else 0.012) * self.length,
+            point_size=size * self.length,
             point_shape="circle",
             precision="float32",
         )

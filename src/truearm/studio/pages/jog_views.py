@@ -48,7 +48,7 @@ class JogViews:
         if of != self._of:
             self._of = of
             points = reached_points(arm.robot, arm.tip) if of else None
-            self._scene.show_points("workspace", points, _REACHED, small=True)
+            self._scene.show_points("workspace", points, _REACHED, size=0.004)
 
     def _draw_loads(self, arm: Jogging) -> None:
         self._said.visible = bool(self.loads.value)

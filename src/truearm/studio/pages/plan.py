@@ -168,7 +168,7 @@ class PlanPage:
                     joints = read_recorded(self._window.project.path(self._table()), robot).joints
                     scene.show_points("chosen", robot.forward(joints, frame="world")[0], _CHOSEN)
         if self._among.value and found is not None:
-            scene.show_points("candidates", in_world(found.candidates), _CANDIDATES, small=True)
+            scene.show_points("candidates", in_world(found.candidates), _CANDIDATES, size=0.004)
 
     def _driven(self) -> None:
         """Play the ways of the plan from its safe configuration, or stop."""

@@ -9,6 +9,7 @@ from truearm.jobs.show import show
 from truearm.library import library
 from truearm.studio import words
 from truearm.studio.pages.choices import offer
+from truearm.studio.uploads import Upload
 from truearm.studio.window import Window
 
 
@@ -31,7 +32,7 @@ class CellPage:
             self._about = gui.add_html("")
         self._robot.on_update(window.action(lambda: window.edit(robot=self._robot.value)))
         self._payload.on_update(window.settled(self._weigh))
-        self._upload.on_upload(window.action(self._take_in))
+        window.receive(self._upload, self._take_in)
 
     def refresh(self) -> None:
         """Show the robot of the settings, and the files of the folder."""
@@ -49,8 +50,7 @@ class CellPage:
     def _weigh(self) -> None:
         self._window.edit(payload=self._payload.value.strip() or None)
 
-    def _take_in(self) -> None:
-        file = self._upload.value
-        name = self._window.project.take_in(file.name, file.content)
-        self._window.tell_lines(f"Taken into the project: {name}", [f"{len(file.content)} bytes"])
+    def _take_in(self, file: Upload) -> None:
+        name = self._window.project.take_in(file.name, file.path)
+        self._window.tell_lines(f"Taken into the project: {name}", [f"{file.size} bytes"])
         self._window.refresh()

@@ -52,7 +52,8 @@ class Work:
     def cancel(self) -> None:
         """End it at once; what it was writing is put back by whatever writes there next."""
         self._cancelled = True
-        self._process.kill()
+        with suppress(ValueError):  # it has ended, and is closed
+            self._process.kill()
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until it has ended and its end is told; return whether it has."""
@@ -72,6 +73,7 @@ class Work:
                 outcome = content
                 break
         self._process.join()
+        self._process.close()  # its pipe would stay open until somebody collects it
         self._ended(None if self._cancelled else outcome)
 
 

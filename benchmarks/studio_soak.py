@@ -59,7 +59,9 @@ def calibrated(line: Line) -> bool:
     """Calibrate, and wait for the end."""
     line.give("Calibrate", True)
     said = "Calibrate: done in"
-    return line.until(lambda one: said in str(one.get("updates", {}).get("content", "")), 120.0)
+    done = line.until(lambda one: said in str(one.get("updates", {}).get("content", "")), 120.0)
+    line.quiet()  # the robots are drawn anew, and have other elements
+    return done
 
 
 def soak(moves: int, calibrations: int, reconnects: int) -> dict[str, Any]:

@@ -150,6 +150,7 @@ class Scene:
             for robot in (self.solid, self.ghost):
                 if robot is not None:
                     robot.move(at if robot.robot is of else at.joints)
+        self._server.flush()  # it would wait for others
 
     def show_tip(self, position: Array, rotation: Array) -> None:
         """Show the frame of the tip that is moved, in the world [m]."""

@@ -1,8 +1,8 @@
 """A long day of the studio: whether it grows, and whether a project survives that it is killed.
 
 ``python benchmarks/studio_soak.py [--moves N] [--calibrations N] [--reconnects N] [--kills N] [--out FILE]`` starts
-``truearm studio`` in a process of its own and opens a window beside it, without a browser. The window moves joints and
-the handle; between the moves it calibrates 20 simulated configurations, closes and comes again. Printed and kept is the
+``truearm studio`` in a process of its own and opens a window beside it, without a browser. The window moves joints;
+between the moves it calibrates 20 simulated configurations, closes and comes again. Printed and kept is the
 memory that the process holds (resident, and that of its own), how many nodes and elements the page has, threads and
 open files, from the 100th move on.
 

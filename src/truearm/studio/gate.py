@@ -29,6 +29,7 @@ from websockets.http11 import Request, Response
 
 from truearm.printable import printable, shortened
 from truearm.studio.access import Access
+from truearm.studio.first_page import complete
 from truearm.studio.uploads import Uploads
 
 #: A message of the window is small; files come in parts of half a megabyte.
@@ -98,6 +99,8 @@ class Gate:
                 response = self.access.entered()
             else:
                 response = theirs(connection, request)
+                if response is not None:
+                    complete(response)
             if response is not None:
                 self.access.close_up(request, response)
             return response

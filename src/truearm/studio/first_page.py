@@ -17,7 +17,7 @@ def complete(response: Response) -> None:
     """Put the script that speaks for browsers without WebGL before everything else in viser's page."""
     packed = response.headers.get("Content-Encoding") == "gzip"
     if response.headers.get("Content-Type", "").startswith("text/html"):
-        response.body = _completed(response.body, packed)
+        response.body = _completed(bytes(response.body), packed)
         del response.headers["Content-Length"]
         response.headers["Content-Length"] = str(len(response.body))
 

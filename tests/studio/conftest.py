@@ -32,7 +32,7 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
 
 @pytest.fixture(scope="session")
 def launch() -> Iterator[Callable[..., Any]]:
-    """Start Chromium without a screen: ``launch("--an-option")``; without one the tests in it are skipped, and say so."""
+    """Start Chromium without a screen, with options; without one the tests in it are skipped, and say so."""
     place = os.environ.get("CHROME") or next(
         (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
     )
@@ -47,5 +47,13 @@ def launch() -> Iterator[Callable[..., Any]]:
 def chromium(launch: Callable[..., Any]) -> Iterator[Any]:
     """A browser whose WebGL is SwiftShader's."""
     browser = launch("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="session")
+def blind(launch: Callable[..., Any]) -> Iterator[Any]:
+    """A browser in which WebGL is switched off: it shows everything but the scene, and quickly."""
+    browser = launch("--disable-gpu", "--disable-webgl", "--disable-webgl2", "--disable-3d-apis")
     yield browser
     browser.close()

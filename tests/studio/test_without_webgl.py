@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from typing import Any
 
-import pytest
 from tests.studio.conftest import Serving
 from tests.studio.talking import eventually, get
-
-
-@pytest.fixture
-def blind(launch: Callable[..., Any]) -> Iterator[Any]:
-    """A browser in which WebGL is switched off."""
-    browser = launch("--disable-gpu", "--disable-webgl", "--disable-webgl2", "--disable-3d-apis")
-    yield browser
-    browser.close()
 
 
 def test_without_webgl_it_says_so_and_pages_tables_and_edits_work(serving: Serving, blind: Any) -> None:
@@ -23,6 +13,7 @@ def test_without_webgl_it_says_so_and_pages_tables_and_edits_work(serving: Servi
     page = blind.new_page(viewport={"width": 1366, "height": 768})
     faults: list[str] = []
     page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
     page.goto(studio.access.entrance)
     page.get_by_role("tab", name="Cell").wait_for()
     assert page.title() == "truearm studio"

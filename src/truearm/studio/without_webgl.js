@@ -34,6 +34,7 @@
       getContextAttributes: () => ({ alpha: true, depth: true, stencil: false, antialias: false }),
       isContextLost: () => false,
       getSupportedExtensions: () => [],
+      getExtension: (name) => (name.startsWith("EXT_color_buffer_") ? {} : null),
       getParameter: parameter,
       getShaderPrecisionFormat: () => ({ rangeMin: 127, rangeMax: 127, precision: 23 }),
       getShaderParameter: () => true,

@@ -142,11 +142,11 @@ def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyP
     person.turn_to("Calibrate")
     person.press("Calibrate")
     person.page.get_by_role("button", name="Cancel").wait_for()
+    words = ["calibrate", "irb120", "measurements.csv", "--model", "elastic", "--payload", "2.7kg,50mm,25mm,100mm"]
+    printed = truearm(*words, "--out", tmp_path / "by-command").out  # at the same time
     person.wait_for("Written to result: ")
     said = person.shown()
     person.picture("calibrate")
-    words = ["calibrate", "irb120", "measurements.csv", "--model", "elastic", "--payload", "2.7kg,50mm,25mm,100mm"]
-    printed = truearm(*words, "--out", tmp_path / "by-command").out
     for line in printed.splitlines()[:-1]:
         figures = re.findall(r"\d+\.\d+ ?(?:mm|deg|%)?", line)
         assert all(figure in said for figure in figures), line
@@ -274,8 +274,8 @@ def with_the_scene_it_is_pictured(person: Person, chromium: Any) -> None:
     person.page.close()
     page = chromium.new_page(viewport={"width": _SIZES[0][0], "height": _SIZES[0][1]})
     one = Person(page, person.studio, person.pictures)
-    for name, sizes in (("Jog", _SIZES[:1]), ("Proof", _SIZES)):
+    for name in ("Jog", "Proof"):
         one.turn_to(name)
-        one.picture(f"{name.lower()}-scene", sizes)
+        one.picture(f"{name.lower()}-scene", _SIZES[:1])
     assert one.faults == []
     page.close()

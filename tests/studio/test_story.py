@@ -80,8 +80,18 @@ def eventually(true: Callable[[], bool]) -> bool:
     return true()
 
 
-#: Resolves once what is there has been drawn.
-_DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+#: Resolves once nothing moves any more, and it has been drawn.
+_DRAWN = """() => new Promise((done) => {
+  let before = "", still = 0;
+  const look = () => {
+    const shown = [...document.querySelectorAll("button, input, p, pre, td, svg")];
+    const now = JSON.stringify(shown.map((element) => element.getBoundingClientRect()));
+    still = now === before ? still + 1 : 0;
+    before = now;
+    still > 4 ? requestAnimationFrame(() => requestAnimationFrame(done)) : setTimeout(look, 40);
+  };
+  look();
+})"""
 #: The texts of elements that reach beyond the window, or are wider than what holds them.
 _BEYOND = """() => [...document.querySelectorAll("button, input, label, p, pre, td, th")]
   .filter((e) => e.offsetParent !== null && e.getBoundingClientRect().width > 0)

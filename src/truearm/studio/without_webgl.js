@@ -64,7 +64,7 @@
     said.id = "without-webgl";
     said.textContent = "This browser has no WebGL: the scene stays empty. Pages, tables and jobs work all the same.";
     said.style.cssText =
-      "position:fixed;left:15px;top:30%;max-width:30em;padding:0.6em 1em;background:#fff;color:#222;" +
+      "position:fixed;left:15px;top:30%;max-width:30em;padding:0.6em 1em;background:var(--mantine-color-body,#fff);color:var(--mantine-color-text,#222);" +
       "border-left:4px solid #c77700;font:15px sans-serif;z-index:100;pointer-events:none";
     document.body.append(said);
   });

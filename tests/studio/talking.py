@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import viser
 import zstandard
+from viser._messages import GuiHtmlMessage, GuiUpdateMessage
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
@@ -121,6 +122,17 @@ def working(studio: Studio, line: Any) -> None:
     """Let a window be the one that works."""
     send(line, **CAMERA)
     assert eventually(lambda: studio.window.gate.has_worker)
+
+
+def shown(studio: Studio) -> str:
+    """Return the HTML that a window shows which comes now."""
+    found = ""
+    for message in list(studio.window.server._websock_server._broadcast_buffer.message_from_id.values()):
+        if isinstance(message, GuiHtmlMessage):
+            found += message.props.content
+        elif isinstance(message, GuiUpdateMessage):
+            found += str(message.updates.get("content", ""))
+    return found
 
 
 def element(studio: Studio, label: str) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import socket
 import threading
 import time
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +26,18 @@ from tests.studio.talking import (
     is_closed,
     own,
     send,
+    shown,
     window,
     working,
 )
 
+from truearm.library import load_robot
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.transform import Transform
 from truearm.studio import gate as module
 from truearm.studio.access import Access, listening_socket
 from truearm.studio.gate import Gate, start_server
+from truearm.studio.project import PROJECT_FILE
 from truearm.studio.serving import Studio
 from truearm.studio.uploads import Uploads
 
@@ -109,7 +114,7 @@ def test_messages_that_no_window_sends_are_dropped(serving: Serving, kind: str) 
     assert alive(studio)
 
 
-def test_only_the_value_of_an_element_can_be_changed(serving: Serving) -> None:
+def test_only_the_value_of_an_element_can_be_changed_and_to_one_that_it_offers(serving: Serving) -> None:
     said: list[str] = []
     studio = serving(say=said.append)
     robot = element(studio, "Robot")
@@ -117,24 +122,85 @@ def test_only_the_value_of_an_element_can_be_changed(serving: Serving) -> None:
         working(studio, line)
         send(line, type="GuiUpdateMessage", uuid=robot, updates={"removed": True, "update_cb": []})
         assert eventually(lambda: any("otherwise" in text for text in said))
+        for value in ("../../etc/passwd", "/etc/passwd", "a\nb", "<script>alert(1)</script>"):
+            send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": value})
         send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": "kr5"})
         assert eventually(lambda: studio.window.project.settings.robot == "kr5")
-
-        def shown_value() -> Any:
-            return studio.window.gui._gui_input_handle_from_uuid[robot].value
-
-        def is_told(times: int) -> bool:
-            return bool(studio.window._notices.content.count("no place") == times)
-
-        for count, value in enumerate(("../../etc/passwd", "/etc/passwd", "C:\\x", "a\nb"), 1):
-            send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": value})
-            assert eventually(partial(is_told, count))
-            assert eventually(lambda: shown_value() == "kr5")  # what was refused is taken back before one types again
-        send(line, type="GuiUpdateMessage", uuid=robot, updates={"value": "<script>alert(1)</script>"})
-        assert eventually(lambda: "script" in studio.window.project.settings.robot)
-    shown = [getattr(one, "content", "") for one in studio.window.gui._gui_input_handle_from_uuid.values()]
-    assert "<script>" not in studio.window._notices.content + "".join(shown)
+    assert any("an element was to have a value that it cannot have" in text for text in said)
+    assert "etc" not in (studio.window.project.folder / PROJECT_FILE).read_text()
     assert alive(studio)
+
+
+@pytest.mark.parametrize("name", ["../../etc/passwd.csv", "/etc/passwd.csv", "C:\\x.csv", "a\nb.csv", "<script>.exe"])
+def test_a_name_that_is_typed_leads_nowhere_and_is_shown_as_it_is(serving: Serving, name: str) -> None:
+    studio = serving()
+    with window(studio) as line:
+        working(studio, line)
+        send(line, type="GuiUpdateMessage", uuid=element(studio, "File"), updates={"value": name})
+        refused = "a table of configurations" if name.endswith("exe") else "no place in the project&#x27;s folder"
+        assert eventually(lambda: refused in shown(studio))
+    assert "<script>" not in shown(studio)
+    assert [path.name for path in studio.window.project.folder.iterdir()] == [PROJECT_FILE]
+
+
+def test_values_of_no_kind_that_an_element_has_are_refused_and_harm_nothing(
+    serving: Serving, capfd: pytest.CaptureFixture[str]
+) -> None:
+    said: list[str] = []
+    studio = serving(say=said.append)
+    odd = [None, -1, 1e308, math.nan, "9" * 20_000, [], [1e3], ["a", "b", "c"], [math.inf] * 3, {"a": 1}, b"x", [[[]]]]
+    with window(studio) as line:
+        working(studio, line)
+        for uuid in [*studio.window.gui._gui_input_handle_from_uuid]:
+            for value in odd:
+                send(line, type="GuiUpdateMessage", uuid=uuid, updates={"value": value})
+        send(line, type="GuiUpdateMessage", uuid=element(studio, "Robot"), updates={"value": "kr5"})
+        assert eventually(lambda: studio.window.project.settings.robot == "kr5")
+        assert alive(studio)
+    assert any("an element was to have a value that it cannot have" in text for text in said)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        {"wxyz": [math.nan] * 4, "position": [0.0] * 3},
+        {"wxyz": [1.0, 0.0, 0.0, 0.0], "position": [math.inf] * 3},
+        {"wxyz": [1.0, 0.0], "position": [0.0] * 3},
+        {"wxyz": "none", "position": [0.0] * 3},
+        {"wxyz": [1.0, 0.0, 0.0, 0.0], "position": [{}, 0.0, 0.0]},
+    ],
+)
+def test_a_handle_cannot_be_dragged_to_what_is_no_pose(serving: Serving, pose: dict[str, Any]) -> None:
+    studio = serving()
+    with window(studio) as line:
+        working(studio, line)
+        send(line, type="TransformControlsUpdateMessage", name="/handle", owner="", **pose)
+        assert is_closed(line)
+    assert alive(studio)
+
+
+def test_what_nobody_has_foreseen_is_said_where_one_acts(serving: Serving, capfd: pytest.CaptureFixture[str]) -> None:
+    studio = serving()
+
+    def fails() -> None:
+        raise ZeroDivisionError("by <b>nought</b>")
+
+    studio.window.action(fails)(type("Event", (), {"client": 1}))
+    assert "this failed in an unforeseen way (ZeroDivisionError: by &lt;b&gt;nought" in studio.window._notices.content
+    assert "Traceback" in capfd.readouterr().err
+    assert alive(studio)
+
+
+def test_a_script_in_the_name_of_a_target_or_fixture_stays_a_name(serving: Serving) -> None:
+    studio = serving()
+    name = "<img src=x onerror=alert(1)>"
+    robot = load_robot("irb120").with_frames(Transform(), {name: (0.0, 0.0, 0.1)})
+    robot = robot.with_fixtures({name: ("point", Transform((0.2, 0.0, 0.1)))})
+    (studio.window.project.folder / "arm.yaml").write_text(robot_text(robot))
+    studio.window.edit(robot="arm.yaml")
+    assert "&lt;img" in shown(studio)
+    assert "<img" not in shown(studio)
 
 
 def test_a_second_window_reads_until_it_takes_over(serving: Serving) -> None:

@@ -101,9 +101,16 @@ _BEYOND = """() => [...document.querySelectorAll("button, input, label, p, pre, 
 
 
 @pytest.fixture(scope="module")
-def demonstration(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
+def turned_away() -> list[str]:
+    """What of a window's requests and messages was refused."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def demonstration(tmp_path_factory: pytest.TempPathFactory, turned_away: list[str]) -> Iterator[Studio]:
     """The studio of an empty folder that it fills itself."""
-    studio = serve(tmp_path_factory.mktemp("studio") / "project", port=0, demo=True)
+    folder = tmp_path_factory.mktemp("studio") / "project"
+    studio = serve(folder, port=0, demo=True, say=turned_away.append)
     yield studio
     studio.stop()
 
@@ -123,7 +130,12 @@ def person(demonstration: Studio, blind: Any, pictures: Path) -> Iterator[Person
 
 
 def test_from_an_empty_folder_to_a_corrected_program_by_clicking(
-    person: Person, chromium: Any, truearm: Truearm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    person: Person,
+    turned_away: list[str],
+    chromium: Any,
+    truearm: Truearm,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     """One test, because each part goes on with what the one before left."""
     the_whole_work(person, truearm, monkeypatch, tmp_path)
@@ -132,6 +144,7 @@ def test_from_an_empty_folder_to_a_corrected_program_by_clicking(
     a_calibration_is_cancelled_and_leaves_the_old_result(person)
     reopened_it_shows_what_it_showed(person, tmp_path)
     with_the_scene_it_is_pictured(person, chromium)
+    assert turned_away == []
 
 
 def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import IO, Any
 
 import pytest
 from tests.studio.conftest import Serving
-from tests.studio.talking import alive, element, eventually, is_closed, messages_of, send, window, working
+from tests.studio.talking import alive, element, eventually, is_closed, messages_of, send, shown, window, working
 from websockets.exceptions import ConnectionClosed
 
 from truearm.studio import uploads as module
@@ -126,12 +126,8 @@ def test_a_script_in_the_name_of_a_file_stays_a_name(serving: Serving) -> None:
         assert eventually(lambda: "Taken into the project" in studio.window._notices.content)
         assert eventually(lambda: studio.window.project.names() == [name])
 
-    def shown() -> str:
-        handles = studio.window.gui._gui_input_handle_from_uuid.values()
-        return "".join(str(getattr(one, "content", "")) for one in handles) + studio.window._notices.content
-
-    assert eventually(lambda: "&lt;img src=x onerror=alert(1)&gt;.csv" in shown())
-    assert "<img" not in shown()
+    assert eventually(lambda: "&lt;img src=x onerror=alert(1)&gt;.csv" in shown(studio))
+    assert "<img" not in shown(studio)
 
 
 @pytest.mark.parametrize(("size", "parts", "said_of_it"), [(100, 3, "more of a file"), (900_000, 3, "less of a file")])

@@ -31,6 +31,7 @@ from truearm.printable import printable, shortened
 from truearm.studio.access import Access
 from truearm.studio.first_page import complete
 from truearm.studio.uploads import Uploads
+from truearm.studio.values import checked
 
 #: A message of the window is small; files come in parts of half a megabyte.
 _MESSAGE_SIZE: Final = 4_000_000
@@ -72,6 +73,8 @@ class Gate:
         Called with the connection of a window of which something was refused, and why; from the server's thread.
     offers
         Elements that a window which only reads may use: those with which it takes over.
+    fits
+        Called with the number of an element and a value: whether it can have that.
     """
 
     access: Access
@@ -79,6 +82,7 @@ class Gate:
     say: Callable[[str], None] = lambda _: None
     blocked: Callable[[ServerConnection, str], None] = lambda *_: None
     offers: set[str] = field(default_factory=set)
+    fits: Callable[[str, object], bool] = lambda *_: True
     _working: ServerConnection | None = None
     _said: dict[str, float] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -164,7 +168,7 @@ class Gate:
         except (msgspec.DecodeError, TypeError, KeyError, RecursionError) as error:
             raise ValueError("a message that cannot be read") from error
         if kind in _LOOKING:
-            _check(message, kind)
+            checked(message, kind, closely=False)
             return True
         if kind not in _WORKING:
             return self._block(connection, f"the message {_shown(str(kind))} is not taken from a window")
@@ -176,15 +180,16 @@ class Gate:
             not isinstance(message.get("updates"), dict) or set(message["updates"]) != {"value"}
         ):
             return self._block(connection, "an element was to be changed otherwise than by its value")
+        checked(message, kind, closely=kind != "GuiUpdateMessage")
         if kind in _FILES:
             self._take(connection, message, kind)
             return False
-        _check(message, kind)
+        if kind == "GuiUpdateMessage" and not self.fits(message["uuid"], message["updates"]["value"]):
+            return self._block(connection, "an element was to have a value that it cannot have")
         return True
 
     def _take(self, connection: ServerConnection, message: Mapping[str, Any], kind: str) -> None:
         """Take a file, or a part of one: viser does not see it."""
-        _check(message, kind)
         uploads = self.uploads
         why = (uploads.begins if kind == "FileTransferStartUpload" else uploads.goes_on)(connection, message)
         if why is not None:
@@ -213,16 +218,6 @@ class Gate:
                         await self.close(1002, f"{error}")
 
         return Watched
-
-
-def _check(message: Mapping[str, Any], kind: str) -> None:
-    """Refuse a message that its kind cannot be made of, as viser would stumble over it."""
-    if not all(isinstance(name, str) for name in message):
-        raise ValueError(f"a message {kind} with a name that is no text")
-    try:
-        viser._messages.Message.deserialize(msgspec.msgpack.encode(message))
-    except Exception as error:  # whatever it is that its fields cannot be made of
-        raise ValueError(f"a message {kind} that cannot be read") from error
 
 
 #: viser is started once at a time, because its function to listen is replaced meanwhile.

@@ -25,7 +25,8 @@ from truearm.studio.gate import Gate
 from truearm.studio.page import Page
 from truearm.studio.project import Project
 from truearm.studio.uploads import Upload
-from truearm.studio.work import Work
+from truearm.studio.values import fits
+from truearm.studio.work import Work, unforeseen
 from truearm.writing import put_back_old
 
 #: So much of what was said stays to be read.
@@ -71,6 +72,7 @@ class Window:
         self._frame(pages)
         gate.blocked = self._say_blocked
         gate.uploads.told = self._say_came
+        gate.fits = self._fits
         gate.say = lambda text: self.tell(Notice("refused", text.removeprefix("refused: "), "warning"))
         server.on_client_connect(self._arrived)
         server.on_client_disconnect(self._gone)
@@ -98,6 +100,8 @@ class Window:
             except InputError as error:
                 self.refuse(error)
                 self.refresh()
+            except Exception as error:  # it is told, and its place is on standard error
+                self.refuse(unforeseen(error))
 
     def receive(self, button: Any, do: Callable[[Upload], None]) -> None:
         """Let a button for uploads take in files: `do` is called as by :meth:`action`, with each that has come whole.
@@ -390,6 +394,10 @@ class Window:
         for client, mine in [*self._windows.values()]:
             if mine is connection:
                 client.add_notification("Refused", why, color="orange", auto_close_seconds=10)
+
+    def _fits(self, number: str, value: object) -> bool:
+        element = self.gui._gui_input_handle_from_uuid.get(number)
+        return element is None or fits(element, value)  # viser drops what is for an element that is gone
 
     def _say_came(self, connection: object, number: str, element: str, upload: Upload | None) -> None:
         """Tell a window how much of its file has come; None lets it forget the file."""

@@ -90,12 +90,17 @@ def _run(target: Connection, do: Callable[..., Any], arguments: dict[str, Any]) 
         outcome: Any = do(**arguments, progress=progress)
     except InputError as error:
         outcome = error
-    except Exception as error:  # it is told, and its place is on standard error
-        traceback.print_exc()
-        outcome = InputError(
-            f"this failed in an unforeseen way ({type(error).__name__}: {error})",
-            cure="Run the command of the same name on the same files, and report what it says.",
-        )
+    except Exception as error:
+        outcome = unforeseen(error)
     with suppress(OSError):
         target.send(("ended", outcome))
     target.close()
+
+
+def unforeseen(error: Exception) -> InputError:
+    """Return a refusal for what nobody has foreseen; its place is printed on standard error."""
+    traceback.print_exception(error)
+    return InputError(
+        f"this failed in an unforeseen way ({type(error).__name__}: {error})",
+        cure="Run the command of the same name on the same files, and report what it says.",
+    )

@@ -148,7 +148,20 @@ def test_values_of_no_kind_that_an_element_has_are_refused_and_harm_nothing(
 ) -> None:
     said: list[str] = []
     studio = serving(say=said.append)
-    odd = [None, -1, 1e308, math.nan, "9" * 20_000, [], [1e3], ["a", "b", "c"], [math.inf] * 3, {"a": 1}, b"x", [[[]]]]
+    odd: list[Any] = [
+        None,
+        -1,
+        1e308,
+        math.nan,
+        "9" * 20_000,
+        [],
+        [1e3],
+        ["a", "b", "c"],
+        [math.inf] * 3,
+        {"a": 1},
+        b"x",
+        [[[]]],
+    ]
     with window(studio) as line:
         working(studio, line)
         for uuid in [*studio.window.gui._gui_input_handle_from_uuid]:

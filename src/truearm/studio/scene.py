@@ -283,7 +283,7 @@ class Scene:
         self._look_at(look, look + base.rotation @ (self.length * np.array([0.85, -1.15, 0.6])))
 
     def _light(self) -> None:
-        """Light the scene from above and from all sides: viser's pictures of rooms cost a slow computer half a minute."""
+        """Light the scene from above and all around: viser's picture of a room costs a slow computer half a minute."""
         self._scene.configure_environment_map(None)
         self._scene.add_light_hemisphere("/light/sky", sky_color=_SKY, ground_color=_GROUND, intensity=_ALL_ROUND)
         self._scene.add_light_directional("/light/side", intensity=_SIDEWAYS, position=(1.0, -2.0, 0.6))

@@ -64,6 +64,7 @@ PLACES: dict[str, Arguments] = {
     "poses": {"out": "set.csv"},
     "path": {"out": "."},
     "sphere": {"out": "page.html"},
+    "measure": {"out": "."},
     "simulate": {"out": "data.csv"},
     "simulate_inclinometers": {"out": "inclinations.csv"},
     "inverse": {"out": "joints.csv"},

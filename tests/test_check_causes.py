@@ -99,6 +99,41 @@ def test_what_cannot_be_the_robot_is_implausible_and_its_cause_named(
         assert f"The cause is most likely what {code} says" in told.message
 
 
+def of_some(factor: float, share: float) -> Callable[[Dataset], Dataset]:
+    def with_factor(data: Dataset) -> Dataset:
+        drawn = np.random.default_rng(1).random(data.configurations) < share
+        return replace(data, position=np.where(drawn[data.configuration, None], factor, 1.0) * data.position)
+
+    return with_factor
+
+
+def single_cells(data: Dataset) -> Dataset:
+    drawn = np.random.default_rng(1).random(data.position.shape) < 0.1
+    return replace(data, position=np.where(drawn, 1e3, 1.0) * data.position)
+
+
+def in_metres_with_a_sign(data: Dataset) -> Dataset:
+    return sign_of(4)(scaled(1e3)(data))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (of_some(1e3, 0.4), ["are a thousand times too large; those of the others are not"]),
+        (of_some(1e-3, 0.4), ["are a thousand times too small; those of the others are not"]),
+        (of_some(25.4, 0.1), ["are 25.4 times too large, as if mm were called inches; those"]),
+        (single_cells, ["No one unit makes them fit"]),
+        (in_metres_with_a_sign, ["are a thousand times too large, as if mm were called m", "The sign of joint 4 is"]),
+    ],
+)
+def test_units_of_positions_are_named_by_what_fits(spoil: Callable[[Dataset], Dataset], told: list[str]) -> None:
+    errors = [notice for notice in check(ROBOT, spoil(honest())).warnings if notice.level == "error"]
+    assert errors[0].code == "unit-length"
+    assert len(errors) == len(told)
+    for notice, words in zip(errors, told, strict=True):
+        assert words in notice.message
+
+
 @pytest.mark.parametrize(("robot", "poses"), [("irb120", 30), ("ur10", 12), ("katana450", 30), ("li3", 20)])
 def test_honest_data_have_no_error(robot: str, poses: int) -> None:
     run = calibrate(robot, campaign(robot, poses, 0.05e-3, 8)[1])

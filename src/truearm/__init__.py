@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
+    from truearm.jobs.measure import measure
     from truearm.jobs.new_robot import new_robot
     from truearm.jobs.path import path
     from truearm.jobs.plan import plan
@@ -116,6 +117,7 @@ __all__ = [
     "lines",
     "load_data",
     "load_robot",
+    "measure",
     "new_robot",
     "path",
     "plan",

@@ -144,7 +144,7 @@ def undo_unfinished(folder: Path) -> None:
     if run is None:
         return
     # not replaced yet, put back already, or changed since: such files stay
-    targets = {name: folder / name for name, known in run.new.files.items() if _is(folder / name, known)}
+    targets = {name: folder / name for name, known in run.new.files.items() if is_the_known(folder / name, known)}
     if not all(_stands_beside(targets[name], run.made[name]) for name in targets if name in run.made):
         raise not_ours(folder / UNFINISHED)
     for name, target in targets.items():
@@ -158,7 +158,8 @@ def undo_unfinished(folder: Path) -> None:
     (folder / UNFINISHED).unlink()
 
 
-def _is(target: Path, known: str) -> bool:
+def is_the_known(target: Path, known: str) -> bool:
+    """Return whether a file is there and has the hash that is known of it."""
     return target.is_file() and hash_of(target.read_bytes()) == known
 
 

@@ -115,7 +115,7 @@ def sized_si(
 def quantity_si(
     text: str, units: tuple[str, ...], parameter: str, number: str, whole: str, *, deviation: bool = False
 ) -> float:
-    """Return a number that a text gives with its unit, such as ``50mm``, in SI units.
+    """Return a number that a text gives with its unit, such as ``50mm``, in SI units; zero needs none.
 
     Parameters
     ----------
@@ -135,6 +135,8 @@ def quantity_si(
     """
     match = re.fullmatch(r"\s*(?P<number>[^a-zA-Z]*(?:[eE][-+0-9]+)?)\s*(?P<unit>[a-zA-Z]*)\s*", text)
     found = None if match is None else as_number(match["number"].strip())
+    if match is not None and found == 0.0 and not match["unit"] and not deviation:
+        return 0.0
     if match is None or found is None or match["unit"] not in units:
         raise InputError(
             "a number with its unit belongs here" if found is None else "no unit that fits is given",

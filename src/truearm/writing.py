@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import broken_link, exists, path_argument, reason_of
-from truearm.manifest import MANIFEST, UNFINISHED, manifest_text, sets_in, unfinished_above
+from truearm.manifest import MANIFEST, UNFINISHED, FileSet, manifest_text, sets_in, unfinished_above
 from truearm.replacing import (
     alone_in,
     clear_temporary,
     file_set,
+    is_the_known,
     replace_all,
     synchronise,
     undo_unfinished,
@@ -41,32 +42,52 @@ def output_folder(
     read
         None of these files may be overwritten.
     ours
-        Whether a file of one of the names that stands there already has to be in the folder's manifest: then truearm
-        has written it.
+        Whether a file of one of the names that stands there already has to be as the folder's manifest has it: then
+        truearm has written it, and nobody has changed it since.
     """
     with refusals_of(parameter):
         path = writable_folder(path_argument(folder, parameter))
         put_back_old(path)
-        written = {name for one in sets_in(path) for name in one.files}
+        sets = sets_in(path)
         for name in names:
             refuse_overwriting(path / name, read)
-            if ours and name not in written and exists(path / name):
-                raise InputError(
-                    "this exists already, was not written here by truearm, and is not overwritten",
-                    where=str(path / name),
-                    cure="Choose another `out`, or move the file.",
-                )
+            if ours:
+                _refuse_not_ours(path / name, name, sets)
     return path
 
 
-def output_file(file: object, read: Iterable[Path] = (), parameter: str = "file") -> Path:
-    """Return the file that was given to write to, or refuse a place that cannot be; `read` as for a folder."""
+def output_file(file: object, read: Iterable[Path] = (), parameter: str = "file", *, ours: bool = False) -> Path:
+    """Return the file that was given to write to, or refuse a place that cannot be; `read` and `ours` as for a folder.
+
+    Only files that are written together with others stand in the manifest.
+    """
     with refusals_of(parameter):
         path = writable_file(path_argument(file, parameter))
         put_back_old(path.parent)
-        sets_in(path.parent)
+        sets = sets_in(path.parent)
         refuse_overwriting(path, read)
+        if ours:
+            _refuse_not_ours(path, path.name, sets)
     return path
+
+
+def _refuse_not_ours(path: Path, name: str, sets: Sequence[FileSet]) -> None:
+    """Refuse to replace a file that is not as truearm has written it there."""
+    if not exists(path):
+        return
+    known = [one.files[name] for one in sets if name in one.files]
+    if not known or not path.is_file():
+        raise InputError(
+            "this exists already, was not written here by truearm, and is not overwritten",
+            where=str(path),
+            cure="Choose another `out`, or move the file.",
+        )
+    if not any(is_the_known(path, hashed) for hashed in known):
+        raise InputError(
+            "this was written here by truearm and has been changed since, and is not overwritten",
+            where=str(path),
+            cure="Choose another `out`, or move the file.",
+        )
 
 
 def write_text(path: Path, text: str) -> None:

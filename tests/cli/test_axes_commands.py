@@ -83,7 +83,7 @@ def test_refusals(truearm: Truearm, kr5: Path, small: Path, tmp_path: Path) -> N
         (("axes", "kr5", kr5, "--frame", "table", "--out", tmp_path), "there is no frame of this name"),
         (("tolerance", "kr5", "--depth", "50"), "not described by joint errors"),
         (("tolerance", "kr5", "--depth", "0", "--lean", "1"), "--depth: a hole needs a depth"),
-        (("tolerance", "kr5", "--depth", "50", "--lean", "-1"), "--lean: the length is out of range; got '-0.001 m'"),
+        (("tolerance", "kr5", "--depth", "50", "--lean", "-1"), "--lean: the length is out of range; got '-1 mm'"),
         (("tolerance", "kr5", "--depth", "50,40"), "6 lengths, or one for all"),
         (("lines", "kr5", "--centre", "850,0"), "3 lengths"),
         (("lines", "kr5", "--centre", "2850,0,600"), "cannot go to a pose"),

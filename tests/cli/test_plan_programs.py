@@ -16,7 +16,8 @@ def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_
     words = (*QUICK, "--program", "rapid", "--speed", "100,5", "--dwell", "1.5", "--wait", "input 3,60s", "--out", out)
     run = truearm(*words)
     assert (run.code, run.err) == (0, "")
-    assert "At most 100 mm/s and 5 % of the joints' speed; it stands for 1.5 s, then for input 3 up to 60 s." in run.out
+    assert "At most 100 mm/s and 5 % of the joints' speed (250, 250, 250, 320, 320, 420 deg/s); it stands" in run.out
+    assert "it stands for 1.5 s, then for input 3 up to 60 s." in run.out
     assert f"Written to {out}: plan.csv, plan.html, plan-ways.csv, sheet.html, MEASURE.mod" in run.out
     assert "state --payload. State the targets" in run.out
     text = (out / "MEASURE.mod").read_text()
@@ -47,7 +48,7 @@ def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_
         (("--dwell", "2"), "State --program, or leave it out"),
         (("--wait", "operator"), "--wait: this is said of a measuring program"),
         (("--program", "rapid", "--speed", "fast"), "--speed: numbers separated by commas belong here; got 'fast'"),
-        (("--program", "rapid", "--speed", "250,10,1"), "--speed: one or two numbers belong here"),
+        (("--program", "rapid", "--speed", "250,10,1"), "--speed: one or two numbers belong here; got 3; allowed"),
         (("--program", "rapid", "--speed", "0"), "allowed: 1 to 5000 mm/s"),
         (("--program", "rapid", "--speed", "9000"), "got '9000 mm/s'"),
         (("--program", "rapid", "--speed", "250,0.1"), "got '0.1 %'; allowed: 1 to 100 %"),
@@ -57,6 +58,7 @@ def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_
             ("--program", "rapid", "--wait", "button"),
             "--wait: there is no such wait; got 'button'; allowed: time; input",
         ),
+        (("--clearance", "-5"), "--clearance: the length is out of range; got '-5 mm'; allowed: 0 mm to"),
         (("--device", "inclinometers", "--program", "rapid"), "--program: this says nothing for inclinometers"),
         (("--device", "inclinometers", "--approach"), "--approach: this says nothing for inclinometers"),
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from tests.performance_plan import small_plan
 from truearm.compensation.cell import Cell, read_tools
 from truearm.compensation.iso9283.programs import measuring_programs
 from truearm.compensation.iso9283.routes import Routes
+from truearm.compensation.joint_speeds import fastest_point, known_speeds
 from truearm.compensation.path_program import BY_NAME
 from truearm.compensation.program_correction import commanded
 from truearm.compensation.programs.motion_program import (
@@ -24,6 +26,7 @@ from truearm.compensation.programs.motion_program import (
     Wait,
 )
 from truearm.compensation.programs.program import Program, Source
+from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
@@ -189,8 +192,40 @@ def test_every_test_begins_and_ends_slowly_in_the_first_pose(programs: dict[str,
         moves = [step for step in program.steps if isinstance(step, JointMove)]
         for move in (moves[0], moves[-1]):
             assert program.joints[move.target] == pytest.approx(first)
-            assert move.share == 0.1
+            assert 0.0 < move.share <= 0.1
             assert move.speed == pytest.approx(0.05)
+        assert moves[0].share <= min(move.share for move in moves)  # nobody knows from where
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_joint_motions_keep_to_the_velocity_and_in_the_first_run_to_250_mm_a_second(known: bool) -> None:
+    plan = with_tip(small_plan(["AP", "AD"], velocities=(1.0, 0.1)))
+    speeds = np.array([10.0, 10.0, 10.0, 20.0, 20.0, 25.0])  # so fast that 10 % is too fast for the tip
+    joints = zip(plan.robot.joints, speeds.tolist(), strict=True)
+    robot = replace(
+        plan.robot, joints=tuple(replace(joint, max_speed=speed if known else None) for joint, speed in joints)
+    )
+    assert (known_speeds(robot) is not None) == known
+    made = measuring_programs(replace(plan, robot=robot), 1.0, "abc", "VAL3")
+    fastest = 0.0
+    for program in made.slow:
+        moves = [step for step in program.steps if isinstance(step, JointMove)]
+        for before, move in pairwise(moves):
+            ends = robot.controller.to_model(program.joints[[before.target, move.target]])
+            seconds = float((np.abs(ends[1] - ends[0]) / speeds).max()) / move.share
+            fastest = max(fastest, fastest_point(robot, ends) / max(seconds, 1e-9))
+    assert fastest <= 0.25 * (1.0 + 1e-6)
+    assert fastest > (0.24 if known else 0.1)
+    shares = {step.share for one in made.faster for step in one.steps if isinstance(step, JointMove)}
+    assert max(shares) == 1.0
+    script = measuring_programs(replace(plan, robot=robot), 1.0, "abc", "URScript")
+    top = np.array(speeds if known else [FASTEST] * 6)
+    for program in script.faster:
+        moves = [step for step in program.steps if isinstance(step, JointMove)]
+        for before, move in list(pairwise(moves))[1:-1]:
+            turned = np.abs(program.joints[move.target] - program.joints[before.target])
+            rates = turned * move.share * FASTEST / turned.max()
+            assert float((rates / top).max()) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_cycles_go_where_the_test_asks(programs: dict[str, MotionProgram]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,12 +13,13 @@ import pytest
 from tests.plan_tours import a_tour
 
 import truearm
+from truearm.compensation.joint_speeds import joint_rates, known_speeds, speed_notices, speed_words
 from truearm.compensation.path_program import BY_NAME
-from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program, shown_speed
+from truearm.compensation.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
 from truearm.compensation.programs.motion_program import LONGEST_COMMENT, JointMove, MotionProgram, Wait
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.urscript.measuring import FASTEST
-from truearm.library import load_robot
+from truearm.library import library, load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
@@ -248,6 +250,13 @@ def test_the_head_says_what_the_program_is(name: str) -> None:
         f"Robot {robot.name}",
         "Plan 0123456789ab",
         "At most 250 mm/s and 10 %",
+        *(
+            {
+                "rapid": (),
+                "krl": ("of the joints' deg/s:", "154 154 228 343 384 721"),
+                "inform": ("375 315 410 550 550 1002",),
+            }.get(name, ())
+        ),
         "Dwell 2 s, wait: input 3, 300 s",
         "Not verified, no safety function",
         "First run: step by step,",
@@ -320,7 +329,25 @@ def durations(name: str, text: str, shown: Array, rates: Array) -> list[float]:
 @pytest.mark.parametrize("name", BY_NAME)
 @pytest.mark.parametrize("driving", [Driving(), Driving(speed=0.1, share=0.3), Driving(speed=2.0, share=0.05)])
 def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Driving) -> None:
-    robot, tour, program = made(name, driving)
+    for robot, tour in (toured(name, approach=True), other_knowledge(name)):
+        check_speeds(name, robot, tour, driving)
+
+
+def other_knowledge(name: str) -> tuple[Robot, Tour]:
+    """Return the same arm with speeds of the joints where they are not known, and else without them."""
+    robot, tour = toured(name, approach=True)
+    known = known_speeds(robot) is not None
+    speeds = [None] * 6 if known else np.radians([150.0, 160.0, 170.0, 320.0, 400.0, 460.0]).tolist()
+    return with_speeds(robot, speeds), tour
+
+
+def with_speeds(robot: Robot, speeds: Sequence[float | None]) -> Robot:
+    pairs = zip(robot.joints, speeds, strict=True)
+    return replace(robot, joints=tuple(replace(joint, max_speed=speed) for joint, speed in pairs))
+
+
+def check_speeds(name: str, robot: Robot, tour: Tour, driving: Driving) -> None:
+    program, told = plan_program(tour, robot, BY_NAME[name].name, driving, "abc")
     shown = robot.controller.from_model(tour.joints)
     slow, fast = joint_rates(robot)
     rates = np.full(len(slow), FASTEST) if name == "urscript" else fast
@@ -334,29 +361,85 @@ def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Dri
             speed = float(steps.max()) * 399 / seconds
             fastest = max(fastest, speed)
     shares = [step.share for step in program.steps if isinstance(step, JointMove)]
-    assert max(shares) <= driving.share + 1e-12
+    assert max(shares) <= driving.share + 1e-12 or name == "urscript"
     assert min(shares) > 0.0
-    _, told = plan_program(tour, robot, BY_NAME[name].name, driving, "abc")
     assert f"At most {1e3 * told:.4g}"[:10] in text_of(name, program)
     assert told == driving.speed or name in ("krl", "fanuc-ls")
     assert fastest <= 1.01 * told
     assert fastest > 0.05 * driving.speed
-    if name == "rapid":
-        joints = np.abs(np.diff(shown, axis=0)) / np.array(found)[:, None]
-        assert (joints <= driving.share * slow * (1 + 1e-6)).all()
+    joints = np.abs(np.diff(shown, axis=0)) / np.array(found)[:, None]
+    top = slow if name == "rapid" else rates if known_speeds(robot) is None else fast
+    least = 0.01 if name in ("krl", "fanuc-ls") else 0.0  # the finest share that the language says
+    assert (joints <= max(driving.share, least) * top * (1 + 1e-6)).all()
 
 
-def test_the_rates_of_known_arms_lie_within_their_bounds() -> None:
-    known = {  # deg/s at 100 %, of the makers' data sheets
-        "irb120": (250, 250, 250, 320, 320, 420),
-        "kr5": (154, 154, 228, 343, 384, 721),
-        "lrmate200ic": (350, 350, 400, 450, 450, 720),
-        "ur5e": (180,) * 6,
-    }
-    for name, rates in known.items():
-        slow, fast = joint_rates(load_robot(name))
-        assert (slow < np.radians(rates)).all()
-        assert (fast > np.radians(rates)).all()
+def test_where_the_speeds_of_joints_are_known_programs_are_faster_and_keep_to_them() -> None:
+    for name in ("krl", "fanuc-ls", "inform"):
+        robot, tour = toured(name, approach=True)
+        unknown, _ = other_knowledge(name)
+        assert known_speeds(unknown) is None
+        taken = []
+        for arm in (robot, unknown):
+            program, _ = plan_program(tour, arm, BY_NAME[name].name, Driving(), "abc")
+            taken.append(np.mean([step.share for step in program.steps if isinstance(step, JointMove)][1:]))
+        assert taken[0] > 1.5 * taken[1], name
+
+
+def test_a_joint_that_is_counted_with_another_keeps_to_both_counts() -> None:
+    robot, tour = toured("fanuc-ls", approach=False)
+    assert robot.controller.couplings is not None
+    program, fastest = plan_program(tour, robot, "FANUC LS", Driving(), "abc")
+    shares = [step.share for step in program.steps if isinstance(step, JointMove)][1:]
+    speeds = np.array(known_speeds(robot))
+    for counted in (tour.joints, robot.controller.from_model(tour.joints)):
+        for k, share in enumerate(shares):
+            seconds = float((np.abs(counted[k + 1] - counted[k]) / speeds).max()) / share
+            along = tour.joints[k] + np.linspace(0.0, 1.0, 200)[:, None] * (tour.joints[k + 1] - tour.joints[k])
+            steps = np.linalg.norm(np.diff(robot.forward(along)[0], axis=0), axis=1)
+            assert float(steps.max()) * 199 / seconds <= 1.01 * fastest
+
+
+def test_the_rates_of_the_library_lie_within_the_bounds_of_unknown_arms() -> None:
+    arms = {name: robot for name in library() if known_speeds(robot := load_robot(name))}
+    assert len(arms) >= 50
+    for name, robot in arms.items():
+        slow, fast = joint_rates(with_speeds(robot, [None] * len(robot.joints)))
+        rates = np.array(known_speeds(robot))
+        assert (fast > rates).all(), name
+        assert (slow < rates).all() or name in ("gen3", "lbr_iiwa_7", "lbr_iiwa_14"), name
+        same, again = joint_rates(robot)
+        assert (same == rates).all()
+        assert (again == rates).all()
+
+
+def test_of_joints_whose_speed_is_known_and_of_others_both_count() -> None:
+    robot = with_speeds(load_robot("irb120"), [4.0, None, 4.0, None, None, 6.0])
+    slow, fast = joint_rates(robot)
+    assert slow[[0, 2, 5]].tolist() == fast[[0, 2, 5]].tolist() == [4.0, 4.0, 6.0]
+    assert (slow[[1, 3, 4]] < fast[[1, 3, 4]]).all()
+    (notice,) = speed_notices(robot, "this was taken")
+    assert (notice.code, notice.level) == ("joint-speed-assumed", "note")
+    assert "How fast axis_2, axis_4, axis_5 go at 100 % is not known: this was taken." in notice.message
+
+
+def test_velocities_of_a_urdf_are_not_relied_on() -> None:
+    robot = load_robot("kr5")
+    urdf = replace(robot, convention_name="urdf")
+    assert known_speeds(urdf) is None
+    without = with_speeds(robot, [None] * 6)
+    for one, other in zip(joint_rates(urdf), joint_rates(without), strict=True):
+        assert one == pytest.approx(other)
+    assert speed_notices(robot, "") == []
+    (notice,) = speed_notices(urdf, "this was taken")
+    assert (notice.code, notice.level) == ("joint-speed-assumed", "note")
+    assert "this was taken. The velocities of the URDF are not relied on" in notice.message
+    assert "URDF" not in speed_notices(without, "this was taken")[0].message
+
+
+def test_speeds_are_said_in_the_units_of_joints() -> None:
+    robot = load_robot("irb120")
+    slides = replace(robot, joints=(*robot.joints[:2], replace(robot.joints[2], kind="prismatic")))
+    assert speed_words([1.0, 2.0, 0.5], slides) == "57 deg/s, 115 deg/s, 500 mm/s"
 
 
 def test_a_language_of_whole_percent_says_how_fast_that_is() -> None:

@@ -68,7 +68,10 @@ COMMANDS: Final[tuple[str, ...]] = (
     "lines kr5 --centre 850,0,600 --size 300,400,200 --model joint-errors.yaml --truth axis-tests --repeats 2",
     "lines kr5.yaml --centre 850,0,600 --size 300,400,200 --model joint-errors.yaml --out lines.csv",
     "simulate irb120 --truth random --poses 5 --noise 0.02 --device tracker --out simulated.csv --seed 2",
+    "measure measured-plan.csv irb120 --device measurement-arm --noise 0.01 --nest n --every 2 --about about.yaml "
+    "--disturbed 0.2 --wait 0 --out out --json",
     "simulate robot.yaml --truth calibrated.yaml --poses 5 --out simulated.csv --payload 1kg,0mm,0mm,5mm",
+    "iso9283 plan irb120 --cube cube.yaml --criteria ap --constraints constraints.yaml --clearance 20 --out out",
     "iso9283 plan irb120 --cube cube.yaml --criteria ap,t --velocities 50 --tip 0,0,50 --out out",
     "iso9283 simulate tested.yaml --plan performance.yaml --rate 100 --seed 1 --out out",
     "iso9283 evaluate performance.yaml --poses attained.csv --forces pushes.csv --out out",
@@ -76,6 +79,7 @@ COMMANDS: Final[tuple[str, ...]] = (
     "--alignment alignment.yaml --noise 0.001 --json --out out",
     "devices",
     "robots",
+    "robots irb-1200 --maker abb --axes 6 --json",
     "show irb120.yaml",
     "show calibrated.yaml --json",
     "show arm.urdf",

@@ -23,6 +23,12 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.hexapod.sheet_reading import read_sheet
 from truearm.measurement.hexapod.sheets_together import together
 from truearm.measurement.hexapod.touches import read_touches
+from truearm.measurement.measuring.about import read_about
+from truearm.measurement.measuring.campaign import Campaign
+from truearm.measurement.measuring.reading_log import ReadingLog
+from truearm.measurement.measuring.readings import Quality
+from truearm.measurement.measuring.session import Session
+from truearm.measurement.measuring.watched_folder import WatchedFolder
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
 from truearm.measurement.readers.guessing.guess import guess_mapping
@@ -131,6 +137,32 @@ def _programs(language: str, *names: str) -> Reader:
     return Reader({Path(name).name: f"{language}/{name}" for name in names}, read)
 
 
+def _log(folder: Path) -> None:
+    """Check that a log goes on, whatever its end is, and is then read as it was."""
+    log = ReadingLog(folder)
+    log.close()
+    again = ReadingLog(folder)
+    again.close()
+    assert (again.torn, len(again.entries)) == (0, len(log.entries)), "a log is not read as it was left"
+
+
+def _rows(folder: Path) -> None:
+    """Check that a session takes whatever rows come, and that its log holds them."""
+    inside = folder / "in"
+    inside.mkdir()
+    (folder / "points.csv").rename(inside / "points.csv")
+    source = WatchedFolder(inside, folder / "rows.yaml", ("P1", "P2", "P3"))
+    session = Session(("P1", "P2", "P3"), ("smr",), ("floor",), 2, Quality(deviation=1e-4))
+    with Campaign(session, source, folder) as campaign:
+        entries = campaign.step()
+        assert all(notice.message for notice in campaign.notices)
+    log = ReadingLog(folder)
+    log.close()
+    reasons = [[entry.reason for entry in some] for some in (log.entries, entries)]
+    assert reasons[0] == reasons[1], "the log holds other readings"
+    Session(("P1", "P2", "P3"), ("smr",), ("floor",), 2, Quality()).add(*log.entries)
+
+
 def _inclinations(folder: Path) -> None:
     """Check that angles are angles, and that what is written is read again."""
     read = read_inclinations(folder / "inclinations.csv")
@@ -178,6 +210,9 @@ READERS: Final[Mapping[str, Reader]] = {
     ),
     "guess": Reader({"table.csv": "whole.csv"}, lambda folder: _guess(folder / "table.csv")),
     "guess-workbook": Reader({"points.xlsx": "points.xlsx"}, lambda folder: _guess(folder / "points.xlsx")),
+    "reading-log": Reader({"readings.csv": "log.csv"}, _log),
+    "watched-rows": Reader({"points.csv": "rows.csv", "rows.yaml": "rows.yaml"}, _rows),
+    "about": Reader({"about.yaml": "about.yaml"}, lambda folder: read_about(folder / "about.yaml").rows()),
     "matrices": Reader({"joints.txt": "joints.txt", "points.txt": "points.txt"}, _matrices),
     "inclinations": Reader({"inclinations.csv": "inclinations.csv"}, _inclinations),
     "robodk": Reader(

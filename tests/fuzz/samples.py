@@ -127,6 +127,34 @@ joints: {columns: [J1, J2], unit: deg}
 """
 
 
+ABOUT = """\
+truearm: truearm-about/1
+units: {length: mm, temperature: degC, pressure: hPa, humidity: percent}
+instrument: {name: tracker, serial: "750123"}
+robot: {serial: "120-501234"}
+reflector: {radius: 19.05, offset: 0.0}
+environment:
+  - {at: start, temperature: 20.4, pressure: 1013.2, humidity: 45}
+"""
+#: Rows as they are written into a folder that is watched, and their mapping.
+ROWS = """\
+Pose,Point,X,Y,Z,W,I,J,K,S,When,RMS,Moved,N,Lost
+P1,smr,1841.2,112.8,655.1,1,0,0,0,0.02,2026-11-23 10:00:00,0.01,0.01,20,0
+P2,smr,702.5,-640.2,790.6,0.6,0.8,0,0,0.02,2026-11-23 10:01:00,0.2,0.01,20,0
+P3,floor,702.5,-640.2,790.7,0.6,0.8,0,0,0.02,2026-11-23 10:02:00,,,,
+"""
+ROWS_MAPPING = """\
+truearm: truearm-mapping/1
+configuration: {column: Pose}
+length_unit: mm
+readings: [{target_column: Point, x: X, y: Y, z: Z, qw: W, qx: I, qy: J, qz: K, sigma: {columns: [S], unit: mm}}]
+references: [floor]
+order: {column: When, time: iso}
+dwell: {deviation: RMS, settling: Moved, unit: mm, samples: N, breaks: Lost}
+joints: {file: plan.csv}
+"""
+
+
 def _workbook(path: Path) -> None:
     import openpyxl
 
@@ -164,6 +192,8 @@ def folder() -> Path:
         EXAMPLES[job](place)
     truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))
     _rename(place, {"result/calibrated.yaml": "calibrated.yaml", "axes/joint-errors.yaml": "joint-errors.yaml"})
+    truearm.measure(**EXAMPLES["measure"](place))
+    _rename(place, {"measured/readings.csv": "log.csv"})
     _rename(place, {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"})
     for name in ("irb120", "kr5"):
         (place / f"{name}.yaml").write_text((files("truearm.library") / f"{name}.yaml").read_text())
@@ -192,6 +222,9 @@ def folder() -> Path:
         "whole.yaml": WHOLE_MAPPING,
         "driven.csv": DRIVEN,
         "workbook.yaml": WORKBOOK_MAPPING,
+        "about.yaml": ABOUT,
+        "rows.csv": ROWS,
+        "rows.yaml": ROWS_MAPPING,
     }
     _workbook(place / "points.xlsx")
     texts["again.csv"] = (place / "data.csv").read_text() + "\n"  # the same readings twice are refused

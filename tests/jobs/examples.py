@@ -280,6 +280,9 @@ chunk: 2
 """
 
 #: Arguments of a call of each job, made in a folder of its own.
+MEASURED_PLAN = "configuration," + ",".join(f"joint_{k} [deg]" for k in range(1, 7)) + "\n"
+MEASURED_PLAN += "".join(f"P{k},{10 * k},10,{5 * k},20,{30 - k},40\n" for k in range(1, 4))
+
 EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "load_robot": lambda _: {"robot": "irb120"},
     "show": lambda _: {"robot": "lrmate200ic", "joints": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "joints_are": "model"},
@@ -368,6 +371,20 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "tip": (0.0, 0.0, 0.125),
         "payload": "1kg,0mm,0mm,50mm",
     },
+    "measure": lambda folder: {
+        "plan": _written(folder / "measured-plan.csv", MEASURED_PLAN),
+        "robot": "irb120",
+        "out": folder / "measured",
+        "device": "measurement-arm",
+        "truth": "random",
+        "noise": 1e-5,
+        "seed": 1,
+        "disturbed": 0.1,
+        "drift": 1e-5,
+        "targets": ["nest"],
+        "every": 2,
+        "about": _written(folder / "about.yaml", "truearm: truearm-about/1\nunits: {}\nrobot: {serial: '12'}\n"),
+    },
     "simulate": lambda _: {
         "robot": "irb120",
         "truth": "random",
@@ -379,7 +396,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "wrench_at": "flange",
     },
     "inverse": _poses,
-    "robots": lambda _: {},
+    "robots": lambda _: {"text": "irb1200", "maker": "ABB", "axes": 6},
     "devices": lambda _: {},
     "axes": lambda folder: {"robot": "kr5", "data": _axis_runs(folder), "frame": "robot"},
     "tolerance": lambda folder: {"robot": _joint_errors(folder), "depth": 0.05, "lean": (1e-5,) * 6, "position": 1e-4},
@@ -422,6 +439,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "velocity": 0.5,
         "velocities": (50.0,),
         "loads": (100.0,),
+        "clearance": 0.02,
         "out": folder / "performance-plan",
     },
     "iso9283_simulate": lambda _: {

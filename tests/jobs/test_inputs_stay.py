@@ -17,7 +17,9 @@ import truearm
 from truearm.errors import InputError
 from truearm.fleets.recorded import RECORD
 from truearm.jobs import JOBS
+from truearm.jobs.measuring_begun import BEGUN
 from truearm.manifest import MANIFEST, UNFINISHED
+from truearm.measurement.measuring.reading_log import LOG
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
 from truearm.results.axis_calibration import AXIS_FILES
@@ -29,6 +31,7 @@ from truearm.results.influence import INFLUENCE_FILES
 from truearm.results.iso9283_evaluation import EVALUATION_FILES
 from truearm.results.iso9283_plan import PLAN_FILES
 from truearm.results.iso9283_simulation import FILES as SIMULATED_FILES
+from truearm.results.measured import DATA, PAGE
 from truearm.results.program_correction import REPORT
 from truearm.results.tilting import GEOMETRY, TILTING_FILES
 from truearm.results.validation import VALIDATION_FILES
@@ -123,9 +126,13 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "poses": EXAMPLES["load_data"](folder)["data"],
         "device": None,
     },
+    "measure": lambda folder: {"robot": _robot(folder), "truth": EXAMPLES["validate"](folder)["robot"]},
     "iso9283_plan": lambda folder: {
         "robot": _robot(folder),
         "slow_run": _written(folder / "slow.yaml", "{}"),
+        "constraints": _written(
+            folder / "c.yaml", f"truearm: truearm-constraints/1\n{_UNITS}limits: {{1: [-99, 99]}}\n"
+        ),
         "program": "rapid",
     },
     "iso9283_evaluate": lambda folder: {"compare": _written(folder / "other.json", "{}")},
@@ -163,10 +170,15 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     },
 }
 #: What is no file that a job reads and overwrites: a folder of data whose files have names of their own.
-FOLDERS = (("study", "data"), ("lines", "data"))
+FOLDERS = (("study", "data"), ("lines", "data"), ("measure", "watch"))
 #: What only another robot reads: tests/compensation/test_controller_model.py tries it.
-#: and what goes with nothing that is held, test_a_file_of_zones_stays below.
-ELSEWHERE = (("compensate", "controller_kinematics"), ("path", "controller_kinematics"), ("calibrate", "zones"))
+#: and what goes with nothing that is held, test_a_file_of_zones_stays below; tests/jobs/test_measure_job.py a mapping.
+ELSEWHERE = (
+    ("measure", "mapping"),
+    ("compensate", "controller_kinematics"),
+    ("path", "controller_kinematics"),
+    ("calibrate", "zones"),
+)
 
 
 #: The names of what a job writes into the folder `out`.
@@ -180,6 +192,7 @@ INTO_FOLDERS = {
     "revert": ("plate.mod",),
     "path": (MOTION, PATH_REPORT),
     "fleet": (*FLEET_FILES, RECORD),
+    "measure": (BEGUN, LOG, DATA, PAGE),
     "iso9283_plan": PLAN_FILES,
     "iso9283_simulate": SIMULATED_FILES,
     "iso9283_evaluate": EVALUATION_FILES,

@@ -28,7 +28,7 @@ def cube(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def planned(cube: Path, **more: Any) -> Iso9283Plan:
     given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [100, 10], "velocity": 0.5, "load": 3.0}
-    return truearm.iso9283_plan("irb120", **(given | more))
+    return truearm.iso9283_plan(**({"robot": "irb120"} | given | more))
 
 
 def filled(path: Path, **entries: str) -> None:
@@ -118,7 +118,20 @@ def test_a_language_of_another_maker_and_speeds_that_it_does_not_say_are_told(cu
     maker, speed = notices("urscript")
     assert (maker.code, maker.level, speed.code) == ("maker", "warning", "joint-speed-assumed")
     assert "programs were written in URScript." in maker.message
+    assert "the leading joint goes so fast that one joint has the share" in speed.message
     assert [one.code for one in notices("fanuc")] == ["maker"]
+
+
+@pytest.mark.parametrize(
+    ("language", "said"), [("krl", "the tip keeps to 250 mm/s"), ("urscript", "100 % is taken for 120 deg/s")]
+)
+def test_what_stands_for_the_speed_of_joints_that_is_not_known_is_told(language: str, said: str, cube: Path) -> None:
+    robot = truearm.load_robot("irb120")
+    robot = replace(robot, maker="", joints=tuple(replace(joint, max_speed=None) for joint in robot.joints))
+    *_, speed = [
+        one for one in planned(cube, robot=robot, program=language).warnings if one.code == "joint-speed-assumed"
+    ]
+    assert said in speed.message
 
 
 def test_programs_of_a_controller_whose_counting_is_not_known_say_so_or_are_refused(cube: Path) -> None:

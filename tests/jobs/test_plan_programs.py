@@ -17,6 +17,7 @@ from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, wi
 from truearm.manifest import MANIFEST, hash_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.planning.choosing.measurement_plan import device_candidates
 from truearm.results.plan import Plan
 from truearm.simulation.devices import named_device
@@ -63,7 +64,8 @@ def test_a_folder_has_the_plan_its_ways_the_sheet_and_the_program(planned: Plan,
 def test_a_plan_tells_of_its_program(planned: Plan) -> None:
     lines = "\n".join(planned.lines())
     assert "Measuring program in RAPID: 10 configurations from Home and back, each approached from one side." in lines
-    assert "At most 250 mm/s and 10 % of the joints' speed; it stands for 2 s, then until the operator starts" in lines
+    speeds = "250, 250, 250, 320, 320, 420 deg/s"
+    assert f"At most 250 mm/s and 10 % of the joints' speed ({speeds}); it stands for 2 s, then until" in lines
     assert "It tells the controller of target 2 at (75, 93.7, 215) mm and of 1.5 kg at (0, 0, 60) mm." in lines
     assert "It is not verified and no safety function" in lines
     told = planned.summary()["program"]
@@ -73,8 +75,12 @@ def test_a_plan_tells_of_its_program(planned: Plan) -> None:
     assert told["approached"] is True
     assert (told["speed_mm_s"], told["joint_speed_percent"], told["dwell_s"]) == (250.0, 10.0, 2.0)
     assert (told["wait"], told["tip"], told["load_kg"]) == ("operator", "2", 1.5)
-    assert [notice["code"] for notice in told["warnings"]] == ["tool-assumed", "joint-speed-assumed"]
-    assert "Nobody said the targets of the flange" in told["warnings"][0]["message"]
+    assert told["joint_speeds"] == speeds
+    assert [notice["code"] for notice in told["warnings"]] == ["tool-assumed"]
+    assumed = told["warnings"][0]["message"]
+    assert "Nobody said the targets of the flange" in assumed
+    assert "target 2 at (75, 93.7, 215) mm, target 3 at (150, 0, 125) mm (the first tool of the robot" in assumed
+    assert "kg" not in assumed
 
 
 def test_the_sheet_has_every_configuration_and_room_to_write(planned: Plan, folder: Path) -> None:
@@ -95,6 +101,10 @@ def test_the_sheet_has_every_configuration_and_room_to_write(planned: Plan, fold
     for words in ("Temp. [&deg;C]", "Start x [mm]", "End z [mm]", "operator", "Instrument: serial", "Environment:"):
         assert words in sheet
     assert "<script" not in sheet
+    page = (folder / "plan.html").read_text()
+    assert "`" not in page.split("<main>")[1].split("</main>")[0]
+    assert "give <code>noise</code> where you know better" in page
+    assert '<p class="notice warning"><strong>Warning (tool-assumed):</strong> Nobody said' in page
     assert len(sheet) < 60_000
 
 
@@ -156,14 +166,23 @@ def test_what_is_asked_of_a_program_is_taken(planned: Plan) -> None:
     assert named.program is not None
     assert "WaitDI diReady,1" in named.program.files["MEASURE.mod"]
     assert "then for input diReady up to 300 s" in "\n".join(named.lines())
-    assert [notice.code for notice in named.program.warnings] == ["joint-speed-assumed"]
+    assert not named.program.warnings
 
 
 def test_a_speed_below_the_lowest_share_of_a_language_is_told(planned: Plan) -> None:
-    for program, codes in (("krl", ["faster-than-asked", "joint-speed-assumed"]), ("val3", ["joint-speed-assumed"])):
-        slow = with_program(planned, wanted(program=program, speed=(0.01,)), planned.made.robot, weighed=True).program
+    known = planned.made.robot
+    unknown = replace(known, joints=tuple(replace(joint, max_speed=None) for joint in known.joints))
+    for program, robot, codes in (
+        ("krl", unknown, ["faster-than-asked", "joint-speed-assumed"]),
+        ("krl", known, ["faster-than-asked"]),
+        ("val3", unknown, ["joint-speed-assumed"]),
+    ):
+        made = replace(planned, made=replace(planned.made, robot=robot))
+        slow = with_program(made, wanted(program=program, speed=(0.01,)), robot, weighed=True).program
         assert slow is not None
         assert [notice.code for notice in slow.warnings] == codes
+        assert bool(slow.speeds) == (robot is known)
+        assert ("as fast as any" in slow.warnings[0].message) == (program == "krl" and robot is unknown)
         assert (slow.fastest > 0.011) == (program == "krl")
         assert slow.summary()["speed_mm_s"] == 1e3 * slow.fastest
     assert "KRL says no share below 1 %" not in "\n".join(planned.lines())
@@ -193,6 +212,7 @@ def test_an_arm_of_seven_joints_is_refused_whoever_made_it() -> None:
 
 def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> None:
     robot, tour = a_tour(replace(truearm.load_robot("puma560"), maker=""))
+    tour = replace(tour, notices=(Notice("never-apart", "What the ways say is said of the program, too.", "note"),))
     made = replace(
         planned.made,
         robot=robot,
@@ -211,10 +231,11 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         driven = with_program(replace(planned, made=made, tour=tour, program=None), asked, robot, weighed=False).program
         assert driven is not None
         codes = [notice.code for notice in driven.warnings]
-        assert codes == ["controller-counts-assumed", "links-beside", "tool-assumed", "joint-speed-assumed"]
-        assert [notice.level for notice in driven.warnings] == ["warning", "warning", "warning", "note"]
+        assert codes == ["controller-counts-assumed", "tool-assumed", "joint-speed-assumed", "never-apart"]
+        assert [notice.level for notice in driven.warnings] == ["warning", "warning", "note", "note"]
         assert any("compare joints with the pendant" in text for text in driven.files.values())
-        assert "Nobody said the load of the flange" in driven.warnings[2].message
+        assert "Nobody said the load of the flange" in driven.warnings[1].message
+        assert "what is assumed, 0 kg at (0, 0, 0) mm. A wrong load" in driven.warnings[1].message
         by_hand = {"fanuc": "Payload schedule 1 on", "inform": "Tool file 0 on", "val3": "The tool flange on"}
         assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.lines())
 

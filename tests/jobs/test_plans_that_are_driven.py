@@ -110,7 +110,7 @@ def test_a_lower_floor_and_more_room() -> None:
     room = sampled_room(low.made.robot, on_the_ways(low), Cell(-0.4, clearance=0.1), points=9)
     assert room.min() >= 0.1
     assert low.made.robot.forward(low.joints)[0][:, 2].min() < 0.0
-    assert "floor at -400 mm, boxes and links." in low.lines()[3]
+    assert " mm from the floor at -400 mm" in low.lines()[3]
 
 
 def test_a_file_with_a_floor_below_the_base_lowers_it() -> None:
@@ -344,7 +344,7 @@ def test_a_clearance_in_another_unit_is_refused() -> None:
     assert refusal.value.parameter == "clearance"
 
 
-def test_a_plan_warns_of_links_beside_their_lines() -> None:
+def test_a_plan_says_where_links_beside_their_lines_are_kept_clear() -> None:
     planned = truearm.plan("ur5e", poses=10, candidates=60)
     assert any("links-beside" in line for line in planned.lines())
     assert [one["code"] for one in planned.summary()["warnings"]] == ["links-beside"]

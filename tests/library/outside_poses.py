@@ -1,18 +1,22 @@
 """Write the poses of a public URDF that an arm of the library is held against, by Pinocchio and nothing of truearm.
 
-A developer who has the URDF (xacro files expanded) runs it once for an arm::
+Get the URDF at the revision that tests/library/outside names. Xacro files have to be expanded (the package xacro of ROS
+does it: ``xacro robot.xacro > robot.urdf``), or their links and the ``<origin>``, ``<axis>`` and ``<limit>`` of their
+joints copied into a short URDF: meshes and inertias are not needed. Then::
 
     python tests/library/outside_poses.py irb1200.urdf --robot irb1200_5_0.9 --repository ros-industrial/abb \
-        --path abb_irb1200_support/urdf/irb1200_5_90_macro.xacro --revision 532b39395dc7 \
-        --base base --tip tool0 > tests/library/outside/irb1200_5_0.9.yaml
+        --path abb_irb1200_support/urdf/irb1200_5_90_macro.xacro --revision 532b39395dc7 --base base --tip tool0
 
-Where the URDF counts joints or has frames otherwise than the library, the entries `joints`, `model_base`,
-`model_flange` and `reason` are added by hand, see tests/library/outside.py.
+That prints the file; ``> tests/library/outside/irb1200_5_0.9.yaml`` keeps it. The same URDF gives the same joint
+positions and poses again. Where a URDF counts joints or has frames otherwise than the library, the entries `joints`,
+`model_base`, `model_flange`, `reason` and `limits_differ` are written by hand, see tests/library/outside.py. Those of a
+file that is there already are kept. ``--check`` prints nothing, and fails if the file that is there has other poses.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import zlib
 from pathlib import Path
@@ -21,6 +25,10 @@ from typing import Any
 import numpy as np
 
 CONFIGURATIONS = 8
+#: Entries that are written by hand.
+BY_HAND = ("joints", "model_base", "model_flange", "reason", "limits_differ")
+#: Positions [mm] and quaternions that differ by less are the same.
+SAME = 2e-6
 
 
 def main() -> None:
@@ -32,11 +40,32 @@ def main() -> None:
     parser.add_argument("--base", default="base")
     parser.add_argument("--tip", default="tool0")
     parser.add_argument("--joints", nargs="+", help="of the arm, in order; all that move if left out")
-    sys.stdout.write(text(parser.parse_args()))
+    parser.add_argument("--check", action="store_true", help="compare with the file that is there")
+    given = parser.parse_args()
+    stored = Path(__file__).with_name("outside") / f"{given.robot}.yaml"
+    made = text(given, stored.read_text("utf-8") if stored.is_file() else "")
+    if not given.check:
+        sys.stdout.write(made)
+    elif not same_poses(made, stored.read_text("utf-8")):
+        sys.exit(f"{stored} has other poses than {given.urdf}")
 
 
-def text(given: argparse.Namespace) -> str:
-    """Return the text of the file: limits [deg], joint positions [deg], positions [mm] and quaternions w x y z."""
+def same_poses(one: str, other: str) -> bool:
+    """Return whether two files have the same joint positions and poses."""
+    numbers = [
+        [float(v) for v in re.findall(r"-?[0-9.]+(?:e-?[0-9]+)?", text.split("poses:")[1])] for text in (one, other)
+    ]
+    return len(numbers[0]) == len(numbers[1]) and max(abs(a - b) for a, b in zip(*numbers, strict=True)) <= SAME
+
+
+def text(given: argparse.Namespace, stored: str = "") -> str:
+    """Return the text of the file: limits [deg], joint positions [deg], positions [mm] and quaternions w x y z.
+
+    Parameters
+    ----------
+    stored
+        Text of the file that is there, whose entries by hand are kept.
+    """
     import pinocchio
 
     model: Any = pinocchio.buildModelFromUrdf(str(given.urdf))
@@ -56,6 +85,7 @@ def text(given: argparse.Namespace) -> str:
         f"source: {{repository: {given.repository}, path: {given.path}, revision: {given.revision}}}",
         f"base: {given.base}",
         f"tip: {given.tip}",
+        *(line for line in stored.splitlines() if line.partition(":")[0] in BY_HAND),
         f"limits: {limits}",
         "poses:",
     ]

@@ -170,3 +170,72 @@ def test_directions_and_columns_of_no_clear_target_are_not_used(tmp_path: Path) 
     text = wide(tmp_path, f"p,J1,X,Y,Z,{names}\na,90,80,1,3,10,0,0,1,2,3\nb,91,81,1,4,0,10,0,1,2,3\n")
     assert "which target they are of is not clear" in text
     assert "# Not used: std x, std y, std z" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "entry"),
+    [("U [mm]", "coverage: 2}"), ("u [um]", "unit: um}"), ("U (mm)", "coverage: 2}")],
+)
+def test_an_uncertainty_alone_is_told_by_its_unit(tmp_path: Path, name: str, entry: str) -> None:
+    (line,) = [line for line in guessed(tmp_path, name, ["0.03", "0.02", "0.05"]).splitlines() if "sigma:" in line]
+    assert entry in line
+
+
+def test_a_path_in_millimetres_is_no_uncertainty(tmp_path: Path) -> None:
+    assert "sigma:" not in guessed(tmp_path, "u [mm]", ["3", "200", "500"])
+    assert "sigma:" not in guessed(tmp_path, "u [mm]", ["-3", "2", "5"])
+
+
+def test_visits_are_guessed_where_labels_come_again(tmp_path: Path) -> None:
+    rows = ["Pose,J1,J2,X,Y,Z,Round"]
+    rows += [f"P{n},{10 * n},{20 * n},100{n},200,30{n}.{k},{k}" for n in (1, 2, 3) for k in (1, 2)]
+    (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
+    assert "visit: {column: Round}" in guess_mapping(tmp_path / "table.csv").text
+    (tmp_path / "table.csv").write_text("\n".join(rows[:2] + rows[3:4]) + "\n")
+    assert "visit:" not in guess_mapping(tmp_path / "table.csv").text
+
+
+def test_a_change_of_form_far_below_is_found(tmp_path: Path) -> None:
+    rows = ["Pose;J1;J2;X;Y;Z"] + [f"P{n};{n % 90},5;{n % 80},25;1000,5;{n % 700},25;30,5" for n in range(1, 5200)]
+    rows[5000] = rows[5000].replace(",", ".")
+    rows[5100] += ";7"
+    (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
+    made = guess_mapping(tmp_path / "table.csv")
+    assert "# Note: line 5101 has 7 cells where others have 6." in made.text
+    assert "# Note: line 5001, column J1: '50.5' is no number as others are written." in made.text
+    assert made.refusal is not None
+    assert "line 5101" in made.refusal or "line 5001" in made.refusal
+
+
+def test_a_guess_says_if_it_has_not_seen_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = ["Pose,J1,J2,X,Y,Z"] + [f"P{n},{n},{2 * n},1000,{n},30" for n in range(1, 500)]
+    (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
+    assert "looked at" not in guess_mapping(tmp_path / "table.csv").text
+    monkeypatch.setattr("truearm.measurement.readers.guessing.layouts._MOST_LINES", 450)
+    assert "# Note: only the first 450 lines were looked at" in guess_mapping(tmp_path / "table.csv").text
+
+
+def test_deviations_are_named_like_the_angles_beside_them(tmp_path: Path) -> None:
+    head = "label;J1;J2;X;Y;Z;A [rad];B [rad];C [rad];sA [mrad];sB [mrad];sC [mrad]"
+    rows = [f"M{n};{100 + n};2{n};80{n};2,5;3{n};0,1;0,2;0,{n};0,1;0,1;0,3" for n in (1, 2)]
+    rows.append("M3;103;23" + ";n.v." * 6 + ";" * 3)
+    (tmp_path / "table.csv").write_text("\n".join([head, *rows]) + "\n")
+    made = guess_mapping(tmp_path / "table.csv")
+    assert 'sigma_rot: {columns: ["sA [mrad]", "sB [mrad]", "sC [mrad]"], unit: mrad}' in made.text
+    assert 'missing: ["n.v."]' in made.text
+    assert made.refusal is None
+    assert made.configurations == 3
+
+
+@pytest.mark.parametrize("letter", ["p", "t", "T"])
+def test_positions_of_one_letter_are_known_where_nothing_else_is_one(tmp_path: Path, letter: str) -> None:
+    names = ",".join(letter + axis for axis in "xyz")
+    (tmp_path / "table.csv").write_text(
+        f"id,J1,J2,{names}\n" + "".join(f"{n},{100 + n},2,80{n},2.5,3\n" for n in (1, 2))
+    )
+    assert f"    x: {letter}x  # guess: its name" in guess_mapping(tmp_path / "table.csv").text
+    beside = f"id,J1,J2,X,Y,Z,{names}\n" + "".join(f"{n},{100 + n},2,80{n},2.5,3,100,0,{n}\n" for n in (1, 2))
+    (tmp_path / "table.csv").write_text(beside)
+    made = guess_mapping(tmp_path / "table.csv")
+    assert "    x: X  # guess: its name" in made.text
+    assert f"# Not used: {letter}x" in made.text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date, time
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,8 @@ def test_formats_of_times(tmp_path: Path, times: list[str], way: str) -> None:
     ("heading", "cells"),
     [
         ("Time", ["am Dienstag", "am Mittwoch"]),
-        ("Date;Time", ["03.04.2026;23:59:30", "04.04.2026;00:00:17"]),
+        ("Date;Time", ["03/04/2026;10:00:00", "05/02/2026;10:00:00"]),
+        ("Date;Time", ["03.04.2026;23:59:30", "04.04.2026;"]),
         ("Time", ["03/04/2026 10:00:00", "05/02/2026 10:00:00"]),
         ("Date", ["03.04.2026", "04.04.2026"]),
         ("t [s]", ["12.5", "3.25"]),
@@ -61,3 +63,26 @@ def test_one_day_leaves_the_order_to_its_times(tmp_path: Path) -> None:
 
 def test_a_running_time_that_rises_tells_the_order(tmp_path: Path) -> None:
     assert 'order: {column: "t [s]"}' in guessed(tmp_path, "t [s]", ["0.00", "47.25", "94.5"])
+
+
+def test_a_day_and_a_time_in_two_columns_are_taken_together(tmp_path: Path) -> None:
+    text = guessed(tmp_path, "Date;Time", ["03.04.2026;23:59:30", "04.04.2026;00:00:17"])
+    assert "order: {columns: [Date, Time], time: '%d.%m.%Y %H:%M:%S'}  # guess: their names and their texts" in text
+
+
+def test_days_of_a_workbook_and_its_times_are_taken_together(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["Info", "of nothing"])
+    sheet = book.create_sheet("Data")
+    sheet.append(["Pose", "Day", "Clock", "J1", "J2", "X", "Y", "Z"])
+    for n, day in ((1, 24), (2, 23)):
+        sheet.append([f"P{n}", date(2026, 11, day), time(10, n, 5), 10.5 * n, -20 - n, 1000.5, 2 * n, 3])
+    book.save(tmp_path / "table.xlsx")
+    made = truearm.import_guess(tmp_path / "table.xlsx")
+    assert "order: {columns: [Day, Clock], time: iso}" in made.text
+    mapping = tmp_path / "map.yaml"
+    mapping.write_text(made.text.replace("confirmed: no", "confirmed: yes").replace("unit: '?'", "unit: deg"))
+    data = truearm.import_table(tmp_path / "table.xlsx", mapping).data
+    assert data.number is not None
+    assert data.number.tolist() == [1, 0]

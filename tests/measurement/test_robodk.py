@@ -89,6 +89,22 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str, words: str) -> N
     assert not out.exists()
 
 
+def test_semicolons_and_decimal_commas(tmp_path: Path) -> None:
+    plain = truearm.import_robodk(written(tmp_path, POINTS)).data
+    other = written(tmp_path, POINTS.replace(",", ";").replace(".", ","))
+    data = truearm.import_robodk(other, delimiter="semicolon", decimal="comma").data
+    assert np.array_equal(data.position, plain.position, equal_nan=True)
+    assert np.array_equal(data.joints, plain.joints)
+    tabs = truearm.import_robodk(written(tmp_path, POINTS.replace(",", "\t")), delimiter="tab").data
+    assert np.array_equal(tabs.joints, plain.joints)
+    with pytest.raises(InputError, match="commas cannot stand between columns and in numbers"):
+        truearm.import_robodk(other, decimal="comma")
+    with pytest.raises(InputError, match="or name what the file has by `delimiter`"):
+        truearm.import_robodk(other)
+    with pytest.raises(InputError, match=r"line 2, column X: the number has a point.*name the other decimal sign"):
+        truearm.import_robodk(written(tmp_path, POINTS.replace(",", ";")), delimiter="semicolon", decimal="comma")
+
+
 def calibrated() -> tuple[truearm.Robot, Dataset]:
     _, data = campaign("irb120", 12, 0.0, 1)
     return truearm.calibrate("irb120", data, train="all").fit.robot, data

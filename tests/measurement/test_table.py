@@ -365,3 +365,27 @@ def test_real_points_in_spatial_analyzer_form(measured_data: Path, tmp_path: Pat
     mapping = SPATIAL.replace("  key: label\n", "  layout: {delimiter: whitespace, header: none}\n")
     data = read(tmp_path, "\n".join(lines), mapping.replace("[q1]", "[1, 2, 3, 4, 5, 6]"), joints)
     assert csv_text(data) == csv_text(plain)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        (LONG + "b,30,40\n", "line 5, column ball: the row does not have as many cells as the header"),
+        (LONG + "b,30,40,one,7,8,9,10\n", "line 5, cell 8: the row does not have as many cells as the header"),
+        (LONG.replace("two", '"two'), "line 3, cell 4: the quotes do not fit together"),
+        (LONG.replace("q1", '"q1'), "line 1, cell 2: the quotes do not fit together"),
+        (LONG.replace("a,10,20,two", 'a,"10",20,"t""wo'), "line 3, cell 4: the quotes do not fit together"),
+        (LONG.replace("q2", "q1"), "has 2 columns of this name, columns 2 and 3"),
+        (LONG.replace("Y", "Y [mm]"), r"got 'Y'.*Did you mean Y \[mm\]\?"),
+    ],
+)
+def test_lines_that_cannot_be_cut_are_refused_by_the_cell(tmp_path: Path, text: str, place: str) -> None:
+    with pytest.raises(InputError, match=place):
+        read(tmp_path, text, MAP)
+
+
+def test_bytes_that_are_no_text_are_refused_by_the_cell(tmp_path: Path) -> None:
+    read(tmp_path, LONG, MAP)
+    (tmp_path / "table.txt").write_bytes(LONG.replace("two", "tw@").encode().replace(b"@", b"\xe4"))
+    with pytest.raises(InputError, match="line 3, cell 4: the file is not utf-8 text"):
+        read_table(tmp_path / "table.txt", tmp_path / "map.yaml")

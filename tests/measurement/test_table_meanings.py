@@ -11,8 +11,9 @@ import pytest
 from tests.measurement.test_table import LONG, MAP, read
 
 from truearm.errors import InputError
+from truearm.jobs.import_table import import_table
 from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.table import read_table
+from truearm.measurement.readers.table import read_noting, read_table
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_vector
 
 ROWS = "pose,q1,q2,ball,X,Y,Z,a,b,c\np,1,2,t,1,2,3,{}\n"
@@ -64,6 +65,22 @@ def test_deviations_in_columns(tmp_path: Path) -> None:
     assert one.sigma[0] == pytest.approx(4e-5)
 
 
+def test_deviations_that_are_far_apart_are_told(tmp_path: Path) -> None:
+    mapping = MAP.replace("z: Z", "z: Z, sigma: {columns: [a, b, c], unit: mm}")
+    table = "pose,q1,q2,ball,X,Y,Z,a,b,c\np,1,2,t,1,2,3,0.01,0.02,{}\np,1,2,u,1,2,3,0.01,0.01,0.04\np,1,2,v,,,,,,\n"
+    read(tmp_path, table.format("0.03"), mapping)
+    data, (notice,) = read_noting(tmp_path / "table.txt", tmp_path / "map.yaml")
+    assert (notice.code, notice.level) == ("sigma-uneven", "note")
+    assert "3.5 times apart in half of the readings or more, and up to 4 times" in notice.message
+    assert data.sigma is not None
+    assert 3.0 * data.sigma[0] ** 2 == pytest.approx(1e-10 * (1 + 4 + 9))
+    told = import_table(tmp_path / "table.txt", tmp_path / "map.yaml")
+    assert told.lines()[-1].startswith("Note (sigma-uneven): ")
+    assert told.summary()["warnings"][0]["code"] == "sigma-uneven"
+    (tmp_path / "table.txt").write_text(table.format("0.01").replace("0.04", "0.015"))
+    assert not import_table(tmp_path / "table.txt", tmp_path / "map.yaml").warnings
+
+
 def test_deviations_of_each_target_of_a_wide_table(tmp_path: Path) -> None:
     mapping = MAP.replace(
         "- {target_column: ball, x: X, y: Y, z: Z}",
@@ -82,6 +99,8 @@ def test_texts_that_mean_missing(tmp_path: Path) -> None:
     commas = LONG.replace(",", ";").replace("7;;9", "7,5;n.a.;9")
     layout = "layout: {delimiter: semicolon, decimal: comma}\n"
     assert read(tmp_path, commas, MAP + layout + "missing: [n.a.]\n").has_position.tolist() == [True, True, False]
+    with pytest.raises(InputError, match=r"a number belongs here; got 'n.a.'.*name its text under missing"):
+        read(tmp_path, commas, MAP + layout)
     with pytest.raises(InputError, match=r"line 2, column q1: a number belongs here; got 'n/a'"):
         read(tmp_path, LONG.replace("a,10,20,one", "a,n/a,20,one"), MAP + "missing: [n/a]\n")
     with pytest.raises(InputError, match="name its text under missing in the mapping"):
@@ -265,3 +284,41 @@ def test_a_mapping_that_nobody_confirmed_is_refused(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"map.yaml, confirmed: this mapping was guessed.*allowed: yes"):
             read(tmp_path, LONG, MAP + f"confirmed: {word}\n")
     assert read(tmp_path, LONG, MAP + "confirmed: yes\n").labels == ("a", "b")
+
+
+def test_a_day_and_a_time_in_two_columns_tell_the_order(tmp_path: Path) -> None:
+    table = "pose,q1,q2,ball,X,Y,Z,day,clock\nb,1,2,t,1,2,3,23.11.2026,00:01\na,3,4,t,1,2,3,22.11.2026,23:59\n"
+    order = "order: {columns: [day, clock], time: '%d.%m.%Y %H:%M'}\n"
+    data = read(tmp_path, table, MAP + order)
+    assert data.number is not None
+    assert data.number.tolist() == [1, 0]
+    for text, part in (
+        (table.replace("23:59", ""), "line 3, column clock: this cell is empty, and the other of day and time is not"),
+        (table.replace("23:59", "late"), "line 3, column day and clock: this is no time of the format"),
+        (table.replace("22.11.2026,23:59", "23.11.2026,00:01"), "line 3, column day and clock: the configurations"),
+    ):
+        with pytest.raises(InputError, match=part):
+            read(tmp_path, text, MAP + order)
+    for wrong, part in (
+        ("{columns: [day], time: iso}", "not one column with the day and one with the time"),
+        ("{columns: [day, clock]}", "give their format"),
+        ("{columns: [day, hour], time: iso}", r"order.columns\[2\]"),
+    ):
+        with pytest.raises(InputError, match=part):
+            read(tmp_path, table, MAP + f"order: {wrong}\n")
+
+
+def test_visits_come_from_a_column(tmp_path: Path) -> None:
+    table = "pose,q1,q2,ball,X,Y,Z,round\na,1,2,t,1,2,3,1\na,1,2,u,1,2,3,2\nb,3,4,t,1,2,3,1\n"
+    data = read(tmp_path, table, MAP + "visit: {column: round}\n")
+    assert data.visit is not None
+    assert data.visit.tolist() == [1, 2, 1]
+    (tmp_path / "again.csv").write_text(csv_text(data))
+    assert np.array_equal(np.asarray(read_csv(tmp_path / "again.csv").visit), data.visit)
+    with pytest.raises(InputError, match="line 3, column round: this is no number of a visit; got 'II'"):
+        read(tmp_path, table.replace("3,2\n", "3,II\n"), MAP + "visit: {column: round}\n")
+    mapping = MAP.replace("columns: [q1, q2]\n  unit: deg", "file: joints.csv") + "visit: {column: round}\n"
+    joints = "configuration,joint_1 [deg],joint_2 [deg]\na,1,2\nb,3,4\nc,5,6\n"
+    assert len(np.asarray(read(tmp_path, table, mapping, joints).visit)) == 5
+    with pytest.raises(InputError, match="a column is used twice"):
+        read(tmp_path, table, MAP + "visit: {column: X}\n")

@@ -88,7 +88,7 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
                 "joints[2]",
                 "modified-hayati",
                 "got 'alpa'",
-                "allowed: name, type, limits, transmission_periods, bearing, alpha, beta",
+                "allowed: name, type, limits, transmission_periods, bearing, max_speed, alpha, beta",
                 "Did you mean alpha",
             ],
             id="unknown column",
@@ -147,6 +147,24 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
             changed("limits: [-165, 165]", "limits: [-165, 165], bearing: -1e9"),
             ["joints[1].bearing", "farther along its axis", "got '-1e+06 m'", "up to 10 m either way"],
             id="bearing",
+        ),
+        *(
+            pytest.param(
+                changed("limits: [-165, 165]", f"limits: [-165, 165], max_speed: {speed}"),
+                ["joints[1].max_speed", *parts],
+                id=f"max_speed {speed}",
+            )
+            for speed, parts in (
+                (
+                    "4.36",
+                    ["no joint is so slow or so fast at 100 %", "got '4.36 deg/s'", "10 to 10000 deg/s", "in deg/s"],
+                ),
+                ("0", ["got '0 deg/s'", "take the entry out"]),
+                ("-250", ["got '-250 deg/s'"]),
+                ("25000", ["got '25000 deg/s'"]),
+                ("fast", ["a number belongs here", "got 'fast'"]),
+                (".nan", ["finite", "got nan"]),
+            )
         ),
         pytest.param(
             changed("limits: [-165, 165]", "limits: [-165, 165], transmission_periods: 0"),

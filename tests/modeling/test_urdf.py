@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +12,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from ruamel.yaml import YAML
 from tests.arms import ARMS
 
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
-from truearm.modeling.formats.robot_file import read_robot, robot_text
+from truearm.modeling.formats.robot_file import RobotFile, read_robot, robot_from_file, robot_text
 from truearm.modeling.formats.urdf import calibrated_urdf, read_urdf
 from truearm.modeling.formats.urdf_tree import roll_pitch_yaw
 from truearm.modeling.formats.urdf_writing import urdf_text
@@ -373,6 +376,14 @@ REFUSED: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "no limit": (only(type_="revolute"), ("joint j", "revolute", "<limit>", "continuous")),
     "no limit of a slide": (only(type_="prismatic"), ("joint j", "prismatic", "Give the joint's limits.")),
     "word as a limit": (simple(TURN.replace('"-1"', "'low'"), links=AB), ("joint turn", "<limit lower>", "'low'")),
+    "velocity below zero": (
+        simple(TURN.replace('velocity="1"', 'velocity="-1"'), links=AB),
+        ("joint turn", "velocity of a <limit> cannot be negative", "-1"),
+    ),
+    "word as a velocity": (
+        simple(TURN.replace('velocity="1"', 'velocity="fast"'), links=AB),
+        ("joint turn", "<limit velocity>", "'fast'"),
+    ),
     "limits that close": (
         simple(TURN.replace('"-1"', '"0"').replace('upper="1"', ""), links=AB),
         ("joint turn", "lower limit must be below", "lower 0.0, upper 0.0", "continuous"),
@@ -650,7 +661,9 @@ def check_new_file(robot: Robot, folder: Path) -> None:
     at_identity = robot.with_frames(Transform(), {})
     check_poses(at_identity, text, "tool0", atol=1e-12)
     again = read(text.encode(), folder)
-    assert [(j.name, j.kind, j.limits) for j in again.joints] == [(j.name, j.kind, j.limits) for j in robot.joints]
+    assert [(j.name, j.kind, j.limits, j.max_speed) for j in again.joints] == [
+        (j.name, j.kind, j.limits, j.max_speed) for j in robot.joints
+    ]
     assert [(m.joint, m.mass) for m in again.masses] == [(m.joint, m.mass) for m in robot.masses]
     q = np.zeros((1, len(robot.joints)))
     for old, new in zip(at_identity.masses, again.masses, strict=True):
@@ -687,13 +700,57 @@ def test_new_file_of_robot_of_any_convention(convention: Convention, seed: int, 
 
 
 def test_new_file_says_what_it_does_not_know() -> None:
-    text, left_out = urdf_text(load_robot("irb120"))
+    text, left_out = urdf_text(with_speeds(load_robot("irb120")))
     assert left_out == [
         "Effort and velocity limits are not known and stand as 0.",
         "Inertia tensors are not written and stand as 0.",
     ]
     assert '<axis xyz="0.0 0.0 1.0"/>' in text
     assert 'effort="0" velocity="0"' in text
+
+
+def with_speeds(robot: Robot, *speeds: float | None) -> Robot:
+    """Return a robot whose joints have these speeds at 100 %, and none beyond."""
+    pairs = zip_longest(robot.joints, speeds)
+    return replace(robot, joints=tuple(replace(joint, max_speed=speed) for joint, speed in pairs))
+
+
+def test_velocities_of_limits_are_the_speeds_of_the_joints(tmp_path: Path) -> None:
+    robot = load_robot("irb120")
+    free = replace(robot, joints=(replace(robot.joints[0], limits=None), *robot.joints[1:]))
+    path = tmp_path / "arm.urdf"
+    for made, said in (
+        (free, "Effort limits are not known and stand as 0."),
+        (
+            with_speeds(free, 1.5, None, 2.5, 3.5, 4.5),
+            "Effort limits, and velocity limits of axis_2, axis_6, are not known and stand as 0.",
+        ),
+    ):
+        text, left_out = urdf_text(made)
+        assert left_out[0] == said
+        path.write_text(text)
+        again = read_urdf(path)
+        assert [(joint.limits, joint.max_speed) for joint in again.joints] == [
+            (joint.limits, joint.max_speed) for joint in made.joints
+        ]
+        saved = robot_from_file(RobotFile(**YAML(typ="safe").load(robot_text(again))), "again")
+        assert [joint.max_speed for joint in saved.joints] == pytest.approx([joint.max_speed for joint in made.joints])
+
+
+@pytest.mark.parametrize(
+    ("velocity", "speed"),
+    [
+        ('velocity="3.15"', 3.15),
+        ('velocity="0"', None),
+        ('velocity="0.1"', None),
+        ('velocity="1e6"', None),
+        ("", None),
+    ],
+)
+def test_a_velocity_that_no_joint_has_is_unknown(velocity: str, speed: float | None, tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(simple(TURN.replace('velocity="1"', velocity), links=AB))
+    assert read_urdf(path).joints[0].max_speed == speed
 
 
 def test_two_masses_of_one_link_become_one(tmp_path: Path) -> None:

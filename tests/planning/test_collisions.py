@@ -55,7 +55,7 @@ def test_distance_from_a_box_by_brute_force() -> None:
     assert box_distance(p, p, low, high) == pytest.approx(np.linalg.norm(p - np.clip(p.T, low, high).T, axis=0))
 
 
-@pytest.mark.parametrize("name", ["irb120", "ur5e", "fr3", "katana450"])
+@pytest.mark.parametrize("name", ["irb120", "gp7", "fr3", "katana450"])
 def test_rooms_are_those_of_sampled_links(name: str) -> None:
     robot = arm(name)
     q = drawn(robot, 60)

@@ -113,7 +113,7 @@ def test_inverse_kinematics_reaches_the_largest_cube_and_not_one_around_it() -> 
 @pytest.mark.parametrize(
     ("words", "make"),
     [
-        ("the side of a cube must be positive", lambda: Cube((0, 0, 0), 0)),
+        ("the side of a cube must be positive; got -5 mm", lambda: Cube((0, 0, 0), -0.005)),
         ("three finite coordinates", lambda: Cube((0, 0, np.inf), 1)),
         ("no such diagonal plane", lambda: CUBE.plane("C1-C3-C5-C7")),
         ("radius of the circle: it does not lie within", lambda: CUBE.planes[0].circle(0.11)),

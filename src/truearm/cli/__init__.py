@@ -29,6 +29,7 @@ from truearm.cli.influence import influence
 from truearm.cli.iso9283 import app as iso9283
 from truearm.cli.library import robots, show
 from truearm.cli.lines import lines
+from truearm.cli.measure import measure
 from truearm.cli.options import CommandError, Commands
 from truearm.cli.path import path
 from truearm.cli.plan import plan
@@ -82,6 +83,7 @@ app.command()(distances)
 app.command()(compensate)
 app.command()(ik)
 app.command()(plan)
+app.command()(measure)
 app.command()(poses)
 app.command()(path)
 app.command()(axes)

@@ -110,6 +110,10 @@ def robodk(
         str | None, typer.Option(metavar="deg|rad", help="Unit of the angles of measured poses.", show_default=False)
     ] = None,
     joints_are: JointsAreText = None,
+    delimiter: Annotated[
+        str, typer.Option(metavar="comma|semicolon|tab", help="What stands between columns.")
+    ] = "comma",
+    decimal: Annotated[str, typer.Option(metavar="point|comma", help="The decimal sign.")] = "point",
     json: Json = False,
 ) -> None:
     """Calibration or validation measurements of RoboDK: joints, measured points and tool points."""
@@ -119,6 +123,8 @@ def robodk(
         file,
         angle_unit=angle_unit,  # type: ignore[arg-type]
         joints_are=joints_are or "model",  # type: ignore[arg-type]
+        delimiter=delimiter,  # type: ignore[arg-type]
+        decimal=decimal,  # type: ignore[arg-type]
         out=out,
     )
     if json:

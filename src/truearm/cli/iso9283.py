@@ -40,6 +40,16 @@ def plan(
     ahead: Ahead = "+x",
     nearest: Nearest = 0.0,
     floor: Floor = 0.0,
+    constraints: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="What stands in the cell, as for 'truearm plan': ways keep clear.", show_default=False
+        ),
+    ] = None,
+    clearance: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Room that ways keep to floor, boxes, links.", show_default="not kept, or 50"),
+    ] = None,
     program: Annotated[
         str | None,
         typer.Option(
@@ -77,6 +87,8 @@ def plan(
         ahead=ahead,  # type: ignore[arg-type]
         nearest=sized_si(nearest, "mm", parameter="nearest"),
         floor=sized_si(floor, "mm", parameter="floor"),
+        constraints=constraints,
+        clearance=None if clearance is None else sized_si(clearance, "mm", parameter="clearance"),
         program=program,
         dwell=dwell,
         slow_run=slow_run,

@@ -10,11 +10,20 @@ from truearm.cli.loading import read_joints
 from truearm.cli.output import Json, print_json, print_record
 
 
-def robots(json: Json = False) -> None:
-    """List the robots of the library."""
+def robots(
+    text: Annotated[
+        str | None, typer.Argument(metavar="[TEXT]", help="Words of the id or the name, such as 'IRB 1200'.")
+    ] = None,
+    maker: Annotated[str | None, typer.Option(metavar="NAME", help="Those of a maker.", show_default="all")] = None,
+    axes: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Those with so many joints.", show_default="any number")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List the robots of the library, all or some."""
     from truearm.jobs.robots import robots as run
 
-    found = run()
+    found = run(text, maker=maker, axes=axes)
     if json:
         print_json(found.summary())
     else:

@@ -25,9 +25,7 @@ def plan(
     ],
     candidates_from: Annotated[
         str | None,
-        typer.Option(
-            "--from", metavar="DATA.csv", help="Choose among the configurations of a file.", show_default=False
-        ),
+        typer.Option("--from", metavar="DATA.csv", help="Choose among those of a file or a plan.", show_default=False),
     ] = None,
     objective: Annotated[
         str | None,

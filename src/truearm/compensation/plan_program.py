@@ -1,8 +1,6 @@
 """The measuring program of a plan: every configuration under its label, from the safe one and back to it.
 
-Joints go evenly, all at once, as the ways were checked. How fast the joints of an arm go at 100 % is rarely known, so
-both limits are kept for all arms between slow and fast ones: the speed of the tip for the fastest, where a language
-says shares, and the share of the joints' speed for the slowest, where it says times or speeds.
+Joints go evenly, all at once, as the ways were checked, see :mod:`truearm.compensation.joint_speeds` for how fast.
 """
 
 from __future__ import annotations
@@ -14,6 +12,14 @@ from typing import Final, Literal
 import numpy as np
 
 from truearm.compensation.joint_counts import counts_comments
+from truearm.compensation.joint_speeds import (
+    fastest_point,
+    first_share,
+    joint_rates,
+    joint_shares,
+    known_speeds,
+    turned,
+)
 from truearm.compensation.programs.motion_program import (
     Carried,
     InputWait,
@@ -25,11 +31,11 @@ from truearm.compensation.programs.motion_program import (
     Wait,
     number,
 )
-from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.kinematics import reach
 from truearm.modeling.robot import Robot
 from truearm.planning.driving.tour import Stop, Tour
+from truearm.units import from_si
 
 #: Name of the program; every language takes it.
 PROGRAM: Final = "MEASURE"
@@ -37,22 +43,8 @@ PROGRAM: Final = "MEASURE"
 MEASURED: Final = "Measure"
 #: Labels of as many characters fit into every comment of every language.
 LONGEST_LABEL: Final = 21
-#: At 100 % no joint of an arm is faster than this: of the first three, and of the others [rad/s], nor do they turn the
-#: stretched arm faster [m/s]. Above what ROS-Industrial's packages have for some of the fastest: KUKA KR 3 R540, FANUC
-#: LR Mate 200iD, Yaskawa GP7, Staubli TX2-60.
-_FAST: Final = ((math.radians(600.0), 12.0), (math.radians(1600.0), math.radians(2500.0)))
-#: At 100 % no joint is slower, of an arm of this length stretched [m] and of longer ones [rad/s]: assumed.
-_SLOW: Final = (2.0, math.radians(100.0), math.radians(50.0))
-#: The same of sliding joints: the slowest and the fastest [m/s].
-_SLIDING: Final = (0.2, 5.0)
 #: While it speeds up and slows down, a robot is slower than on average, by less than so long [s].
 _RAMPS: Final = 0.5
-#: Ways are looked at in steps of no more [rad or m].
-_STEP: Final = math.radians(3.0)
-#: The finest share that a language says; URScript says a speed instead.
-_FINEST: Final = {"KRL": 0.01, "FANUC LS": 0.01, "URScript": 1e-6}
-_FINEST_ELSEWHERE: Final = 1e-4
-_FIRST_JOINTS: Final = 3
 #: Share, speed of the tip, time and angular velocity of a joint motion.
 _Pace = tuple[float, float, float | None, float]
 
@@ -158,16 +150,11 @@ def _stand(label: str, driving: Driving) -> list[ProgramStep]:
 
 
 def _first_move(robot: Robot, language: str, driving: Driving) -> _Pace:
-    """Return share, speed, time and angular velocity of the move to the safe configuration, from nobody knows where.
-
-    As if all joints turned the outstretched arm.
-    """
+    """Return share, speed, time and angular velocity of the move to the safe configuration, from nobody knows where."""
     far = max(reach(robot, name) for name in (None, *(target.name for target in robot.targets)))
-    slow, fast = joint_rates(robot)
-    rate = FASTEST if language == "URScript" else float(fast.max())
-    share = min(driving.share, driving.speed / (rate * far))
+    slow, _ = joint_rates(robot)
     turning = min(driving.share * float(slow.min()), driving.speed / far)
-    return _said(share, language), driving.speed, None, turning
+    return first_share(robot, language, driving.share, driving.speed), driving.speed, None, turning
 
 
 def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: Array) -> tuple[_Pace, float]:
@@ -175,54 +162,18 @@ def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: A
 
     The angular velocity is of no meaning where the time is said.
     """
-    turned = np.abs(np.diff(shown, axis=0))[0]
-    rate = _fastest_point(robot, joints)
-    slow, fast = joint_rates(robot)
-    if language == "URScript":
-        fast = np.full(len(turned), FASTEST)
-    leading = float((turned / fast).max())
-    share = driving.share if rate <= 0 else min(driving.share, driving.speed * leading / rate)
-    seconds = max(float((turned / slow).max()) / driving.share, rate / driving.speed) + _RAMPS
-    said = _said(share, language)
-    speed = rate * said / leading if language != "RAPID" and leading > 0 else 0.0
-    return (said, driving.speed, math.ceil(100.0 * seconds) / 100.0, driving.share * float(slow.min())), speed
-
-
-def _said(share: float, language: str) -> float:
-    """Return a share as a language says it: no larger, unless it has none so small."""
-    finest = _FINEST.get(language, _FINEST_ELSEWHERE)
-    return max(math.floor(share / finest + 1e-9), 1) * finest
-
-
-def joint_rates(robot: Robot) -> tuple[Array, Array]:
-    """Return how fast the joints go at 100 %, at least and at most [rad/s, m/s], ``(joints,)`` each.
-
-    They are bounds for arms of its length, not its data.
-    """
-    length = max(reach(robot, None), 0.1)
-    turns = [joint.kind == "revolute" for joint in robot.joints]
-    slowest = _SLOW[1] if length <= _SLOW[0] else _SLOW[2]
-    fastest = [min(rate, along / length) for rate, along in _FAST]
-    slow = [slowest if turning else _SLIDING[0] for turning in turns]
-    fast = [fastest[k >= _FIRST_JOINTS] if turning else _SLIDING[1] for k, turning in enumerate(turns)]
-    return np.array(slow), np.array(fast)
+    slow, _ = joint_rates(robot)
+    said, speed = joint_shares(robot, language, joints, shown, driving.share, driving.speed)
+    _, most = turned(joints, shown)
+    along = fastest_point(robot, joints)
+    seconds = max(float((most / slow).max()) / driving.share, along / driving.speed) + _RAMPS
+    pace = (said, driving.speed, math.ceil(100.0 * seconds) / 100.0, driving.share * float(slow.min()))
+    return pace, speed if language != "RAPID" else 0.0
 
 
 def shown_speed(speed: float) -> str:
     """Return a speed in mm/s, rounded up."""
     return number(math.ceil(1e4 * speed - 1e-6) / 10.0, 1)
-
-
-def _fastest_point(robot: Robot, joints: Array) -> float:
-    """Return how fast the fastest of the targets and the flange goes, in the whole way of a move [m]."""
-    count = max(2, math.ceil(float(np.abs(np.diff(joints, axis=0)).max()) / _STEP) + 1)
-    share = np.linspace(0.0, 1.0, count)[:, None]
-    along = (1.0 - share) * joints[0] + share * joints[1]
-    fastest = 0.0
-    for name in (None, *(target.name for target in robot.targets)):
-        steps = np.diff(robot.forward(along, target=name)[0], axis=0)
-        fastest = max(fastest, float(np.linalg.norm(steps, axis=1).max()) * (count - 1))
-    return fastest
 
 
 def _carried(robot: Robot) -> Carried:
@@ -252,6 +203,7 @@ def _notes(robot: Robot, carried: Carried, driving: Driving, fastest: float, mar
         f"Load {number(carried.mass, 3)} kg at",
         at(carried.cog_mm),
         f"At most {shown_speed(fastest)} mm/s and {number(100 * driving.share, 2)} %",
+        *_speed_comments(robot),
         f"Dwell {number(driving.dwell, 2)} s, wait: {driving.words}",
         *counts_comments(robot),
         "Not verified, no safety function",
@@ -259,3 +211,16 @@ def _notes(robot: Robot, carried: Carried, driving: Driving, fastest: float, mar
         "at reduced speed, nobody near",
         "Go to Home by hand before it",
     )
+
+
+def _speed_comments(robot: Robot) -> tuple[str, ...]:
+    """Return how fast joints go at 100 %, where that is known, in lines that every language takes."""
+    speeds = known_speeds(robot)
+    if speeds is None:
+        return ()
+    turning = all(joint.kind == "revolute" for joint in robot.joints)
+    numbers = [
+        f"{from_si(speed, 'deg' if joint.kind == 'revolute' else 'mm'):.0f}"
+        for speed, joint in zip(speeds, robot.joints, strict=True)
+    ]
+    return (f"of the joints' {'deg/s' if turning else 'deg/s, mm/s'}:", " ".join(numbers))

@@ -32,6 +32,7 @@ JOBS: Final = (
     "plan_inclinometers",
     "poses",
     "path",
+    "measure",
     "simulate",
     "simulate_inclinometers",
     "inverse",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from numbers import Integral, Real
 from pathlib import Path
@@ -20,6 +20,7 @@ from truearm.manifest import sets_in
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
+from truearm.measurement.readers.configurations import read_configurations
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
@@ -37,6 +38,7 @@ T = TypeVar("T")
 
 #: Where a force acts that acts on no target.
 FLANGE: Final = "flange"
+_CANONICAL: Final = "a canonical CSV file"
 #: Whose joint positions can be asked for.
 JOINTS_OF: Final[dict[str, JointsOf]] = {"controller": "controller", "model": "model"}
 
@@ -74,8 +76,10 @@ def refuse_swapped(robot: object, data: object, job: str) -> None:
         )
 
 
-def data_argument(data: object, parameter: str = "data") -> Dataset:
-    """Return the dataset that was given, or that a canonical CSV file holds."""
+def data_argument(
+    data: object, parameter: str = "data", read: Callable[[Path], Dataset] = read_csv, allowed: str = _CANONICAL
+) -> Dataset:
+    """Return the dataset that was given, or that a file holds: a canonical CSV, or what `read` reads."""
     if isinstance(data, Dataset):
         return data
     if isinstance(data, str | Path):
@@ -85,12 +89,12 @@ def data_argument(data: object, parameter: str = "data") -> Dataset:
                 "this is a robot, and measurements belong here",
                 parameter=parameter,
                 came=str(data),
-                allowed="a canonical CSV file",
+                allowed=allowed,
                 cure="Exchange robot and measurements, or name the file of measurements.",
             )
         with refusals_of(parameter):
-            return read_csv(path)
-    raise wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
+            return read(path)
+    raise wrong_kind("measurements belong here", data, parameter, f"a Dataset, or {allowed}")
 
 
 def readings_argument(robot: Robot, data: object, parameter: str = "data") -> Dataset:
@@ -98,6 +102,13 @@ def readings_argument(robot: Robot, data: object, parameter: str = "data") -> Da
     measured = data_argument(data, parameter)
     with refusals_of(parameter):
         return in_model_joints(robot, measured)
+
+
+def configurations_argument(robot: Robot, data: object, parameter: str) -> Dataset:
+    """Return where an arm stands, by its model: with measurements, or without them as the table of a plan has it."""
+    found = data_argument(data, parameter, read_configurations, f"{_CANONICAL}, or that of a plan")
+    with refusals_of(parameter):
+        return in_model_joints(robot, found)
 
 
 def joints_argument(joints: object, robot: Robot, parameter: str = "joints") -> JointsOf:
@@ -119,7 +130,7 @@ def folder_for(names: Iterable[str], out: object, *read: object, parameter: str 
     read
         What the job was given: none of these, as far as they are files, may be overwritten.
     ours
-        Whether only files may be overwritten that truearm has written there.
+        Whether only files may be overwritten that truearm has written there and nobody has changed since.
     """
     return output_folder(out, names, files_of(*read), parameter, ours=ours)
 
@@ -146,9 +157,9 @@ def folder_beside(names: Iterable[str], mark: str, out: object, *read: object) -
     return folder
 
 
-def file_for(out: object, *read: object, parameter: str = "out") -> Path:
-    """Return where a file shall be written, or refuse a place that cannot be; `read` as for :func:`folder_for`."""
-    return output_file(out, files_of(*read), parameter)
+def file_for(out: object, *read: object, parameter: str = "out", ours: bool = False) -> Path:
+    """Return where a file shall be written, or refuse a place that cannot be; the rest as for :func:`folder_for`."""
+    return output_file(out, files_of(*read), parameter, ours=ours)
 
 
 def new_file_for(out: object, parameter: str = "out") -> Path:
@@ -244,6 +255,8 @@ def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float
 
 def numbers_argument(values: object, parameter: str, count: int, allowed: str) -> tuple[float, ...]:
     """Return `count` finite numbers."""
+    if isinstance(values, Real) and not isinstance(values, bool) and count != 1:
+        raise InputError(f"{count} numbers belong here", parameter=parameter, came=1, allowed=allowed)
     if not _is_sequence(values):
         raise wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
     found = [*values]
@@ -283,8 +296,13 @@ def length_argument(value: object, parameter: str, lowest: float = -math.inf) ->
     length = finite_number(value, parameter, allowed="a length")
     least, most = accepted_range("m")
     if not max(least, lowest) <= length <= most:
-        span = f"up to {most:g} m" if lowest == -math.inf else f"{lowest:g} m to {most:g} m"
-        raise InputError("the length is out of range", parameter=parameter, came=f"{length:g} m", allowed=span)
+        span = "up to" if lowest == -math.inf else f"{lowest * 1e3:g} mm to"
+        raise InputError(
+            "the length is out of range",
+            parameter=parameter,
+            came=f"{length * 1e3:g} mm",
+            allowed=f"{span} {most * 1e3:g} mm",
+        )
     return length
 
 

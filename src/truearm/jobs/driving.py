@@ -6,10 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.errors import InputError, refusals_of
+from truearm.files import path_argument
 from truearm.jobs.arguments import flag_argument, length_argument, numbers_argument
 from truearm.modeling.robot import Robot
-from truearm.planning.constraints.constraints import Constraints, keep_out
+from truearm.planning.constraints.constraints import Constraints, keep_out, read_constraints
 from truearm.planning.driving.cell import (
     CLEARANCE,
     FLOOR,
@@ -28,6 +29,14 @@ from truearm.units import sized_si
 
 #: What is less, and not zero, is meant in another unit [m].
 _LEAST_CLEARANCE: Final = 1e-3
+
+
+def constraints_argument(constraints: object) -> Constraints | None:
+    """Return the constraints that were given, or that a file holds; None for None."""
+    if constraints is None or isinstance(constraints, Constraints):
+        return constraints
+    with refusals_of("constraints"):
+        return read_constraints(path_argument(constraints, "constraints"))
 
 
 def cell_argument(

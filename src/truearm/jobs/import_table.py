@@ -8,7 +8,7 @@ from truearm.errors import refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import JOINTS_OF, choice_argument, file_for
 from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.readers.table import files_read, read_table
+from truearm.measurement.readers.table import files_read, read_noting
 from truearm.modeling.controller import JointsOf
 from truearm.results.imported import Imported
 from truearm.writing import write_text
@@ -50,7 +50,7 @@ def import_table(
         read = files_read(table, columns, beside)
     target = None if out is None else file_for(out, *read)
     with refusals_of("file"):
-        data = read_table(table, columns, whose, beside)
+        data, noticed = read_noting(table, columns, whose, beside)
     if target is not None:
         write_text(target, csv_text(data))
-    return Imported(data, target)
+    return Imported(data, target, warnings=noticed)

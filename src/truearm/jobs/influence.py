@@ -134,7 +134,7 @@ def influence(
     moved = length_argument(length, "length")
     if not 0.0 < moved <= _LARGEST[1]:
         raise InputError(
-            "no length errs by that", parameter="length", came=f"{moved:g} m", allowed="above 0, to 100 mm"
+            "no length errs by that", parameter="length", came=f"{moved * 1e3:g} mm", allowed="above 0, to 100 mm"
         )
     count = None if poses is None else count_argument(poses, "poses")
     seed = whole_argument(seed, "seed")

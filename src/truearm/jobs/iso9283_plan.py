@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -21,10 +22,16 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
+from truearm.jobs.driving import constraints_argument
+from truearm.jobs.iso9283_cell import stated_cell
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, refuse_stale, written_programs
+from truearm.jobs.plans_replaced import replaced_notices
 from truearm.jobs.tip import tip_argument
+from truearm.library.wider_limits import wider_limits_notices
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+from truearm.planning.constraints.constraints import Constraints
+from truearm.planning.driving.said_of_cells import cell_notices
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
 from truearm.planning.iso9283.plan import performance_plan
 from truearm.planning.iso9283.plan_file import PLAN, read_cube
@@ -59,6 +66,8 @@ def iso9283_plan(
     ahead: Direction = "+x",
     nearest: float = 0.0,
     floor: float = 0.0,
+    constraints: Constraints | str | Path | None = None,
+    clearance: float | None = None,
     program: str | None = None,
     dwell: float = 2.0,
     slow_run: str | Path | None = None,
@@ -94,6 +103,12 @@ def iso9283_plan(
         How long the drift is watched.
     ahead, nearest, floor
         Where the largest cube is searched, as for :func:`truearm.poses`.
+    constraints
+        What stands in the cell (boxes to keep out of, a floor), limits of joints and what else a configuration must
+        keep, as for :func:`truearm.plan`, or its file. With these or a clearance all ways keep clear, or the plan is
+        refused; the largest cube is then one in which they do.
+    clearance
+        Room to keep to floor, boxes and the arm's own links [m]; None for 50 mm.
     program
         Language of measuring programs: ``rapid``, ``krl``, ``fanuc``, ``urscript``, ``inform`` or ``val3``; None writes
         none.
@@ -117,7 +132,7 @@ def iso9283_plan(
     choice_argument(plane, "plane", dict.fromkeys(PLANES))
     choice_argument(ahead, "ahead", dict.fromkeys(DIRECTIONS))
     near, low = length_argument(nearest, "nearest"), length_argument(floor, "floor")
-    band = _positive(limit_band, "limit_band", "the limit band is above 0", "a length above 0 [m]")
+    band = _positive(limit_band, "limit_band", "the limit band is above 0", "a length above 0", "mm")
     watched = _positive(hours, "hours", "the drift is watched for a time above 0", "hours above 0")
     shares = _shares(velocities, "velocities", "velocity", may_be_zero=False)
     carried = _shares(loads, "loads", "load", may_be_zero=True)
@@ -131,8 +146,10 @@ def iso9283_plan(
             parameter="slow_run",
             cure="State `program`, or leave it out.",
         )
-    inputs = files_of(robot, given_cube, record)
-    folder = None if out is None else folder_beside(PLAN_FILES, PLAN, out, robot, given_cube, record)
+    given = (robot, given_cube, record, constraints)
+    inputs = files_of(*given)
+    folder = None if out is None else folder_beside(PLAN_FILES, PLAN, out, *given)
+    rules = constraints_argument(constraints)
     call = command_argument(command) or python_call(
         "iso9283_plan",
         robot,
@@ -150,13 +167,15 @@ def iso9283_plan(
         ahead=ahead,
         nearest=nearest,
         floor=floor,
+        constraints=constraints,
+        clearance=clearance,
         program=program,
         dwell=dwell,
         slow_run=slow_run,
     )
     arm = robot_argument(robot)
     arm, target = tip_argument(arm, target, tip, "be measured")
-    warnings: list[Notice] = []
+    warnings = wider_limits_notices(arm)
     rated = _rated_load(arm, load, warnings)
     speed = _ASSUMED_VELOCITY
     if velocity is None:
@@ -170,11 +189,13 @@ def iso9283_plan(
         )
     else:
         speed = _rated_velocity(velocity)
+    where = str(constraints) if isinstance(constraints, str | Path) else "constraints"
+    cell = stated_cell(arm, rules, where, clearance)
     with refusals_of("cube"):
         whole = None if given_cube is None else read_cube(given_cube)
     with refusals_of("cube" if whole is not None else "robot"):
         plan = performance_plan(
-            arm,
+            arm if cell is None else cell.robot,
             target=target,
             tests=tests,
             cube=whole,
@@ -188,16 +209,26 @@ def iso9283_plan(
             ahead=ahead,
             nearest=near,
             floor=low,
+            unclear=None if cell is None else cell.unclear,
+            unsuited=None if cell is None else cell.unsuited,
         )
-    programs = None if language is None else written_programs(plan, language, stands, record, warnings)
-    found = Iso9283Plan(plan, call, tuple(warnings), inputs, programs)
+    kept = "" if cell is None else cell.words(plan)
+    if cell is not None:
+        warnings += cell_notices(cell.check)
+    plan = replace(plan, robot=arm)
+    programs = None
+    if language is not None:
+        programs = written_programs(plan, language, stands, record, warnings, cell_unknown=cell is None)
+    found = Iso9283Plan(plan, call, tuple(warnings), inputs, programs, kept)
     if folder is not None:
-        names = tuple(found.contents())
-        if programs is not None:
-            folder_for(names, folder, robot, given_cube, record, ours=True)
+        contents = found.contents()
         refuse_losing_slow_run(folder, record)
-        refuse_stale(folder, names, record)
+        if programs is not None:
+            folder_for(tuple(contents), folder, *given, ours=True)
+        refuse_stale(folder, tuple(contents), record)
+        replaced = replaced_notices(folder, PLAN, contents[PLAN])
         found.save(folder)
+        found = replace(found, warnings=(*found.warnings, *replaced))
     return found
 
 
@@ -228,7 +259,7 @@ def _rated_load(arm: Robot, load: object, warnings: list[Notice]) -> float:
 
 
 def _rated_velocity(velocity: object) -> float:
-    speed = _positive(velocity, "velocity", "the rated velocity is above 0", "a velocity above 0 [m/s]")
+    speed = _positive(velocity, "velocity", "the rated velocity is above 0", "a velocity above 0", "mm/s")
     least, most = _VELOCITIES
     if not least <= speed <= most:
         other = 1e3 if speed < least else 1e-3
@@ -242,10 +273,12 @@ def _rated_velocity(velocity: object) -> float:
     return speed
 
 
-def _positive(value: object, parameter: str, what: str, allowed: str) -> float:
+def _positive(value: object, parameter: str, what: str, allowed: str, thousandths: str = "") -> float:
+    """Return a number above 0; in the refusal it has the unit `thousandths`, of which 1000 make one."""
     (number,) = numbers_argument([value], parameter, 1, allowed)
     if number <= 0.0:
-        raise InputError(what, parameter=parameter, came=Words(f"{number:g}"), allowed=allowed)
+        shown = f"{1e3 * number:g} {thousandths}" if thousandths else f"{number:g}"
+        raise InputError(what, parameter=parameter, came=Words(shown), allowed=allowed)
     return number
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -12,9 +13,11 @@ import numpy as np
 from truearm.compensation.iso9283.programs import measuring_programs
 from truearm.compensation.iso9283.slow_run import SLOW_RUN, check_slow_run, slow_run_text
 from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
+from truearm.compensation.joint_speeds import speed_notices
 from truearm.compensation.path_program import BY_NAME
 from truearm.compensation.programs.motion_program import MotionProgram
 from truearm.compensation.programs.program import Language
+from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.errors import InputError, refusals_of
 from truearm.files import exists, read_bytes
 from truearm.jobs.driving import cell_argument
@@ -37,23 +40,29 @@ _MARK: Final = 12
 #: What stands for the share of the joints' speed in languages that do not say it.
 _JOINT_SPEEDS: Final = {
     "RAPID": "joint motions have the share of the rated velocity, of the tip",
-    "URScript": "100 % of the joints' speed is taken for 120 deg/s. Accelerations are URScript's own, 1.4 rad/s^2 and "
-    "1.2 m/s^2: on a short line the robot may not come to the velocity; state the acceleration a in the program where "
-    "it shall",
+    "URScript": "the leading joint goes so fast that one joint has the share. Accelerations are URScript's own, "
+    "1.4 rad/s^2 and 1.2 m/s^2: on a short line the robot may not come to the velocity; state the acceleration a in "
+    "the program where it shall",
 }
 
 
 def written_programs(
-    plan: PerformancePlan, language: Language, dwell: float, slow_run: Path | None, warnings: list[Notice]
+    plan: PerformancePlan,
+    language: Language,
+    dwell: float,
+    slow_run: Path | None,
+    warnings: list[Notice],
+    *,
+    cell_unknown: bool = True,
 ) -> WrittenPrograms:
     """Return the programs of a plan as texts: the slow ones, and the faster ones where the slow run is recorded.
 
-    What is to be said of them is added to `warnings`.
+    What is to be said of them is added to `warnings`; of ways near floor and links only where the cell is unknown.
     """
     refuse_unknown_counts(plan.robot, language.name)
     text = plan_text(plan)
     with refusals_of("program"):
-        found = measuring_programs(plan, dwell, hash_of(text.encode())[:_MARK])
+        found = measuring_programs(plan, dwell, hash_of(text.encode())[:_MARK], language.name)
         slow = _texts(found.slow, language)
         faster = {} if slow_run is None else _texts(found.faster, language)
     record = None
@@ -67,18 +76,25 @@ def written_programs(
         warnings.append(
             Notice("maker", f"{robot.name} is of {robot.maker}, and programs were written in {language.name}.")
         )
-    warnings += counts_notices(robot)
-    if language.name in _JOINT_SPEEDS:
-        warnings.append(
-            Notice(
-                "joint-speed-assumed",
-                f"{language.name} says no share of the joints' speed: {_JOINT_SPEEDS[language.name]}.",
-                "note",
-            )
-        )
-    warnings += _near(plan.robot, found.ways)
+    warnings += [*counts_notices(robot), *_speed_notices(robot, language)]
+    if cell_unknown:
+        warnings += _near(plan.robot, found.ways)
     count = len(found.slow) + (0 if slow_run is None else len(found.faster))
     return WrittenPrograms(language.name, {**slow, **faster}, record, count, found.share)
+
+
+def _speed_notices(robot: Robot, language: Language) -> list[Notice]:
+    """Return what is to be said of the speed of joint motions."""
+    found = []
+    if language.name in _JOINT_SPEEDS:
+        words = f"{language.name} says no share of the joints' speed: {_JOINT_SPEEDS[language.name]}."
+        found.append(Notice("joint-speed-assumed", words, "note"))
+    if language.name == "RAPID":
+        return found
+    assumed = "in the slow run joint motions are so slow that the tip keeps to 250 mm/s with the joints of fast arms"
+    if language.name == "URScript":
+        assumed = f"100 % is taken for {math.degrees(FASTEST):.0f} deg/s"
+    return [*found, *speed_notices(robot, assumed)]
 
 
 def _texts(programs: Sequence[MotionProgram], language: Language) -> dict[str, str]:
@@ -102,7 +118,7 @@ def _near(robot: Robot, ways: Mapping[str, Array]) -> list[Notice]:
             "ways-near",
             f"On {len(near)} of {len(looked)} ways the arm comes within {cell.clearance * 1e3:g} mm of the floor or of "
             f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {room * 1e3:.0f} mm. Look at "
-            "these ways first, or plan again in a smaller cube or elsewhere.",
+            "these ways first, or state `constraints` or `clearance`: then they are kept clear.",
         )
     ]
 

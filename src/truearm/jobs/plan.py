@@ -9,13 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from truearm.errors import InputError, kind_of, refusals_of
-from truearm.files import path_argument
+from truearm.errors import InputError, kind_of
 from truearm.identification.solving.models import MODELS
 from truearm.jobs.accuracy_goal import accuracy_goal
 from truearm.jobs.arguments import (
     choice_argument,
     command_argument,
+    configurations_argument,
     count_argument,
     deviation_argument,
     device_argument,
@@ -27,12 +27,12 @@ from truearm.jobs.arguments import (
     payload_argument,
     progress_argument,
     python_call,
-    readings_argument,
     robot_argument,
     whole_argument,
 )
-from truearm.jobs.driving import cell_argument, finder_argument
+from truearm.jobs.driving import cell_argument, constraints_argument, finder_argument
 from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
+from truearm.jobs.plans_replaced import plan_files_for, refuse_ways_of_another, replaced_notices
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
@@ -46,7 +46,8 @@ from truearm.planning.choosing.measurement_plan import (
     with_targets,
 )
 from truearm.planning.choosing.observability import INDICES
-from truearm.planning.constraints.constraints import Constraints, read_constraints
+from truearm.planning.choosing.plan_table import plan_csv
+from truearm.planning.constraints.constraints import Constraints
 from truearm.planning.driving.joint_window import on_principal_turn
 from truearm.planning.driving.touring import tour_of, unreached
 from truearm.results.plan import PAGE, Plan
@@ -98,7 +99,8 @@ def plan(
         CSV file to write, and a page beside it; with a program a folder for both, the program and a sheet. None writes
         nothing, see :meth:`Plan.save`.
     candidates_from
-        Readings, or a canonical CSV file, among whose configurations to choose; None draws them within the limits.
+        Readings, a canonical CSV file, or the table of another plan, among whose configurations to choose; None draws
+        them within the limits.
     objective
         ``O1`` to ``O5``, or ``error``: the mean square error where the robot shall be accurate. None is ``error`` if
         that was said, otherwise ``O1``.
@@ -184,7 +186,7 @@ def plan(
             cure="Leave one of them out; `constraints` narrows the choice.",
         )
     instrument = None if device is None else device_argument(device)
-    rules = _rules(constraints)
+    rules = constraints_argument(constraints)
     carried, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
         "plan",
@@ -225,12 +227,14 @@ def plan(
     # What was measured was reached: such configurations are checked where that is asked for.
     driven = candidates_from is None or wanted_program is not None or no_floor
     driven = driven or any(given is not None for given in (floor, clearance, home))
+    if table is not None and not driven:
+        refuse_ways_of_another(ways_beside(table))
     labels, readings, own, finder = None, None, bool(carrying.targets), None
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
         own = True
     elif candidates_from is not None:
-        data = readings_argument(carrying, candidates_from, "candidates_from")
+        data = configurations_argument(carrying, candidates_from, "candidates_from")
         if wanted_program is not None:
             wanted_program.check_readings(data)
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
@@ -286,7 +290,10 @@ def plan(
         if planned.program is not None:
             refuse_other_programs(table, planned.program.files, *read)
         progress("writing the files")
+        there = (table.parent, table.name) if planned.program is None else (table, TABLE)
+        replaced = replaced_notices(*there, plan_csv(planned.made, planned.joints_are))
         planned.save(table)
+        planned = replace(planned, replaced=replaced)
     return planned
 
 
@@ -295,8 +302,7 @@ def _files(out: object, *read: object) -> Path:
     table = file_for(out, *read)
     if table.suffix == PAGE:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
-    file_for(table.with_suffix(PAGE), *read)
-    file_for(ways_beside(table), *read)
+    plan_files_for((table.name, table.with_suffix(PAGE).name, ways_beside(table).name), table, *read)
     return table
 
 
@@ -307,13 +313,6 @@ def _folder(out: object, *read: object) -> Path:
             "a plan with a program needs a folder", parameter="out", came=str(out), cure="Name a folder, or no program."
         )
     return folder_beside((TABLE, PLAN_PAGE, WAYS, SHEET), TABLE, out, *read)
-
-
-def _rules(constraints: object) -> Constraints | None:
-    if constraints is None or isinstance(constraints, Constraints):
-        return constraints
-    with refusals_of("constraints"):
-        return read_constraints(path_argument(constraints, "constraints"))
 
 
 def _count(poses: object) -> int | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -26,6 +27,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.driving import cell_argument, finder_argument
+from truearm.jobs.plans_replaced import plan_files_for, replaced_notices
 from truearm.measurement.inclinometer import deviation_of_change
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
@@ -108,7 +110,7 @@ def plan_inclinometers(
     progress_argument(progress)
     table = None if out is None else file_for(out, robot)
     if table is not None:
-        file_for(ways_beside(table), robot)
+        plan_files_for((table.name, ways_beside(table).name), table, robot)
     count, force = even_argument(poses), pull_argument(pull)
     number, deviation = count_argument(candidates, "candidates"), deviation_argument(noise, "noise")
     rng = np.random.default_rng(whole_argument(seed, "seed"))
@@ -142,7 +144,9 @@ def plan_inclinometers(
     tour = tour_of(finder, at, [str(k + 1) for k in range(len(at))])
     planned = InclinometerPlan(carrying, made, force, call, tour, files_of(robot), joints_are)
     if table is not None:
+        replaced = replaced_notices(table.parent, table.name, planned.csv_text())
         planned.save(table)
+        planned = replace(planned, replaced=replaced)
     return planned
 
 

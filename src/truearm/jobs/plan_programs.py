@@ -10,21 +10,23 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
-from truearm.compensation.plan_program import LONGEST_LABEL, Driving, joint_rates, plan_program, shown_speed
+from truearm.compensation.joint_speeds import joint_rates, known_speeds, speed_notices, speed_words, stated_speeds
+from truearm.compensation.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
 from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.compensation.programs.program import Language
 from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.errors import InputError
 from truearm.jobs.arguments import choice_argument, flag_argument, folder_for, numbers_argument
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES
+from truearm.library.wider_limits import wider_limits_notices
 from truearm.manifest import hash_of, sets_in
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.results.plan import Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
+from truearm.simulation.truths import DEFAULT_TOOL
 from truearm.units import as_number
 
 #: What the languages are called as arguments.
@@ -43,6 +45,8 @@ _WAITS: Final = "time; input N or input N,SECONDSs; operator"
 _INPUT: Final = re.compile(r"([0-9]{1,5}|[A-Za-z][A-Za-z0-9_]{0,31})")
 #: Languages whose inputs have names.
 _NAMED_INPUTS: Final = ("RAPID",)
+#: A message names no more targets.
+_MOST_NAMED: Final = 6
 #: Numbers of the digital inputs, where a language has them: standard ones of a UR, as many as KUKA has at most.
 _INPUTS: Final = {"URScript": (0, 7), "KRL": (1, 8192)}
 #: Devices that see the arm, or are fixed to it, while it is driven.
@@ -189,18 +193,30 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed:
     program, fastest = plan_program(tour, robot, language.name, wanted.driving, mark)
     assert language.motion is not None
     assert program.carried is not None
-    notices = _notices(language, robot, given, weighed=weighed)
+    notices = [*_notices(language, robot, given, weighed=weighed), *tour.notices]
+    speeds = known_speeds(robot)
     if fastest > _CLOSE * wanted.driving.speed:
         notices.insert(
             0,
             Notice(
                 "faster-than-asked",
-                f"{language.name} says no share below 1 %: where joints are as fast as any, a target goes at up to "
-                f"{shown_speed(fastest)} mm/s. Set the override of the controller lower, or state a higher `speed`.",
+                f"{language.name} says no share below 1 %: {'' if speeds else 'where joints are as fast as any, '}"
+                f"a target goes at up to {shown_speed(fastest)} mm/s. Set the override of the controller lower, or "
+                "state a higher `speed`.",
             ),
         )
     texts = dict(language.motion(program))
-    written = PlanProgram(language.name, texts, tour, wanted.driving, program.carried, fastest, mark, tuple(notices))
+    written = PlanProgram(
+        language.name,
+        texts,
+        tour,
+        wanted.driving,
+        program.carried,
+        fastest,
+        mark,
+        tuple(notices),
+        speed_words(speeds, robot) if speeds else "",
+    )
     return replace(planned, program=written)
 
 
@@ -233,11 +249,11 @@ def _speed(value: Any) -> tuple[float, float]:
     usual = Driving()
     if value is None:
         return usual.speed, usual.share
-    allowed = "a speed of the tip [m/s], and with it a share of the joints' speed: 0.25, 0.1"
+    allowed = "the speed of the tip, and with it a share of the joints' speed"
     single = not isinstance(value, Sequence) or isinstance(value, str)
     values = [value] if single else list(value)
     if len(values) not in (1, 2):
-        raise InputError("one or two numbers belong here", parameter="speed", came=values, allowed=allowed)
+        raise InputError("one or two numbers belong here", parameter="speed", came=len(values), allowed=allowed)
     speed, *shares = numbers_argument(values, "speed", len(values), allowed)
     low, high = _SPEEDS
     if not low <= speed <= high:
@@ -317,13 +333,27 @@ def _overload(robot: Robot) -> list[Notice]:
     ]
 
 
-def _taken(robot: Robot) -> str:
-    """Say which tool a plan has taken."""
-    return f"{robot.payload.mass:g} kg and {', '.join(f'target {one.name}' for one in robot.targets) or 'no target'}"
+def _taken(robot: Robot, given: Robot, *, weighed: bool) -> str:
+    """Say which load and targets a plan has taken for those that nobody said, and whence."""
+    said = [] if weighed else [f"{robot.payload.mass:g} kg at {_at(robot.payload.cog)} mm"]
+    if given.targets:
+        return said[0]
+    there = {one.name: robot.tool_place(one.name).translation for one in robot.targets}
+    name, tool = next(iter(given.tools.items()), ("", DEFAULT_TOOL))
+    said += [f"target {target} at {_at(place)} mm" for target, place in [*there.items()][:_MOST_NAMED]]
+    whence = f"the first tool of the robot file, {name}" if name else "three reflectors about 150 mm apart"
+    if there != dict(tool.targets):
+        whence = "targets where the readings have them"
+    return f"{', '.join(said)}{', and others' if len(there) > _MOST_NAMED else ''} ({whence})"
+
+
+def _at(point: tuple[float, float, float]) -> str:
+    return f"({', '.join(f'{1e3 * v:.4g}' for v in point)})"
 
 
 def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -> list[Notice]:
-    found = [*_overload(robot), *counts_notices(robot), *beside_notices(robot)]
+    found = [*_overload(robot), *counts_notices(robot)]
+    found += wider_limits_notices(robot)
     unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
     if unsaid:
         cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []
@@ -332,22 +362,26 @@ def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -
             Notice(
                 "tool-assumed",
                 f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is "
-                f"assumed, {_taken(robot)}. {' '.join(cures)}",
+                f"assumed, {_taken(robot, given, weighed=weighed)}. {' '.join(cures)}",
             )
         )
+    return [*found, *speed_notices(robot, "" if known_speeds(robot) else _assumed(language, robot))]
+
+
+def _assumed(language: Language, robot: Robot) -> str:
+    """Say what was taken for the joints' speed where it is not known."""
     slow, fast = joint_rates(robot)
-    highest = " and ".join(dict.fromkeys(f"{math.degrees(rate):.0f}" for rate in (fast[0], fast[-1])))
-    words = f"shares are so low that the tip keeps to its speed with joints of up to {highest} deg/s"
+    unknown = [speed is None for speed in stated_speeds(robot)]
     if language.name == "URScript":
         words = f"100 % is taken for {math.degrees(FASTEST):.0f} deg/s"
     elif language.name == "RAPID":
-        words = f"moves take so long that joints of {math.degrees(slow.min()):.0f} deg/s and more keep to the share"
-    found.append(
-        Notice(
-            "joint-speed-assumed",
-            f"How fast the joints of {robot.name} are at 100 % is not known: {words}. It may go more slowly than it "
-            "could; `speed` makes it faster.",
-            "note",
-        )
+        slowest = math.degrees(slow[unknown].min())
+        words = f"moves take so long that joints of {slowest:.0f} deg/s and more keep to the share"
+    else:
+        rates = [fast[unknown][0], fast[unknown][-1]]
+        highest = " and ".join(dict.fromkeys(f"{math.degrees(rate):.0f}" for rate in rates))
+        words = f"shares are so low that the tip keeps to its speed with joints of up to {highest} deg/s"
+    return (
+        f"{words}. It may go more slowly than it could; `speed` makes it faster, and so may max_speed of each joint in "
+        "the robot file"
     )
-    return found

@@ -14,6 +14,7 @@ from truearm.files import path_argument
 from truearm.jobs.arguments import (
     JOINTS_OF,
     choice_argument,
+    configurations_argument,
     count_argument,
     deviation_argument,
     device_argument,
@@ -23,7 +24,6 @@ from truearm.jobs.arguments import (
     payload_argument,
     progress_argument,
     pushed_at_argument,
-    readings_argument,
     robot_argument,
     whole_argument,
     wrench_argument,
@@ -75,7 +75,7 @@ def simulate(
         file, with its own base and targets if it has targets.
     poses
         How many configurations, drawn evenly within the limits; or a file or dataset whose configurations are measured,
-        such as :func:`truearm.poses` writes.
+        such as :func:`truearm.poses` or :func:`truearm.plan` writes.
     out
         Canonical CSV file to write; None writes nothing.
     noise
@@ -132,7 +132,7 @@ def simulate(
     rng = np.random.default_rng(whole_argument(seed, "seed"))
     nominal = robot_argument(robot)
     joints_are = joints_argument(choice_argument(joints, "joints", JOINTS_OF), nominal)
-    wanted = readings_argument(nominal, poses, "poses") if given else None
+    wanted = configurations_argument(nominal, poses, "poses") if given else None
     count = count if wanted is None else wanted.configurations
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)

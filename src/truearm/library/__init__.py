@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -15,10 +16,14 @@ from truearm.modeling.robot import Robot
 
 #: How much of a file is looked at to tell what it is [bytes].
 _BEGINNING: Final = 4096
-#: Of an id that was half given, how many letters and digits are needed, and how many ids are offered at most.
+#: Of an id that was half given, how many letters and digits are needed, and of one that stands in a longer name; how
+#: many ids are offered at most.
 _SHORTEST_HELD: Final = 2
+_SHORTEST_WITHIN: Final = 3
 _MOST_OFFERED: Final = 8
 _URDF: Final = re.compile(r".*\.(?:urdf|xml|xacro)", re.I | re.S)
+#: The ending of a file: letters, where names of arms that have a point go on in digits (`IRB 1200-5/0.9`).
+_ENDING: Final = re.compile(r"\.[A-Za-z]\w*")
 
 
 @cache
@@ -75,9 +80,10 @@ def load_robot(robot: str | Path) -> Robot:
             cure="Give calibrated.yaml, or the file of the zone in which the flange stays; only 'truearm validate' "
             "takes all zones together.",
         )
-    if exists(path) or path.suffix or len(path.parts) > 1:
-        return read_robot(path)
     near = [f"{name} ({_of_library(name).title})" for name in close_names(text)]
+    in_a_folder = len(path.parts) > 1 and (exists(path.parent) or not near)
+    if exists(path) or in_a_folder or _ENDING.fullmatch(path.suffix):
+        return read_robot(path)
     raise InputError(
         "there is no such robot",
         parameter="robot",
@@ -88,18 +94,23 @@ def load_robot(robot: str | Path) -> Robot:
 
 
 def close_names(text: str) -> list[str]:
-    """Return the ids of the library that somebody may have meant: those that hold the text, or else those like it.
+    """Return the ids of the library that somebody may have meant.
 
-    Letters and digits count: ``IRB 1200`` is close to every IRB 1200. None of them is ever taken for it, since arms of
-    one series differ in their lengths.
+    Those that hold the text; else those that the text holds (``LR Mate 200iD/7L`` holds `lrmate200id`), the longest
+    first; else those like it. Letters and digits count: ``IRB 1200`` is close to every IRB 1200. None of them is ever
+    taken for it, since arms of one series differ in their lengths.
     """
-    asked = _letters(text)
-    held = [name for name in library() if len(asked) >= _SHORTEST_HELD and asked in _letters(name)]
+    asked = letters(text)
+    held = [name for name in library() if len(asked) >= _SHORTEST_HELD and asked in letters(name)]
+    if not held:
+        held = [name for name in library() if len(name) >= _SHORTEST_WITHIN and letters(name) in asked]
+        held.sort(key=len, reverse=True)
     return held[:_MOST_OFFERED] or nearest_names(text, library())
 
 
-def _letters(text: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", text.lower())
+def letters(text: str) -> str:
+    """Return the letters and digits of a name in small letters, without accents, by which names are compared."""
+    return re.sub(r"[^a-z0-9]", "", unicodedata.normalize("NFKD", text).lower())
 
 
 @cache

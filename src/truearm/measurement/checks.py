@@ -246,7 +246,9 @@ def _missing(data: Dataset) -> list[Notice]:
         in_turn = names > 1 and len(read) == len(np.unique(of))
         once = part.configurations > 1 and names > 1 and int(times.max()) == 1
         everywhere = data.fixture is None and not in_turn and not once
-        absent = part.configurations - times if everywhere else np.zeros(names, dtype=np.intp)
+        # Fixed points are measured in rounds: one is missing where another one was read.
+        among = part.configurations if part is data else len(np.unique(of))
+        absent = among - times if everywhere else np.zeros(names, dtype=np.intp)
         counts |= dict(zip(part.targets, (empty + absent).tolist(), strict=True))
     total = sum(counts.values())
     if total == 0:

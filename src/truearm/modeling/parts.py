@@ -22,6 +22,11 @@ ReachPoint = Literal["wrist-centre", "flange"]
 POINT_MASS: Final[Inertia] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 SLIDES: Final[tuple[tuple[str, Motion], ...]] = (("x", "Tx"), ("y", "Ty"), ("z", "Tz"))
 TURNS: Final[tuple[tuple[str, Motion], ...]] = (("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz"))
+#: At 100 % no joint of an arm is slower or faster [rad/s, m/s].
+JOINT_SPEEDS: Final[Mapping[JointKind, tuple[float, float]]] = {
+    "revolute": (math.radians(10.0), math.radians(10_000.0)),
+    "prismatic": (0.01, 20.0),
+}
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,8 @@ class Joint:
         How far along the joint's axis its bearing lies [m], from the joint's origin at nominal values (the origin of
         the frame right behind the joint's turn); None if that is not known, and zero is assumed. Joints that slide
         have none.
+    max_speed
+        How fast it goes at 100 % [rad/s or m/s], where known.
     """
 
     name: str
@@ -53,6 +60,7 @@ class Joint:
     limits: tuple[float, float] | None = None
     transmission_periods: int | None = None
     bearing: float | None = None
+    max_speed: float | None = None
 
     @property
     def range(self) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.notices import worst_first
 from truearm.planning.choosing.measurement_plan import MeasurementPlan
 from truearm.planning.choosing.prediction import Prediction
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, Figure, axis, base_axes, figure, scene_axis
@@ -34,6 +35,7 @@ def plan_html(planned: Plan) -> str:
         chosen_by=planned.chosen_by,
         command=planned.command,
         words=(*planned.answer, *planned.driving),
+        notices=worst_first(planned.warnings),
         indices=[(name, _INDEX_WORDS[name], f"{value:.4g}") for name, value in plan.indices.items()],
     )
 

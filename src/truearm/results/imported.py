@@ -11,7 +11,8 @@ import numpy as np
 
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
-from truearm.results.record import Record
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted
 
 
@@ -27,11 +28,14 @@ class Imported(Record):
         The canonical CSV file that holds them; None if none was written.
     missing
         How many readings are missing of each point, where the file has places for them.
+    warnings
+        What the data cannot hold of the files.
     """
 
     data: Dataset
     out: Path | None = None
     missing: Mapping[str, int] = field(default_factory=dict)
+    warnings: tuple[Notice, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -39,6 +43,7 @@ class Imported(Record):
             "configurations": self.data.configurations,
             "targets": list(self.data.targets),
             "missing": dict(self.missing),
+            "warnings": notice_summaries(self.warnings),
         }
 
     def lines(self) -> list[str]:
@@ -46,7 +51,8 @@ class Imported(Record):
         where = "" if self.out is None else f": {self.out}"
         many = counted(self.data.configurations, "configuration")
         text = [f"{many}, targets {', '.join(self.data.targets)}{where}"]
-        return text + [f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items()]
+        text += [f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items()]
+        return text + notice_lines(self.warnings)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

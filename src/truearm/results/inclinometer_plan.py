@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from truearm.library.wider_limits import wider_limits_notices
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.inclinometer import Inclinations
 from truearm.measurement.readers.canonical import csv_text
@@ -17,11 +18,11 @@ from truearm.measurement.readers.inclinations import inclinations_text
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.planning.choosing.inclinometer import TiltingPlan
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
-from truearm.results.record import Record, joints_lines, notice_lines
+from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
 from truearm.results.tour_files import tour_summary, ways_beside
 from truearm.shown import counted, listed
 from truearm.units import SHOWN_AS, from_si
@@ -56,6 +57,8 @@ class InclinometerPlan(Record):
         The files that were read: none of them is overwritten.
     joints_are
         Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
+    replaced
+        What to know of another plan that it was written over.
     """
 
     robot: Robot
@@ -65,6 +68,12 @@ class InclinometerPlan(Record):
     tour: Tour
     inputs: tuple[Path, ...] = ()
     joints_are: JointsOf = "model"
+    replaced: tuple[Notice, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know of its ways, and of the files."""
+        return (*self.tour.notices, *wider_limits_notices(self.robot), *self.replaced)
 
     def _expected(self) -> list[tuple[str, str, float, float]]:
         """Return name, unit, deviation to expect and prior of each constant, as they are shown."""
@@ -93,6 +102,7 @@ class InclinometerPlan(Record):
                 for name, unit, deviation, prior in self._expected()
             ],
             "unseen": list(self.unseen),
+            "warnings": notice_summaries(self.warnings),
         }
 
     def lines(self) -> list[str]:
@@ -108,7 +118,7 @@ class InclinometerPlan(Record):
         for name, unit, deviation, prior in self._expected():
             known = "stays unknown" if name in self.unseen else f"known to {deviation:.2g} {unit}"
             text.append(f"  {name:<14} {known} (before: {prior:.2g} {unit})")
-        return [*text, *joints_lines(self.joints_are), *notice_lines(beside_notices(self.robot))]
+        return [*text, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
 
     def csv_text(self) -> str:
         """Return the plan as CSV: one row a configuration, in the order of measurement, and what is read there."""
@@ -134,8 +144,8 @@ class InclinometerPlan(Record):
         -------
         The files written; the second ends in ``-ways.csv``.
         """
-        table = output_file(file, self.inputs)
-        ways = output_file(ways_beside(table), self.inputs)
+        table = output_file(file, self.inputs, ours=True)
+        ways = output_file(ways_beside(table), self.inputs, ours=True)
         stops = tour_csv(self.tour, self.robot, self.joints_are)
         write_files(table.parent, {table.name: self.csv_text(), ways.name: stops}, self.command)
         return table, ways

@@ -63,6 +63,8 @@ class Iso9283Plan(Record):
         The files that were read: none of them is overwritten.
     programs
         Measuring programs; None where they were not asked for.
+    kept
+        What all ways keep clear of, in words; nothing where no cell was stated.
     """
 
     plan: PerformancePlan
@@ -70,6 +72,7 @@ class Iso9283Plan(Record):
     warnings: tuple[Notice, ...] = ()
     inputs: tuple[Path, ...] = ()
     programs: WrittenPrograms | None = None
+    kept: str = ""
 
     def summary(self) -> dict[str, Any]:
         """Return the plan as JSON holds it: lengths in mm, velocities and loads in percent of the rated ones."""
@@ -104,6 +107,7 @@ class Iso9283Plan(Record):
             f"{counted(len(plan.tests), 'test')} of {plan.robot.title}, plane {plan.plane} of the cube of "
             f"{millimetres(plan.cube.side)} mm about ({centre}) mm.",
             f"Rated: {plan.rated_load:g} kg, {millimetres(plan.rated_velocity)} mm/s along a path.",
+            *([self.kept] if self.kept else []),
         ]
 
     def lines(self) -> list[str]:
@@ -146,7 +150,7 @@ class Iso9283Plan(Record):
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write all files into a folder; return them."""
         contents = self.contents()
-        out = output_folder(folder, contents, self.inputs, "folder")
+        out = output_folder(folder, contents, self.inputs, "folder", ours=True)
         write_files(out, contents, self.command)
         return tuple(out / name for name in contents)
 

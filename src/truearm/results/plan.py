@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from truearm.errors import InputError
+from truearm.library.wider_limits import wider_limits_notices
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.notices import Notice
 from truearm.planning.choosing.measurement_plan import ERROR, MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.choosing.prediction import There
-from truearm.planning.driving.links_beside import beside_notices
 from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
@@ -47,6 +47,8 @@ class Plan(Record):
         How the configurations are driven, each way checked; None where nothing was checked.
     program
         What drives it; None where no program was asked for.
+    replaced
+        What to know of another plan that it was written over.
     """
 
     made: MeasurementPlan
@@ -57,6 +59,7 @@ class Plan(Record):
     accurate_at: str = ""
     tour: Tour | None = None
     program: PlanProgram | None = None
+    replaced: tuple[Notice, ...] = ()
 
     @property
     def joints(self) -> Array:
@@ -91,7 +94,8 @@ class Plan(Record):
         """What to know of the ways that were checked, and of the program."""
         if self.program is not None:
             return self.program.warnings
-        return () if self.tour is None else tuple(beside_notices(self.made.robot))
+        robot = self.made.robot
+        return (*(() if self.tour is None else self.tour.notices), *wider_limits_notices(robot))
 
     @property
     def _there(self) -> tuple[str, ...]:
@@ -141,7 +145,7 @@ class Plan(Record):
             "usable": made.usable,
             "rejected": dict(made.rejected),
             "left_out": list(made.left_out),
-            "warnings": notice_summaries(self.warnings),
+            "warnings": notice_summaries((*self.warnings, *self.replaced)),
             **({} if self.tour is None else {"ways": tour_summary(self.tour, made.robot, self.joints_are)}),
             **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
             "seconds": made.seconds,
@@ -177,7 +181,8 @@ class Plan(Record):
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
-        driven = notice_lines(self.warnings) if self.program is None else self.program.lines()
+        answer = () if self.program is None else self.program.answer
+        driven = [*answer, *notice_lines((*self.warnings, *self.replaced))]
         return [*text, *self.driving, *self.answer, *joints_lines(self.joints_are), *driven]
 
     def contents(self) -> dict[str, str]:
@@ -208,16 +213,16 @@ class Plan(Record):
 
         if self.program is not None:
             contents = self.contents()
-            folder = output_folder(file, contents, self.inputs, "file")
+            folder = output_folder(file, contents, self.inputs, "file", ours=True)
             write_files(folder, contents, self.command)
             return tuple(folder / name for name in contents)
-        table = output_file(file, self.inputs)
+        table = output_file(file, self.inputs, ours=True)
         if table.suffix == PAGE:
             raise InputError("the plan is a CSV file", parameter="file", came=table.name, allowed="PLAN.csv")
-        page = output_file(table.with_suffix(PAGE), self.inputs)
+        page = output_file(table.with_suffix(PAGE), self.inputs, ours=True)
         texts = {table.name: plan_csv(self.made, self.joints_are), page.name: plan_html(self)}
         if self.tour is not None:
-            ways = output_file(ways_beside(table), self.inputs)
+            ways = output_file(ways_beside(table), self.inputs, ours=True)
             texts[ways.name] = tour_csv(self.tour, self.made.robot, self.joints_are)
         write_files(table.parent, texts, self.command)
         return tuple(table.parent / name for name in texts)

@@ -48,6 +48,8 @@ class PlanProgram:
         Highest speed of a target or the flange [m/s].
     mark
         The first digits of the plan's hash, by which program and sheet name it.
+    speeds
+        How fast the joints go at 100 %, in words; empty where it is not known.
     warnings
         What to know about it.
     """
@@ -60,6 +62,7 @@ class PlanProgram:
     fastest: float
     mark: str = ""
     warnings: tuple[Notice, ...] = ()
+    speeds: str = ""
 
     @property
     def answer(self) -> tuple[str, ...]:
@@ -72,7 +75,7 @@ class PlanProgram:
         return (
             f"Measuring program in {self.language}: {', '.join(way)}.",
             f"At most {shown_speed(self.fastest)} mm/s and {number(100 * driving.share, 2)} % of the joints' "
-            f"speed; it stands for {number(driving.dwell, 2)} s{waits}.",
+            f"speed{f' ({self.speeds})' if self.speeds else ''}; it stands for {number(driving.dwell, 2)} s{waits}.",
             self._told,
             "It is not verified and no safety function: run it step by step first, at reduced speed, nobody near.",
         )
@@ -101,6 +104,7 @@ class PlanProgram:
             "approached": any(stop.kind == "approach" for stop in self.tour.stops),
             "speed_mm_s": 1e3 * self.fastest,
             "joint_speed_percent": 100.0 * driving.share,
+            "joint_speeds": self.speeds or None,
             "dwell_s": driving.dwell,
             "wait": driving.words,
             "tip": carried.name or None,

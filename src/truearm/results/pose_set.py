@@ -186,12 +186,12 @@ class PlannedPoses(Record):
 
 
 def places(file: object, inputs: tuple[Path, ...], parameter: str = "file") -> tuple[Path, Path, Path]:
-    """Return where configurations, poses and page are written; refuse a place that cannot be."""
-    table = output_file(file, inputs, parameter)
+    """Return where configurations, poses and page are written; refuse a place that cannot be, or not ours."""
+    table = output_file(file, inputs, parameter, ours=True)
     if table.suffix == PAGE:
         raise InputError("the set is a CSV file", parameter=parameter, came=table.name, allowed="SET.csv")
-    poses = output_file(table.with_name(f"{table.stem}{POSES}"), inputs, parameter)
-    return table, poses, output_file(table.with_suffix(PAGE), inputs, parameter)
+    poses = output_file(table.with_name(f"{table.stem}{POSES}"), inputs, parameter, ours=True)
+    return table, poses, output_file(table.with_suffix(PAGE), inputs, parameter, ours=True)
 
 
 def _cube(made: PoseSet) -> dict[str, Any]:

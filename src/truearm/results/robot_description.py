@@ -51,8 +51,9 @@ class RobotDescription(Record):
             unit = "deg" if joint.kind == "revolute" else "mm"
             limits = [from_si(v, unit) for v in joint.limits] if joint.limits else None
             bearing = None if joint.bearing is None else written(joint.bearing, "mm")
+            speed = None if joint.max_speed is None else written(joint.max_speed, unit)
             made = {"name": joint.name, "type": joint.kind, "values": values, "limits": limits, "bearing": bearing}
-            joints.append(made)
+            joints.append({**made, "max_speed": speed})
         return {
             "name": robot.name,
             "title": robot.title,
@@ -92,7 +93,7 @@ class RobotDescription(Record):
             row = "  ".join(f"{name} {value:g}" for name, value in joint["values"].items())
             limits = "  limits {:g} to {:g}".format(*joint["limits"]) if joint["limits"] else ""
             bearing = "" if joint["bearing"] is None else f"  bearing at {joint['bearing']:g}"
-            text.append(f"  {joint['name']} ({joint['type']})  {row}{limits}{bearing}")
+            text.append(f"  {joint['name']} ({joint['type']})  {row}{limits}{bearing}{_speed(joint)}")
         x, y, z = content["flange_at_zero_mm"]
         text.append(f"Flange at zero joint positions, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm")
         if content["masses_kg"]:
@@ -133,6 +134,13 @@ _KINEMATICS: Final = {
     "nominal": "the nominal values",
     "proprietary": "a calibration of its maker that nobody else can read",
 }
+
+
+def _speed(joint: dict[str, Any]) -> str:
+    """Say how fast a joint goes at 100 %, if that is known."""
+    if joint["max_speed"] is None:
+        return ""
+    return f"  up to {joint['max_speed']:g} {'deg' if joint['type'] == 'revolute' else 'mm'}/s"
 
 
 def _controller_lines(entry: dict[str, Any], joints: list[dict[str, Any]]) -> Iterator[str]:

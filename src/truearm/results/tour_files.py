@@ -26,4 +26,5 @@ def tour_summary(tour: Tour, robot: Robot, joints_are: JointsOf) -> dict[str, An
         "floor_mm": None if tour.floor is None else 1e3 * tour.floor,
         "clearance_mm": 1e3 * tour.clearance,
         "room_mm": 1e3 * tour.room if math.isfinite(tour.room) else None,
+        "distances_mm": {what: 1e3 * room for what, room in tour.distances.items()},
     }

@@ -5,8 +5,9 @@ A program begins and ends in P1, slowly. Before each measured pose the robot sto
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from truearm.compensation.fake_targets import nominal_robot
 from truearm.compensation.iso9283.routes import Route, Routes
 from truearm.compensation.joint_counts import counts_comments
+from truearm.compensation.joint_speeds import first_share, joint_shares
 from truearm.compensation.programs.motion_program import (
     LONGEST_COMMENT,
     CircleMove,
@@ -32,7 +34,8 @@ from truearm.modeling.transform import homogeneous
 from truearm.planning.iso9283.criteria import TESTS
 from truearm.planning.iso9283.planned import PerformancePlan, PlannedPose, PlannedTest, visited
 
-#: The first run: no more than this share of the rated velocity, and no faster than this [m/s].
+#: The first run: no more than this share of the rated velocity, and no faster than this along paths and in joint
+#: motions [m/s].
 _SLOW: Final = 0.1
 _SLOW_SPEED: Final = 0.25
 #: Controllers take no lower speed [m/s].
@@ -67,7 +70,7 @@ class MeasuringPrograms:
     ways: Mapping[str, Array]
 
 
-def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> MeasuringPrograms:
+def measuring_programs(plan: PerformancePlan, dwell: float, mark: str, language: str = "") -> MeasuringPrograms:
     """Return the programs of a plan.
 
     Parameters
@@ -78,6 +81,8 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> Measur
         How long the robot stands where it is measured [s].
     mark
         By which the plan is known, for a comment.
+    language
+        Its name: languages say speeds of joint motions in different ways.
 
     Raises
     ------
@@ -101,7 +106,7 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> Measur
             cure="Plan for the nominal robot, and correct its programs with the calibrated one.",
         )
     slow = min(_SLOW, _SLOW_SPEED / plan.rated_velocity)
-    made = _Programs(plan, dwell, mark, slow)
+    made = _Programs(plan, dwell, mark, slow, language)
     first: list[MotionProgram] = []
     faster: list[MotionProgram] = []
     for test in plan.tests:
@@ -110,6 +115,22 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> Measur
         if test.id != "compliance":
             faster += [one for other in test.velocities if abs(other - share) > 1e-9 for one in made.of(test, other)]
     return MeasuringPrograms(tuple(first), tuple(faster), slow, {**made.moves, **made.routes.driven})
+
+
+def driven_ways(plan: PerformancePlan) -> Mapping[str, Array]:
+    """Return the ways between the stops of all tests, as :attr:`MeasuringPrograms.ways` has them.
+
+    Raises
+    ------
+    InputError
+        If a move cannot be made: with the move.
+    """
+    # A second cycle begins where the first has ended; the others go the same ways.
+    twice = replace(plan, tests=tuple(replace(test, cycles=min(2, test.cycles)) for test in plan.tests))
+    made = _Programs(twice, 0.0, "", 1.0, "")
+    for test in twice.tests:
+        _Steps(made, test, 1.0).run()
+    return {**made.moves, **made.routes.driven}
 
 
 def _is_calibrated(robot: Robot) -> bool:
@@ -123,11 +144,12 @@ def _is_calibrated(robot: Robot) -> bool:
 class _Programs:
     """Programs of a plan; every way is followed once."""
 
-    def __init__(self, plan: PerformancePlan, dwell: float, mark: str, slow: float) -> None:
-        self.plan, self.dwell, self.mark, self.slow = plan, dwell, mark, slow
+    def __init__(self, plan: PerformancePlan, dwell: float, mark: str, slow: float, language: str) -> None:
+        self.plan, self.dwell, self.mark, self.slow, self.language = plan, dwell, mark, slow, language
         self.routes = Routes(plan.robot, plan.target, self.pose("P1", "every program").joints)
         self.known: dict[tuple[str, str], Route] = {}
         self.moves: dict[str, Array] = {}
+        self.shares: dict[tuple[bytes, float], float] = {}
         self.rule = branch_rule(plan.robot)
 
     def pose(self, name: str, test: str) -> PlannedPose:
@@ -141,6 +163,25 @@ class _Programs:
         if (test, place) not in self.known:
             self.known[test, place] = found()
         return self.known[test, place]
+
+    def joint_share(self, ways: Array | None, share: float) -> float:
+        """Return the share of a joint motion in the joints' speed; in the first run the tip keeps to its speed.
+
+        Parameters
+        ----------
+        ways
+            Joint positions at both ends ``(2, joints)``; None from nobody knows where.
+        share
+            Of the velocity.
+        """
+        robot, speed = self.plan.robot, _SLOW_SPEED if share <= self.slow else math.inf
+        if ways is None:
+            return first_share(robot, self.language, share, speed)
+        key = ways.tobytes(), share
+        if key not in self.shares:
+            shown = robot.controller.from_model(ways)
+            self.shares[key], _ = joint_shares(robot, self.language, ways, shown, share, speed)
+        return self.shares[key]
 
     def along(self, test: PlannedTest, place: str) -> Route:
         """Return the way along a path of a test."""
@@ -233,13 +274,15 @@ class _Steps:
 
     def _go(self, name: str, joints: Array, share: float) -> None:
         self.programs.routes.check(f"{self.test.id}, {name}", joints)
-        plan = self.programs.plan
+        plan, ways = self.programs.plan, None
         if self._at is not None:
             left, start = self._at
-            self.programs.moves.setdefault(f"{self.test.id}, from {left} to {name}", np.array([start, joints]))
+            ways = np.array([start, joints])
+            self.programs.moves.setdefault(f"{self.test.id}, from {left} to {name}", ways)
         self._at = name, joints
         self.steps.append(Remark(f"To {name}"[:LONGEST_COMMENT]))
-        self.steps.append(JointMove(self._target(joints), share, share * plan.rated_velocity))
+        of_joints = self.programs.joint_share(ways, share)
+        self.steps.append(JointMove(self._target(joints), of_joints, share * plan.rated_velocity))
 
     def _stand(self) -> None:
         self.steps.append(Wait(self.programs.dwell))

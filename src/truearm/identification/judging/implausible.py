@@ -44,6 +44,7 @@ CAUSES: Final = (
     "rows-shifted",
     "rows-unrelated",
     "quaternion-order",
+    "orientation-order",
     "fixtures-unlikely",
     "wrong-robot",
 )

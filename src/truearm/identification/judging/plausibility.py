@@ -13,6 +13,7 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.joint_rounding import check_rounding
+from truearm.identification.judging.orientation_slips import ORIENTATION_SLIPS
 from truearm.identification.judging.slips import off_by, slips_by_fit, slips_in_lengths, slips_in_positions
 from truearm.identification.judging.wrong_robot import check_robot, other_robot
 from truearm.identification.solving.fit import Fit, identify, place
@@ -85,6 +86,8 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
     if not data.has_position.any():
         return found, [], None
     slips = slips_in_positions(robot, data)
+    if slips and all(slip.code in ORIENTATION_SLIPS for slip in slips):  # the positions are this robot's
+        return [*slips, *found], [], None
     if slips:
         return [*(other_robot(robot, data) or slips), *found], [], None
     fit = identify(robot, data, named_model("geometric"), loss="cauchy")

@@ -21,6 +21,10 @@ from truearm.notices import Notice
 _MOST_UNEVEN: Final = 1.2
 #: Cosine between two axes of an instrument that are still called square.
 _SQUARE: Final = 0.1
+#: Between readings in one unit and those in another lies a gap: no reading is so many times as far as the next one.
+_APART: Final = 5.0
+#: So many configurations are named.
+_MOST_NAMED: Final = 5
 #: No instrument reads a robot from farther away [m].
 _FARTHEST: Final = 1e4
 
@@ -65,6 +69,31 @@ def length_slips(data: Dataset) -> Iterator[Slip]:
         what = "positions" if data.fixture is None else "lengths"
         words = f"The {what} are {words}. Mend the unit in the header"
         yield Slip("unit-length", words, _scaled(data, factor))
+
+
+def mixed_length_slips(data: Dataset) -> Iterator[Slip]:
+    """Try another unit of those readings that lie far beyond the others, and of those that lie far inside of them."""
+    far_away = np.linalg.norm(data.position, axis=1)
+    known = np.sort(far_away[data.has_position & (far_away > 0.0)])
+    if len(known) < 2:
+        return
+    ratios = known[1:] / known[:-1]
+    widest = int(np.argmax(ratios))
+    if ratios[widest] < _APART:
+        return
+    beyond = far_away > np.sqrt(known[widest] * known[widest + 1])
+    for mask, factor, words in (
+        (beyond, 1e-3, "a thousand times too large"),
+        (~beyond, 1e3, "a thousand times too small"),
+        (beyond, 1 / 25.4, "25.4 times too large, as if mm were called inches"),
+        (~beyond, 25.4, "25.4 times too small, as if inches were called mm"),
+    ):
+        configurations = np.unique(data.configuration[mask & data.has_position])
+        first = ", ".join(data.labels[c] for c in configurations[:_MOST_NAMED].tolist())
+        which = f"{first} and others" if len(configurations) > _MOST_NAMED else first
+        said = f"The positions of some configurations ({which}) are {words}; those of the others are not. "
+        mended = data.position * np.where(mask, factor, 1.0)[:, None]
+        yield Slip("unit-length", f"{said}Mend the numbers of these rows", replace(data, position=mended))
 
 
 def _scaled(data: Dataset, factor: float) -> Dataset:

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.judging.orientation_slips import orientation_slips
 from truearm.identification.judging.slip_trials import (
     Slip,
     angle_slips,
@@ -22,6 +23,7 @@ from truearm.identification.judging.slip_trials import (
     controller_slips,
     length_slips,
     mirrored,
+    mixed_length_slips,
     order_slips,
     scale_slips,
     shifted,
@@ -37,7 +39,7 @@ from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rotation_from_quaternion, rotation_vector
+from truearm.modeling.transform import Transform
 from truearm.notices import Notice
 
 #: A nominal robot that is placed better than this needs no explanation [m].
@@ -64,8 +66,8 @@ _UNRELATED: Final = 0.3
 #: much better than the best of these data must fit that follow them.
 _ORDERS_DRAWN: Final = 19
 _ALIKE: Final = 0.8
-#: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
-_TURNED_WITHIN: Final = 0.1
+#: A campaign is at least so large, over what an arm lets it be at most.
+_LEAST_OF_REACH: Final = 0.02
 #: No target is farther from the flange [m].
 _LARGEST_TOOL: Final = 2.0
 #: Weight of readings against priors where slips are judged by a fit [m or rad].
@@ -75,7 +77,7 @@ _FITTED_NOISE: Final = 1e-4
 def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     """Return which slip explains positions in the instrument's frame; nothing if they fit, or if none does."""
     data, robot = _few_targets(data), robot.with_frames(Transform(), {})  # made once for all that is tried
-    turned = _quaternion_slips(robot, data)
+    turned = orientation_slips(robot, _some(data))
     some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
     some = replace(some, quaternion=None, sigma_rot=None)
     seen = [t for t in range(len(some.targets)) if _seen(some, t)]
@@ -94,21 +96,39 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
         )
         if best is not None:
             return [best.notice]
-        return turned or _beyond_reach(robot, some) or _unrelated(robot, some)
+        return turned or _two_slips(robot, rest) or _beyond_reach(robot, some) or _unrelated(robot, some)
     # The other targets fit with the same joints, so these are right.
     found = []
     for t in bad:
         only = _only(some, t)
-        best = _best(robot, only, [*length_slips(only), *mirrored(only), *scale_slips(robot, only)])
+        best = _best(
+            robot, only, [*length_slips(only), *mirrored(only), *mixed_length_slips(only), *scale_slips(robot, only)]
+        )
         if best is not None:
             found.append(Notice(best.code, f"Target {some.targets[t]}: {best.words}.", "error"))
-    return [*turned, *found]
+    return [*turned, *found] or _beyond_reach(robot, some)
+
+
+def _two_slips(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if lengths in another unit and one slip more explain the data: a unit alone is told by no size."""
+    some = _some(data)
+    if _size_over_reach(robot, some) <= 1.0:
+        return []
+    for lengths in length_slips(some):
+        mended = next(slip.data for slip in length_slips(data) if slip.words == lengths.words)
+        if not _LEAST_OF_REACH < _size_over_reach(robot, lengths.data) <= 1.0:
+            continue
+        best = _best(robot, lengths.data, _simple_slips(robot, mended))
+        if best is not None:
+            return [lengths.notice, best.notice]
+    return []
 
 
 def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     """Try everything but several slips at once, the simplest first."""
     some = _some(data)
     yield from length_slips(some)
+    yield from mixed_length_slips(some)
     yield from as_noted(robot, some, angle_slips)
     yield from controller_slips(robot, some)
     yield from mirrored(some)
@@ -234,19 +254,31 @@ def _spread(data: Dataset) -> float:
 
 def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:
     """Say if readings lie so far apart that no arm of this size was read, in whatever frame."""
-    reach = float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
-    read = data.position[data.has_position]
-    apart = float(np.linalg.norm(read - np.median(read, axis=0), axis=1).max())
-    if apart <= 2.0 * (reach + _LARGEST_TOOL):
+    if _size_over_reach(robot, data) <= 1.0:
         return []
     return [
         Notice(
             "unit-length",
-            f"The positions lie up to {apart:.3g} m from the middle of all, where the arm reaches {reach:.2g} m. Some "
-            "of their numbers are in another unit, or lost their decimal point or comma.",
+            f"The positions lie up to {_apart(data):.3g} m from the middle of all, where the arm reaches "
+            f"{_reach(robot, data):.2g} m. No one unit makes them fit: some of their numbers are in another unit or "
+            "lost their decimal point or comma, or more is wrong with the data than that.",
             "error",
         )
     ]
+
+
+def _size_over_reach(robot: Robot, data: Dataset) -> float:
+    """Return how far readings lie apart, over what an arm of this size lets them at most."""
+    return _apart(data) / (2.0 * (_reach(robot, data) + _LARGEST_TOOL))
+
+
+def _apart(data: Dataset) -> float:
+    read = data.position[data.has_position]
+    return float(np.linalg.norm(read - np.median(read, axis=0), axis=1).max())
+
+
+def _reach(robot: Robot, data: Dataset) -> float:
+    return float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
 
 
 def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
@@ -271,50 +303,6 @@ def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
             )
         ]
     return []
-
-
-# -- orientations ------------------------------------------------------------------------------------------
-
-
-def _quaternion_slips(robot: Robot, data: Dataset) -> list[Notice]:
-    """Say if the orientations agree with the robot only with the numbers of the quaternions in another order."""
-    some = _some(data)
-    if some.quaternion is None or not some.has_orientation.any():
-        return []
-    read = some.quaternion
-    placed = initial_frames(robot, replace(some, quaternion=None, sigma_rot=None))
-    given = _turned(placed, some, read)
-    if given <= _TURNED_WITHIN:
-        return []
-    inverse = np.array([1.0, -1.0, -1.0, -1.0])
-    orders = [
-        ("their numbers are in the order x, y, z, w. Exchange the columns", read[:, [3, 0, 1, 2]]),
-        ("they turn the other way round. Change the sign of qw", read * inverse),
-        (
-            "their numbers are in the order x, y, z, w, and they turn the other way round. Mend the columns",
-            read[:, [3, 0, 1, 2]] * inverse,
-        ),
-    ]
-    tried = [(_turned(placed, some, mended), words) for words, mended in orders]
-    left, words = min(tried)
-    if left * _LEAST_IMPROVEMENT > given:
-        return []
-    return [Notice("quaternion-order", f"The quaternions do not turn as the robot does: {words}.", "error")]
-
-
-def _turned(placed: Robot, data: Dataset, quaternion: Array) -> float:
-    """Return how far a target's orientation on the flange differs from its mean, as a root mean square [rad]."""
-    _, R = placed.world_poses(data.postures)
-    left = []
-    for t in range(len(data.targets)):
-        mine = np.flatnonzero(data.has_orientation & (data.target == t))
-        if len(mine) < 2:
-            continue
-        on_flange = np.swapaxes(R[data.configuration[mine]], 1, 2) @ rotation_from_quaternion(quaternion[mine])
-        U, _, Vt = np.linalg.svd(on_flange.mean(axis=0))
-        mean = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-        left.append(np.linalg.norm(rotation_vector(mean.T @ on_flange), axis=1))
-    return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) if left else 0.0
 
 
 # -- parts of the data -------------------------------------------------------------------------------------

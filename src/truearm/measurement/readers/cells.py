@@ -173,13 +173,15 @@ class Cells:
 
     def _not_a_number(self, row: int, column: int, *, missing: bool) -> InputError:
         cell, where = self.columns[column][row], self.place(row, column)
-        if self.decimal == "," and "." in cell:
+        if self.decimal == "," and as_number(cell.replace(".", "").replace(",", ".")) is not None:
             return InputError(
                 "the number has a point, and this file has decimal commas",
                 where=where,
                 came=cell,
                 allowed="a number with a decimal comma and no thousands separator",
-                cure="Say decimal: point in the mapping, or remove the thousands separators.",
+                cure="Remove the thousands separators, or name the other decimal sign."
+                if self.absent is None
+                else "Say decimal: point in the mapping, or remove the thousands separators.",
             )
         if not cell:
             return InputError(
@@ -254,7 +256,7 @@ def read_cells(text: str, source: str, layout: Layout) -> Cells:
         raise InputError("the file holds a header and no rows", where=source, cure="Check that it was exported whole.")
     for line, row in rows:
         if len(row) != len(names):
-            raise _ragged(f"{source}, line {line}", len(row), len(names), layout)
+            raise _ragged(f"{source}, line {line}", row, names, layout)
     return Cells(
         source=source,
         header=None if layout.header is None else first[0],
@@ -290,22 +292,46 @@ def _no_header(source: str, line: int | None) -> InputError:
     )
 
 
-def _ragged(where: str, came: int, wanted: int, layout: Layout) -> InputError:
+def _ragged(where: str, row: Sequence[str], names: Sequence[str], layout: Layout) -> InputError:
+    """Refuse a row by the first cell that has no column, or the first column that has no cell."""
+    came, wanted = len(row), len(names)
     if came < wanted:
-        cure = "Check for a missing cell."
-    elif layout.delimiter is None:
-        cure = "A name with blanks in it is split: export the file with another separator."
-    elif layout.delimiter == ",":
-        cure = "Check for decimal commas, or for a comma in a name without quotes around it."
+        where += f", column {names[came]}"
+        cure = "The row ends before this column: check for a missing cell."
     else:
-        cure = "Check for a separator inside a name without quotes around it."
+        where += f", cell {wanted + 1}"
+        if layout.delimiter is None:
+            cure = "A name with blanks in it is split: export the file with another separator."
+        elif layout.delimiter == ",":
+            cure = "Check for decimal commas, or for a comma in a name without quotes around it."
+        else:
+            cure = "Check for a separator inside a name without quotes around it."
     what = f"the row does not have as many cells as {'the first row' if layout.header is None else 'the header'}"
     return InputError(what, where=where, came=f"{came} cells", allowed=f"{wanted} cells", cure=cure)
+
+
+def _opened_quote(lines: Sequence[tuple[int, str]], delimiter: str) -> str:
+    """Return the line and the cell in which a quote is opened that is never closed, as far as it can be told."""
+    for number, line in lines:
+        inside, cell, start, opened, before = False, 1, True, 1, ""
+        for sign in line:
+            doubled = sign == before == '"'  # a quote inside of a quoted cell
+            before = sign
+            if sign == '"' and (inside or start or doubled):
+                inside, opened = not inside, cell
+            elif sign == delimiter and not inside:
+                cell, start = cell + 1, True
+                continue
+            start = start and sign in " \t"
+        if inside:
+            return f"line {number}, cell {opened}"
+    return f"line {lines[-1][0] if lines else 1}"
 
 
 def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list[str]]]:
     """Yield the line number and the cells of each line that is neither blank nor a comment."""
     current = 0
+    record: list[tuple[int, str]] = []
     start = layout.first_row or (layout.header or 0) + 1
 
     def lines() -> Iterator[str]:
@@ -317,9 +343,11 @@ def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list
                 heading = line.lstrip().removeprefix(layout.comment or "") if is_comment else line
                 if not heading.strip():
                     raise _no_header(source, number)
+                record.append((number, heading))
                 yield heading
             elif number >= start and not is_comment:
                 current = number
+                record.append((number, line))
                 yield line
 
     if layout.delimiter is None:
@@ -327,20 +355,22 @@ def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list
         return
     reader = csv.reader(lines(), delimiter=layout.delimiter, skipinitialspace=True, strict=True)
     try:
-        for record in reader:
-            cells = [cell.strip() for cell in record]
+        for found in reader:
+            record.clear()
+            cells = [cell.strip() for cell in found]
             if len(cells) > 1 or (cells and cells[0]):
                 yield current, cells
     except csv.Error as error:
+        where = f"{source}, {_opened_quote(record, layout.delimiter)}"
         if "field larger" in str(error):
             raise InputError(
                 "a cell is too long",
-                where=f"{source}, line {current}",
+                where=where,
                 allowed=f"{csv.field_size_limit()} characters",
                 cure="Check for a quote that is opened and not closed.",
             ) from error
         raise InputError(
             f"the quotes do not fit together ({error})",
-            where=f"{source}, line {current}",
+            where=where,
             cure="Close every quote, and write a quote inside a quoted cell twice.",
         ) from error

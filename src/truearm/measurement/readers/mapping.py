@@ -11,6 +11,7 @@ from truearm.errors import InputError
 from truearm.measurement.readers.mapping_entries import (
     AnglesEntry,
     Column,
+    DwellEntry,
     Entry,
     LayoutEntry,
     OrderEntry,
@@ -22,6 +23,7 @@ from truearm.measurement.readers.mapping_entries import (
     SigmaRotEntry,
     TemperatureEntry,
     Text,
+    VisitEntry,
 )
 from truearm.modeling.controller import JointsOf
 from truearm.shown import counted
@@ -219,7 +221,9 @@ class MappingFile(Entry):
     sigma_rot: SigmaRotEntry | None = None
     missing: list[Text] = Field(default=[])
     order: OrderEntry | None = None
+    visit: VisitEntry | None = None
     temperature: TemperatureEntry | None = None
+    dwell: DwellEntry | None = None
     confirmed: Annotated[bool, BeforeValidator(_yes_or_no)] = True
 
     @model_validator(mode="after")
@@ -265,6 +269,8 @@ class MappingFile(Entry):
         used += [(column, entry) for (column, _), entry in shared.items()]
         if self.temperature is not None:
             used.append((self.temperature.column, "temperature.column"))
+        if self.visit is not None:
+            used.append((self.visit.column, "visit.column"))
         joints = [(column, f"joints.columns[{number}]") for number, column in enumerate(self.joints.columns, 1)]
         for group in [[*used, *joints]] if self.joints.file is None else [used, joints]:
             first: dict[str, str] = {}

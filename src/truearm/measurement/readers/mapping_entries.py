@@ -1,4 +1,4 @@
-"""Entries of a mapping file that stand for themselves: layout, orientations, deviations, order and temperature."""
+"""Entries of a mapping file that stand for themselves: layout, orientations, deviations, order and others."""
 
 from __future__ import annotations
 
@@ -173,19 +173,36 @@ _DAYS: Final = ("%d", "%j", "%c", "%x", "%u", "%w", "%a", "%A")
 
 
 class OrderEntry(Entry):
-    """What tells the order in which configurations were measured."""
+    """What tells the order in which configurations were measured; of two columns one has the day, one the time."""
 
     by: Literal["labels", "rows"] | None = None
     column: Column | None = None
+    columns: list[Column] | None = None
     time: Text | None = None
 
     @model_validator(mode="after")
     def _one(self) -> OrderEntry:
-        if (self.by is None) == (self.column is None):
-            raise ValueError("give either by: labels, by: rows, or column: NAME")
-        if self.time is not None and self.column is None:
+        if sum(given is not None for given in (self.by, self.column, self.columns)) != 1:
+            raise ValueError("give either by: labels, by: rows, column: NAME, or columns: [DAY, TIME]")
+        if self.time is not None and self.by is not None:
             raise ValueError("time is the format of a column; name it with column:")
+        if self.columns is not None:
+            if len(set(self.columns)) != 2 or len(self.columns) != 2:
+                raise InputError(
+                    "these are not one column with the day and one with the time",
+                    came=", ".join(self.columns) or "none",
+                    allowed="two different columns",
+                )
+            if self.time is None:
+                raise ValueError("two columns tell a day and a time: give their format, the two with a blank between")
         return self
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Return the columns that tell it, by their entries."""
+        if self.columns is not None:
+            return {f"columns[{number}]": column for number, column in enumerate(self.columns, 1)}
+        return {} if self.column is None else {"column": self.column}
 
     @validator_of("time")
     @classmethod
@@ -213,8 +230,32 @@ def _is_format(time: str) -> bool:
         return False
 
 
+class VisitEntry(Entry):
+    """The column with the number of the visit on which a row was measured."""
+
+    column: Column
+
+
 class TemperatureEntry(Entry):
     """The column of the arm's temperature."""
 
     column: Column
     unit: Literal["degC", "degF", "K"]
+
+
+class DwellEntry(Entry):
+    """Columns that say how a reading was taken: scatter and settling, number of samples, breaks of the beam."""
+
+    deviation: Column | None = None
+    settling: Column | None = None
+    unit: Literal["mm", "m", "um", "in"] | None = None
+    samples: Column | None = None
+    breaks: Column | None = None
+
+    @model_validator(mode="after")
+    def _units(self) -> DwellEntry:
+        if (self.unit is None) != (self.deviation is None and self.settling is None):
+            raise ValueError("unit belongs to deviation and settling: give both, or neither")
+        if not self.model_fields_set:
+            raise ValueError("give deviation, settling, samples or breaks")
+        return self

@@ -22,13 +22,15 @@ from truearm.modeling.chain import Array
 _NUMBERED: Final = re.compile("(?P<before>.*?)(?P<number>[0-9]{1,9})")
 #: Times without a day that lie further apart [s] may have passed midnight.
 _HALF_A_DAY: Final = 12 * 3600.0
+#: What a workbook adds to a day.
+MIDNIGHT: Final = " 00:00:00"
 _CANNOT_TELL: Final = "Leave order out of the mapping if nothing tells it."
 #: Numbers of configurations are below.
 _BEYOND: Final = 1e9
 
 
 def measuring_order(
-    entry: OrderEntry, cells: Cells, place: int | None, labels: Sequence[str], of_row: IntArray, where: str
+    entry: OrderEntry, cells: Cells, places: Sequence[int], labels: Sequence[str], of_row: IntArray, where: str
 ) -> IntArray:
     """Return the number of each configuration in the order of measurement, ``(configurations,)``.
 
@@ -39,8 +41,8 @@ def measuring_order(
     ----------
     entry
         What the mapping says.
-    place
-        The column that it names; None if it names none.
+    places
+        The columns that it names: none, one, or two with the day and the time.
     labels
         Of the configurations, those that were not measured included.
     of_row
@@ -55,14 +57,14 @@ def measuring_order(
     """
     if entry.by == "labels":
         return _by_labels(cells, labels, of_row, where)
-    if entry.by == "rows" or place is None:
+    if entry.by == "rows" or not places:
         return np.arange(1, len(labels) + 1)
-    values = cells.values(place) if entry.time is None else _times(cells, place, entry)
+    values = cells.values(places[0]) if entry.time is None else moments(cells, places, entry)
     first, last, row = _spans(values, of_row, len(labels))
     measured = np.flatnonzero(np.isfinite(first))
     if not len(measured):
         raise InputError(
-            "the column that shall tell the order is empty", where=cells.place(0, place), cure=_CANNOT_TELL
+            "the column that shall tell the order is empty", where=cells.place(0, places[0]), cure=_CANNOT_TELL
         )
     is_place = (first == last) & (first == np.floor(first)) & (first >= 0) & (first < _BEYOND)
     sequence = measured[np.argsort(first[measured], kind="stable")]
@@ -72,8 +74,8 @@ def measuring_order(
             raise InputError(
                 f"the configurations {labels[before]!r} and {labels[after]!r} "
                 f"{'were measured at the same time' if same else 'were measured in turns'}",
-                where=cells.place(int(row[after]), place),
-                came=cells.columns[place][int(row[after])],
+                where=_where(cells, int(row[after]), places),
+                came=" ".join(cells.columns[place][int(row[after])] for place in places),
                 allowed="one configuration after the other",
                 cure=f"A configuration is one standstill: give each its own label. {_CANNOT_TELL}",
             )
@@ -132,11 +134,32 @@ def _by_labels(cells: Cells, labels: Sequence[str], of_row: IntArray, where: str
     return np.array(list(numbers), dtype=np.intp)
 
 
-def _times(cells: Cells, place: int, entry: OrderEntry) -> Array:
+def _where(cells: Cells, row: int, places: Sequence[int]) -> str:
+    return " and ".join([cells.place(row, places[0]), *(cells.names[place] for place in places[1:])])
+
+
+def _texts_of_moments(cells: Cells, places: Sequence[int], absent: set[str]) -> list[str]:
+    """Return the text of each moment, empty where there is none; a day and a time have a blank between them."""
+    if len(places) == 1:
+        return ["" if text in absent else text for text in cells.columns[places[0]]]
+    made = []
+    for row, both in enumerate(zip(*(cells.columns[place] for place in places), strict=True)):
+        lacking = [place for place, text in zip(places, both, strict=True) if text in absent]
+        if len(lacking) == 1:
+            raise InputError(
+                "this cell is empty, and the other of day and time is not",
+                where=cells.place(row, lacking[0]),
+                allowed="a day and a time, or neither",
+            )
+        day, time = both
+        made.append("" if lacking else f"{day if cells.sheet is None else day.removesuffix(MIDNIGHT)} {time}")
+    return made
+
+
+def moments(cells: Cells, places: Sequence[int], entry: OrderEntry) -> Array:
     """Return moments in seconds since some moment, ``(rows,)``, NaN where there is none."""
-    absent = {"", *(cells.absent or ())}
-    texts = cells.columns[place]
-    known: dict[str, datetime | None] = dict.fromkeys(absent)
+    texts = _texts_of_moments(cells, places, {"", *(cells.absent or ())})
+    known: dict[str, datetime | None] = {"": None}
     for row, text in enumerate(texts):
         if text in known:
             continue
@@ -148,7 +171,7 @@ def _times(cells: Cells, place: int, entry: OrderEntry) -> Array:
         except ValueError:
             raise InputError(
                 "this is no time of the format that the mapping names",
-                where=cells.place(row, place),
+                where=_where(cells, row, places),
                 came=text,
                 allowed="2026-11-23 14:05:09" if entry.time == "iso" else str(entry.time),
                 cure="Correct order.time in the mapping: iso, or signs of Python such as %d.%m.%Y %H:%M:%S.",
@@ -158,7 +181,7 @@ def _times(cells: Cells, place: int, entry: OrderEntry) -> Array:
     if bare and len(bare) < len(given):
         row = bare[0]
         raise InputError(
-            "this time has no time zone, and others have one", where=cells.place(row, place), came=texts[row]
+            "this time has no time zone, and others have one", where=_where(cells, row, places), came=texts[row]
         )
     seconds = {text: math.nan if moment is None else _seconds(moment) for text, moment in known.items()}
     values = np.array([seconds[text] for text in texts])
@@ -166,7 +189,7 @@ def _times(cells: Cells, place: int, entry: OrderEntry) -> Array:
         row = int(np.nanargmax(values))
         raise InputError(
             "the times have no day and lie more than 12 hours apart, so that they may have passed midnight",
-            where=cells.place(row, place),
+            where=_where(cells, row, places),
             came=texts[row],
             cure="Export the day as well, or let something else tell the order.",
         )

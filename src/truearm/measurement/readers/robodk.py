@@ -32,6 +32,11 @@ from truearm.modeling.transform import quaternion_from_rotation, rotation_from_q
 from truearm.shown import counted
 
 AngleUnit = Literal["deg", "rad"]
+Delimiter = Literal["comma", "semicolon", "tab"]
+Decimal = Literal["point", "comma"]
+#: What stands between columns, and the sign in numbers, by their names.
+DELIMITERS: Final[dict[str, str]] = {"comma": ",", "semicolon": ";", "tab": "\t"}
+DECIMALS: Final[dict[str, str]] = {"point": ".", "comma": ","}
 _JOINTS: Final = 6
 #: Columns of a table of points and of one of poses.
 _POINTS, _POSES = 12, 18
@@ -67,7 +72,13 @@ class RoboDKTable:
     missing: int
 
 
-def read_robodk(path: Path, angle_unit: AngleUnit | None, joints_are: JointsOf) -> RoboDKTable:
+def read_robodk(
+    path: Path,
+    angle_unit: AngleUnit | None,
+    joints_are: JointsOf,
+    delimiter: Delimiter = "comma",
+    decimal: Decimal = "point",
+) -> RoboDKTable:
     """Read a table of measurements.
 
     Lines that follow each other with the same joint positions and other tool points are one configuration.
@@ -78,6 +89,8 @@ def read_robodk(path: Path, angle_unit: AngleUnit | None, joints_are: JointsOf) 
         Of the angles of measured poses; None for a table of points.
     joints_are
         ``model``, or ``controller`` if it shows these joint positions.
+    delimiter, decimal
+        What stands between columns, and the decimal sign.
 
     Raises
     ------
@@ -86,8 +99,9 @@ def read_robodk(path: Path, angle_unit: AngleUnit | None, joints_are: JointsOf) 
     """
     text = read_text(path)
     header = 1 + next((number for number, line in enumerate(lines_of(text)) if line.strip()), 0)
-    refuse_other_separators(text, f"{path}, line {header}")
-    cells = read_cells(text, str(path), Layout(header=header))
+    if delimiter == "comma":
+        refuse_other_separators(text, f"{path}, line {header}", ", or name what the file has by `delimiter`")
+    cells = read_cells(text, str(path), Layout(DELIMITERS[delimiter], DECIMALS[decimal], header))
     columns = len(cells.names)
     if columns and not cells.names[-1] and not any(cells.columns[-1]):  # every line ends with a comma
         columns -= 1

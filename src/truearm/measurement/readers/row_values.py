@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, Literal
@@ -10,14 +11,19 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.dataset import IntArray
-from truearm.measurement.readers.cells import Cells
+from truearm.measurement.readers.cells import Cells, column_letters
 from truearm.measurement.readers.mapping import MappingFile, ReadingEntry
 from truearm.measurement.readers.mapping_entries import SigmaColumns, SigmaRotColumns, TemperatureEntry
 from truearm.measurement.readers.orientation_columns import quaternions_of_angles, quaternions_of_vectors
 from truearm.measurement.readers.rows import Configurations
 from truearm.modeling.chain import Array
+from truearm.notices import Notice
 from truearm.units import as_number, sized_si
 
+#: Deviations of the coordinates of a reading are called uneven if they are so many times apart in half of all.
+_UNEVEN: Final = 2.0
+#: A unit behind a name.
+_IN_BRACKETS: Final = re.compile(r"[\[({].*")
 #: Temperatures of an arm that are meant [degC].
 _TEMPERATURES: Final = (-100.0, 200.0)
 #: What is taken off a temperature, and by what the rest is multiplied, to have degC.
@@ -29,14 +35,21 @@ def place_of(cells: Cells, column: str, mapping: Path, entry: str) -> int:
     count = cells.names.count(column)
     if count == 1:
         return cells.names.index(column)
-    near = nearest_names(column, cells.names, 1) if cells.header is not None else []
-    raise InputError(
-        f"{cells.source} has {'no such column' if not count else f'{count} columns of this name'}",
-        where=f"{mapping}, {entry}",
-        came=column,
-        allowed=", ".join(name for name in cells.names if name),
-        cure=f"Did you mean {near[0]}?" if near and not count else "Check the header line and the delimiter.",
-    )
+    where, cure = f"{mapping}, {entry}", "Check the header line and the delimiter."
+    if count:
+        places = " and ".join(column_letters(n) if cells.sheet else str(n + 1) for n in _places(cells, column))
+        what = f"{cells.source} has {count} columns of this name, columns {places}"
+        cure = "Give each its own name, or let columns go by number (layout.header: none, and layout.first_row)."
+    else:
+        what = f"{cells.source} has no such column"
+        with_unit = [name for name in cells.names if _IN_BRACKETS.sub("", name).strip() == column]
+        near = with_unit or (nearest_names(column, cells.names, 1) if cells.header is not None else [])
+        cure = f"Did you mean {near[0]}?" if near else cure
+    raise InputError(what, where=where, came=column, allowed=", ".join(name for name in cells.names if name), cure=cure)
+
+
+def _places(cells: Cells, column: str) -> list[int]:
+    return [place for place, name in enumerate(cells.names) if name == column]
 
 
 def numbers_of(
@@ -108,6 +121,34 @@ def deviations(cells: Cells, content: MappingFile, mapping: Path, name: Literal[
         each = numbers_of(cells, columns, entry.unit, mapping, f"readings[{number}].{name}", deviation=True)
         parts.append(np.sqrt(np.mean(each**2, axis=1)) / entry.coverage)
     return np.stack(parts, axis=1).reshape(-1)
+
+
+def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list[Notice]:
+    """Say if deviations of the three coordinates of a reading are far apart: a reading has one for all of them."""
+    found: list[Notice] = []
+    for name, whole in (("sigma", "x, y and z"), ("sigma_rot", "the three angles")):
+        ratios = []
+        for number, reading in enumerate(content.readings, 1):
+            entry: SigmaColumns | SigmaRotColumns | None = getattr(reading, name)
+            if entry is None or len(entry.columns) != 3:
+                continue
+            columns = {f"columns[{n}]": column for n, column in enumerate(entry.columns, 1)}
+            each = numbers_of(cells, columns, entry.unit, mapping, f"readings[{number}].{name}", deviation=True)
+            each = each[np.isfinite(each).all(axis=1)]
+            ratios.append(each.max(axis=1) / each.min(axis=1))
+        apart = np.concatenate([*ratios, np.zeros(0)])
+        if not len(apart) or np.median(apart) < _UNEVEN:
+            continue
+        found.append(
+            Notice(
+                "sigma-uneven",
+                f"The deviations of {whole} of one reading are {np.median(apart):.2g} times apart in half of the "
+                f"readings or more, and up to {apart.max():.2g} times. Data have one {name} for all three, the root of "
+                "their mean square: the best coordinate counts less than it could, and the worst one more.",
+                "note",
+            )
+        )
+    return found
 
 
 def called_in(content: MappingFile) -> dict[str, str]:

@@ -13,6 +13,7 @@ from truearm.errors import InputError, did_you_mean, nearest_names
 from truearm.files import exists, read_bytes, read_yaml
 from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.readers.canonical_rows import visits_of
 from truearm.measurement.readers.cells import Cells, read_cells
 from truearm.measurement.readers.columns import joints_in_file
 from truearm.measurement.readers.mapping import MappingFile, NamesEntry, name_pattern
@@ -27,11 +28,13 @@ from truearm.measurement.readers.row_values import (
     quaternions,
     refuse_second_header,
     temperatures,
+    uneven_deviations,
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.measurement.readers.sheets import is_workbook, read_sheet
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
+from truearm.notices import Notice
 from truearm.shown import counted
 
 
@@ -63,8 +66,8 @@ class TableFiles:
         return (self.table, *mapping, *(() if self.joints is None else (self.joints,)))
 
 
-def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
-    """Return the files of a table, or refuse a mapping that nobody confirmed."""
+def read_mapping(mapping: Path) -> MappingFile:
+    """Return what a mapping file, or a preset, says, or refuse one that nobody confirmed."""
     path = mapping_path(mapping)
     if not path.suffix and not exists(path):
         raise InputError(
@@ -83,6 +86,12 @@ def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
             allowed="yes",
             cure="Look at every line marked with a guess, correct it, and write confirmed: yes.",
         )
+    return content
+
+
+def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
+    """Return the files of a table, or refuse a mapping that nobody confirmed."""
+    path, content = mapping_path(mapping), read_mapping(mapping)
     named = content.joints.file
     if joints is not None and named is None:
         raise InputError(
@@ -118,35 +127,34 @@ def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, jo
     InputError
         If a file cannot be used, or the mapping says that the joint positions are another's.
     """
+    return read_with(_files(path, mapping, joints), joints_are)[0]
+
+
+def read_noting(
+    path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None
+) -> tuple[Dataset, tuple[Notice, ...]]:
+    """Read a table as :func:`read_table` does, and say what data cannot hold of it."""
     return read_with(_files(path, mapping, joints), joints_are)
 
 
-def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
-    """Read a table with its mapping, see :func:`read_table`."""
+def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Dataset, tuple[Notice, ...]]:
+    """Read a table with its mapping, see :func:`read_noting`."""
     path, content, mapping = files.table, files.content, files.mapping
     whose = _whose(content.joints.are, joints_are, f"{mapping}, joints.are")
-    cells = replace(_read(path, content.layout, f"{mapping}, layout"), absent=tuple(content.missing))
-    found: dict[str, list[str]] = {}
-    if content.names is not None:
-        cells, found = _split_names(cells, content.names, mapping)
-    refuse_second_header(cells, content)
-    labels = found.get("configuration") or [str(number) for number in range(1, len(cells.lines) + 1)]
-    if content.configuration is not None and content.configuration.column is not None:
-        labels = list(cells.texts(place_of(cells, content.configuration.column, mapping, "configuration.column")))
+    cells, labels, found = _named_rows(_read(path, content.layout, f"{mapping}, layout"), content, mapping)
+    if labels is None:
+        labels = [str(number) for number in range(1, len(cells.lines) + 1)]
     configurations, of_row = _configurations(cells, labels, files, whose, joints_are)
-    targets = _targets(cells, content, found.get("target"), mapping)
+    rows = _mapped(cells, labels, found, content, mapping)
+    targets, position, quaternion = list(rows.targets), rows.position, rows.quaternion
+    sigma, sigma_rot = rows.sigma, rows.sigma_rot
     entries = len(content.readings)
-    position = np.stack(
-        [
-            numbers_of(cells, entry.position, content.length_unit, mapping, f"readings[{number}]")
-            for number, entry in enumerate(content.readings, 1)
-        ],
-        axis=1,
-    ).reshape(-1, 3)
     configuration = np.repeat(of_row, entries)
     lines = [line for line in cells.lines for _ in range(entries)]
-    quaternion = quaternions(cells, content, mapping)
-    sigma, sigma_rot = (deviations(cells, content, mapping, name) for name in ("sigma", "sigma_rot"))
+
+    visit = None
+    if content.visit is not None:
+        visit = np.repeat(visits_of(cells, place_of(cells, content.visit.column, mapping, "visit.column")), entries)
 
     reference = _is_reference(targets, content.references, f"{mapping}, references")
     absent = np.setdiff1d(np.arange(len(configurations.labels)), of_row)
@@ -167,12 +175,87 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> Dataset:
         quaternion=None if quaternion is None else padded(quaternion),
         sigma=None if sigma is None else padded(sigma, same=content.sigma is not None),
         sigma_rot=None if sigma_rot is None else padded(sigma_rot, same=content.sigma_rot is not None),
+        visit=None if visit is None else np.concatenate([visit, np.full(added, visit[0])]),
         called=called_in(content),
     )
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
+    noticed = tuple(uneven_deviations(cells, content, mapping))
     if content.temperature is None:
-        return data
-    return replace(data, temperature=temperatures(cells, configurations, of_row, content.temperature, mapping))
+        return data, noticed
+    warm = temperatures(cells, configurations, of_row, content.temperature, mapping)
+    return replace(data, temperature=warm), noticed
+
+
+@dataclass(frozen=True, eq=False)
+class MappedRows:
+    """What the rows of a table hold, row by row; a row has as many readings as the mapping has entries of them.
+
+    Attributes
+    ----------
+    cells
+        The rows, those to be skipped left out.
+    labels
+        Of each row's configuration, ``(rows,)``; None where every row is a configuration of its own.
+    targets
+        Of each reading, ``(readings,)``.
+    position
+        [m], ``(readings, 3)``, NaN where nothing is.
+    quaternion
+        (w, x, y, z) as the table has it, ``(readings, 4)``; None if there is none.
+    sigma, sigma_rot
+        Standard deviations [m], [rad], ``(readings,)``; None if the table has none.
+    """
+
+    cells: Cells
+    labels: tuple[str, ...] | None
+    targets: tuple[str, ...]
+    position: Array
+    quaternion: Array | None
+    sigma: Array | None
+    sigma_rot: Array | None
+
+
+def mapped_rows(cells: Cells, content: MappingFile, mapping: Path) -> MappedRows:
+    """Return what the rows of a table hold, whatever configurations there are.
+
+    Raises
+    ------
+    InputError
+        If a column is missing, or a cell cannot be what its column holds.
+    """
+    named, labels, found = _named_rows(cells, content, mapping)
+    return _mapped(named, labels, found, content, mapping)
+
+
+def _named_rows(
+    cells: Cells, content: MappingFile, mapping: Path
+) -> tuple[Cells, list[str] | None, dict[str, list[str]]]:
+    """Return the rows that are meant, their labels, None if they have none, and what the pattern finds in names."""
+    cells, found = replace(cells, absent=tuple(content.missing)), dict[str, list[str]]()
+    if content.names is not None:
+        cells, found = _split_names(cells, content.names, mapping)
+    refuse_second_header(cells, content)
+    labels = found.get("configuration")
+    if content.configuration is not None and content.configuration.column is not None:
+        labels = list(cells.texts(place_of(cells, content.configuration.column, mapping, "configuration.column")))
+    return cells, labels, found
+
+
+def _mapped(
+    cells: Cells, labels: list[str] | None, found: dict[str, list[str]], content: MappingFile, mapping: Path
+) -> MappedRows:
+    targets = _targets(cells, content, found.get("target"), mapping)
+    position = np.stack(
+        [
+            numbers_of(cells, entry.position, content.length_unit, mapping, f"readings[{number}]")
+            for number, entry in enumerate(content.readings, 1)
+        ],
+        axis=1,
+    ).reshape(-1, 3)
+    turned = quaternions(cells, content, mapping)
+    sigma, sigma_rot = (deviations(cells, content, mapping, name) for name in ("sigma", "sigma_rot"))
+    named = None if labels is None else tuple(labels)
+    return MappedRows(cells, named, tuple(targets), position, turned, sigma, sigma_rot)
 
 
 def files_read(path: Path, mapping: Path, joints: Path | None = None) -> tuple[Path, ...]:
@@ -198,10 +281,10 @@ def _order(cells: Cells, configurations: Configurations, of_row: IntArray, files
     entry = files.content.order
     if entry is None:
         return None
-    place = None if entry.column is None else place_of(cells, entry.column, files.mapping, "order.column")
+    places = [place_of(cells, column, files.mapping, f"order.{name}") for name, column in entry.names.items()]
     if entry.by == "rows" and files.joints is None:
         refuse_returns(cells, configurations.labels, of_row, f"{files.mapping}, order.by")
-    return measuring_order(entry, cells, place, configurations.labels, of_row, f"{files.mapping}, order")
+    return measuring_order(entry, cells, places, configurations.labels, of_row, f"{files.mapping}, order")
 
 
 def _read(path: Path, entry: LayoutEntry, where: str) -> Cells:
@@ -222,17 +305,27 @@ def _read(path: Path, entry: LayoutEntry, where: str) -> Cells:
             cure=f"Remove it, or name a workbook instead of {path}.",
         )
     encoding = "utf-8-sig" if entry.encoding == "utf-8" else entry.encoding
+    content = read_bytes(path)
     try:
-        text = read_bytes(path).decode(encoding)
+        text = content.decode(encoding)
     except (UnicodeError, LookupError) as error:
         raise InputError(
             f"the file is not {entry.encoding} text",
-            where=str(path),
+            where=f"{path}{_place_of_byte(content, error, entry.layout.delimiter)}",
             cure="Name its encoding in the mapping (layout.encoding), such as cp1252 or utf-16.",
         ) from error
     if not text.strip():
         raise InputError("the file is empty", where=str(path), cure="Check that it was exported whole.")
     return read_cells(text, str(path), entry.layout)
+
+
+def _place_of_byte(content: bytes, error: Exception, delimiter: str | None) -> str:
+    """Return the line and the cell of a byte that is no text, where bytes are signs."""
+    if not isinstance(error, UnicodeDecodeError) or error.encoding.startswith("utf-16"):
+        return ""
+    *above, before = content[: error.start].split(b"\n")
+    cell = "" if delimiter is None else f", cell {before.count(delimiter.encode()) + 1}"
+    return f", line {len(above) + 1}{cell}"
 
 
 def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells, dict[str, list[str]]]:

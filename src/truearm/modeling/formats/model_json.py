@@ -40,6 +40,7 @@ def model_json(robot: Robot, frames: str, left_out: Iterable[str]) -> str:
                 "limits": None if joint.limits is None else list(joint.limits),
                 "transmission_periods": joint.transmission_periods,
                 "bearing": joint.bearing,
+                "max_speed": joint.max_speed,
                 "elements": _elements(robot, link),
             }
             for joint, link in zip(robot.joints, robot.link_elements, strict=True)

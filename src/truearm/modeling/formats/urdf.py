@@ -42,7 +42,7 @@ from truearm.modeling.formats.urdf_tree import (
     roll_pitch_yaw,
     triple,
 )
-from truearm.modeling.parts import Joint, LinkMass
+from truearm.modeling.parts import JOINT_SPEEDS, Joint, LinkMass
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
 
@@ -80,7 +80,9 @@ def read_urdf(path: Path, tip: str | None = None) -> Robot:
         title=tree.name or path.stem,
         source=f"URDF file {path.name}",
         convention_name="urdf",
-        joints=tuple(Joint(link.joint.name, link.kind, link.row, link.limits) for link in links),
+        joints=tuple(
+            Joint(link.joint.name, link.kind, link.row, link.limits, max_speed=_max_speed(link.joint)) for link in links
+        ),
         flange=Transform.from_matrix(tail[:3, :3], tail[:3, 3]),
         masses=tuple(mass for mass in masses if mass is not None),
         controller=_controller(tree, links[-1].joint.child, end),
@@ -265,6 +267,24 @@ def _limits(joint: UrdfJoint) -> tuple[float, float] | None:
             cure=cure,
         )
     return low, high
+
+
+def _max_speed(joint: UrdfJoint) -> float | None:
+    """Return how fast a joint goes at 100 % [rad/s or m/s]; None for 0, and for what no joint does.
+
+    The attribute must be there, so files have 0, or some large number, where nobody knows.
+    """
+    tag = child_tag(joint.tag, "limit", joint.where)
+    speed = (numbers(tag, "velocity", 1, joint.where) or (0.0,))[0] if tag else 0.0
+    if speed < 0.0:
+        raise InputError(
+            "the velocity of a <limit> cannot be negative",
+            where=joint.where,
+            came=speed,
+            cure="Give how fast the joint goes at 100 % [rad/s or m/s], or 0 if it is not known.",
+        )
+    slowest, fastest = JOINT_SPEEDS[KIND[joint.type]]
+    return speed if slowest <= speed <= fastest else None
 
 
 def _mass(tree: Tree, number: int, link: str) -> LinkMass | None:

@@ -45,8 +45,7 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
         lines += _joint_lines(joint, parent, f"link_{number}", place, _limit(robot.name, joint), moving.axis)
     lines += ['  <link name="tool0"/>']
     lines += _joint_lines(None, f"link_{len(robot.joints)}", "tool0", origins[-1], [])
-    if any(joint.limits for joint in robot.joints):
-        said.append("Effort and velocity limits are not known and stand as 0.")
+    said += _unknown_limits(robot.joints)
     if robot.masses:
         said.append("Inertia tensors are not written and stand as 0.")
     return "\n".join([*lines, "</robot>", ""]), said
@@ -59,7 +58,7 @@ def _joint_lines(
     if joint is None:
         head = '  <joint name="tool0_joint" type="fixed">'
     else:
-        type_ = joint.kind if limit else "continuous"
+        type_ = joint.kind if joint.limits else "continuous"
         limit = [f'    <axis xyz="{_written(axis or (0.0, 0.0, 1.0))}"/>', *limit]
         head = f'  <joint name={quoteattr(joint.name)} type="{type_}">'
     place = f'xyz="{_written(origin[:3, 3])}" rpy="{_written(roll_pitch_yaw(origin[:3, :3]))}"'
@@ -68,6 +67,7 @@ def _joint_lines(
 
 
 def _limit(where: str, joint: Joint) -> list[str]:
+    speed = "0" if joint.max_speed is None else repr(joint.max_speed)
     if joint.limits is None:
         if joint.kind == "prismatic":
             raise InputError(
@@ -75,9 +75,22 @@ def _limit(where: str, joint: Joint) -> list[str]:
                 where=f"{where}, joint {joint.name}",
                 cure="Give the joint its limits in the robot file.",
             )
-        return []
+        return [] if joint.max_speed is None else [f'    <limit effort="0" velocity="{speed}"/>']
     low, high = joint.limits
-    return [f'    <limit lower="{low!r}" upper="{high!r}" effort="0" velocity="0"/>']
+    return [f'    <limit lower="{low!r}" upper="{high!r}" effort="0" velocity="{speed}"/>']
+
+
+def _unknown_limits(joints: Iterable[Joint]) -> list[str]:
+    """Say which numbers of a ``<limit>`` stand as 0."""
+    limited = [joint for joint in joints if joint.limits or joint.max_speed is not None]
+    if not limited:
+        return []
+    unknown = [joint.name for joint in limited if joint.max_speed is None]
+    if not unknown:
+        return ["Effort limits are not known and stand as 0."]
+    if len(unknown) == len(limited):
+        return ["Effort and velocity limits are not known and stand as 0."]
+    return [f"Effort limits, and velocity limits of {', '.join(unknown)}, are not known and stand as 0."]
 
 
 def _link_lines(robot: Robot, number: int, behind: Array) -> list[str]:

@@ -24,19 +24,24 @@ def segment_distance(p1: Array, q1: Array, p2: Array, q2: Array) -> Array:
     """
     u, v, w = q1 - p1, q2 - p2, p1 - p2
     a, b, c = _dot(u, u), _dot(u, v), _dot(v, v)
-    d, e = _dot(u, w), _dot(v, w)
-    square = a * c - b * b
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s, t = (b * e - c * d) / square, (a * e - b * d) / square
-        inside = (square > 1e-12 * a * c) & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
-        between = np.linalg.norm(w + s[..., None, :] * u - t[..., None, :] * v, axis=-2)
-    ends = [
-        _to_segment(p1, p2, v, c),
-        _to_segment(q1, p2, v, c),
-        _to_segment(p2, p1, u, a),
-        _to_segment(q2, p1, u, a),
-    ]
-    return np.asarray(np.minimum(np.min(np.broadcast_arrays(*ends), axis=0), np.where(inside, between, np.inf)))
+    d, e, apart = _dot(u, w), _dot(v, w), _dot(w, w)
+
+    def squared(s: Array | float, t: Array | float) -> Array:
+        """Return the square of the distance between the points at the shares s of the one and t of the other."""
+        return np.asarray(apart + s * (a * s - 2.0 * b * t + 2.0 * d) + t * (c * t - 2.0 * e))
+
+    on_u, on_v = 1.0 / np.where(a > 0, a, 1.0), 1.0 / np.where(c > 0, c, 1.0)
+    nearest = squared(0.0, np.clip(e * on_v, 0.0, 1.0))
+    np.minimum(nearest, squared(1.0, np.clip((e + b) * on_v, 0.0, 1.0)), out=nearest)
+    np.minimum(nearest, squared(np.clip(-d * on_u, 0.0, 1.0), 0.0), out=nearest)
+    np.minimum(nearest, squared(np.clip((b - d) * on_u, 0.0, 1.0), 1.0), out=nearest)
+    sine = a * c - b * b
+    crossing = sine > 1e-12 * a * c
+    sine = np.where(crossing, sine, 1.0)
+    s, t = (b * e - c * d) / sine, (a * e - b * d) / sine
+    inside = crossing & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
+    np.minimum(nearest, np.where(inside, squared(s, t), np.inf), out=nearest)
+    return np.asarray(np.sqrt(np.maximum(nearest, 0.0)))
 
 
 def box_distance(p: Array, q: Array, low: Array, high: Array) -> Array:
@@ -63,11 +68,5 @@ def box_distance(p: Array, q: Array, low: Array, high: Array) -> Array:
     return np.asarray(np.min(apart, axis=0))
 
 
-def _to_segment(point: Array, start: Array, along: Array, square: Array) -> Array:
-    way = point - start
-    part = np.clip(_dot(way, along) / np.where(square > 0, square, 1.0), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(way - part[..., None, :] * along, axis=-2))
-
-
 def _dot(a: Array, b: Array) -> Array:
-    return np.asarray((a * b).sum(axis=-2))
+    return np.asarray(a[..., 0, :] * b[..., 0, :] + a[..., 1, :] * b[..., 1, :] + a[..., 2, :] * b[..., 2, :])

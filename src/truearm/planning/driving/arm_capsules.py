@@ -2,20 +2,24 @@
 
 How thick the links of an arm are stands in no kinematic table. Arms of all makers are much alike, so it follows from
 the length of the stretched arm: the first half of it is thicker than the second, in which the wrist is.
+
+Links between parallel axes may lie beside these lines. Such a link is all of a plate: its line, moved along the axes
+from where the links may lie on the one side to the other. Lines side by side stand for it, with the gap between them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 from typing import Final
 
 import numpy as np
 
-from truearm.modeling.chain import Array
+from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.constraints import at_the_origin
+from truearm.planning.driving.links_beside import Beside, links_beside
 
 #: Radius of links that begin in the first half of the stretched arm, and of the others, by its length.
 RADII: Final = (0.06, 0.045)
@@ -25,12 +29,14 @@ TARGET_RADIUS: Final = 0.025
 _SMALL: Final = 1e-3
 #: Of more targets those are looked at that are farthest out in some direction.
 _MOST_TARGETS: Final = 12
+#: Lines of a plate are no farther apart than this times its radius.
+_GAP: Final = 1.5
 _SAMPLE: Final = 300
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """A line between two points of the arm, and its radius.
+    """A line between two points of the arm, or lines that stand for a plate, and its radius.
 
     Attributes
     ----------
@@ -40,18 +46,63 @@ class Capsule:
         [m].
     tool
         Whether it holds a target.
+    lines
+        Numbers of the points at both ends of each line; one line from start to end, unless it is a plate.
+    gap
+        How far a point of the plate is from the nearest of its lines along the parallel axes at most [m].
+    joints
+        Those with parallel axes between which a plate lies.
+    across
+        The points at both ends of its line at right angles to these axes, at one side; None if it has none. Two plates
+        of the same axes are as far apart as these lines.
     """
 
     start: int
     end: int
     radius: float
     tool: bool = False
+    lines: tuple[tuple[int, int], ...] = ()
+    gap: float = 0.0
+    joints: tuple[int, ...] = ()
+    across: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.lines:
+            object.__setattr__(self, "lines", ((self.start, self.end),))
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """All points at the ends of its lines."""
+        return tuple(sorted({point for line in self.lines for point in line}))
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """Points side by side along a joint's axis, at which links may lie that a model has elsewhere.
+
+    Attributes
+    ----------
+    joint
+        From 1.
+    first
+        Number of the first of the points.
+    places
+        Where each is along the axis from the origin of the joint [m], evenly.
+    group
+        The joints with parallel axes.
+    """
+
+    joint: int
+    first: int
+    places: Array
+    group: Beside
 
 
 class ArmCapsules:
     """The capsules of a robot, without its joint effects, in its base frame.
 
     Points are numbered: 0 is the origin of the base, then come the origins of the joints, the flange and the targets.
+    Behind these come the points side by side along axes that are parallel.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -62,10 +113,20 @@ class ArmCapsules:
         if len(self.targets) > _MOST_TARGETS:
             self.targets = self._outermost()
             del self.__dict__["_places"]
+        self.beside = links_beside(robot)
+        self.modelled = self.flange + 1 + len(self.targets)
 
     def points(self, q: Array) -> Array:
         """Return the points at joint positions ``(n, joints)`` [m], ``(points, 3, n)``."""
         kinematics = self.robot.forward_kinematics(q)
+        points = self._of_the_model(kinematics)
+        for row in self._rows:
+            # Along the first of the axes, which are parallel.
+            axis = kinematics.axis(self.robot.moving[row.group.joints[0] - 1])
+            points += [points[row.joint] + place * axis for place in row.places.tolist()]
+        return np.array(points)
+
+    def _of_the_model(self, kinematics: ForwardKinematics) -> list[Array]:
         shape = kinematics.position.shape
         points = [np.zeros(shape)]
         points += [np.broadcast_to(kinematics.origin(i), shape) for i in self.robot.moving[: self.joints]]
@@ -73,7 +134,7 @@ class ArmCapsules:
         if self.targets:
             rotation = kinematics.matrix()
             points += [kinematics.position + (rotation @ place).T for place in self._places]
-        return np.array(points)
+        return points
 
     @cached_property
     def sample(self) -> Array:
@@ -88,34 +149,103 @@ class ArmCapsules:
         return self.points(self.sample)
 
     @cached_property
+    def _modelled(self) -> Array:
+        """The points of the model at :attr:`sample`."""
+        return np.array(self._of_the_model(self.robot.forward_kinematics(self.sample)))
+
+    @cached_property
     def lengths(self) -> Array:
         """How far each point up to the flange is from the one before at most [m], ``(joints + 2,)``; 0 for the base."""
-        steps = np.diff(self.sampled[: self.flange + 1], axis=0)
+        steps = np.diff(self._modelled[: self.flange + 1], axis=0)
         return np.concatenate([[0.0], np.linalg.norm(steps, axis=1).max(axis=1)])
 
     @cached_property
     def along(self) -> Array:
-        """How far each point is from the base along the arm at most [m], ``(points,)``."""
+        """How far each point is from the base along the arm at most [m], ``(points,)``.
+
+        Points beside a joint are as far as the joint, see :attr:`aside`.
+        """
         along = np.cumsum(self.lengths)
-        tool = self.sampled[self.flange + 1 :] - self.sampled[self.flange]
-        return np.concatenate([along, along[-1] + np.linalg.norm(tool, axis=1).max(axis=1, initial=0.0)])
+        tool = self._modelled[self.flange + 1 :] - self._modelled[self.flange]
+        tools = along[-1] + np.linalg.norm(tool, axis=1).max(axis=1, initial=0.0)
+        return np.concatenate([along, tools, *(np.full(len(row.places), along[row.joint]) for row in self._rows)])
+
+    @cached_property
+    def aside(self) -> Array:
+        """How far each point is beside a joint, along its axis [m], ``(points,)``; zero for points of the model."""
+        return np.concatenate([np.zeros(self.modelled), *(np.abs(row.places) for row in self._rows)])
+
+    def joint_of(self, point: int) -> int:
+        """Return the point of the model that a point lies beside; a point of the model itself."""
+        return next((row.joint for row in self._rows if 0 <= point - row.first < len(row.places)), point)
+
+    def parallel_at(self, point: int) -> int:
+        """Return the first of the joints, from 1, along whose parallel axes a point lies; 0 for points of the model."""
+        rows = (row for row in self._rows if 0 <= point - row.first < len(row.places))
+        return next((row.group.joints[0] for row in rows), 0)
 
     @cached_property
     def fixed(self) -> tuple[int, ...]:
-        """Points that stand still whatever the joints do."""
-        return tuple(int(k) for k in np.flatnonzero((np.ptp(self.sampled, axis=2) < _SMALL).all(axis=1)))
+        """Points of the model that stand still whatever the joints do."""
+        still = (np.ptp(self._modelled, axis=2) < _SMALL).all(axis=1)
+        return tuple(int(k) for k in np.flatnonzero(still))
 
     @cached_property
     def links(self) -> tuple[Capsule, ...]:
         """The links from the base to the flange; what is shorter than 1 mm is none."""
+        return tuple(self._plate(start, end, radius) for start, end, radius in self._modelled_links())
+
+    def _modelled_links(self) -> list[tuple[int, int, float]]:
+        """Return the points at both ends of each link, and its radius [m]."""
         ends = [k for k in range(1, self.flange + 1) if self.lengths[k] >= _SMALL]
-        starts = [0, *ends[:-1]]
+        lines = [(self._last_at(start), end) for start, end in pairwise([0, *ends])]
         half = self.along[self.flange] / 2.0
-        found = []
-        for start, end in zip(starts, ends, strict=True):
-            thick = RADII[0] if self.along[start] < half else RADII[1]
-            found.append(Capsule(end=end, start=self._last_at(start), radius=thick * float(self.along[self.flange])))
-        return tuple(found)
+        return [
+            (start, end, RADII[0 if self.along[start] < half else 1] * float(self.along[self.flange]))
+            for start, end in lines
+        ]
+
+    def _plate(self, start: int, end: int, radius: float) -> Capsule:
+        """Return a link as a capsule; as a plate if it begins at a joint whose axis is parallel to another.
+
+        The last of the links begins anywhere along the axis, and ends where the model has it. If it leads along the
+        axis, two lines cover it: from either side to there.
+        """
+        rows = {row.joint: row for row in self._rows}
+        if start not in rows:
+            return Capsule(start, end, radius)
+        row, other = rows[start], rows.get(end)
+        numbers = range(len(row.places))
+        gap = abs(float(row.places[1] - row.places[0])) / 2.0
+        across = None
+        if other is not None and other.group is row.group:
+            lines = tuple((row.first + k, other.first + k) for k in numbers)
+            across = lines[0]
+        elif self._leads_along(row, end):
+            lines, gap, across = ((row.first, end), (row.first + numbers[-1], end)), 0.0, (row.first, row.first)
+        else:
+            lines = tuple((row.first + k, end) for k in numbers)
+        return Capsule(start, end, radius, False, lines, gap, row.group.joints, across)
+
+    def _leads_along(self, row: _Row, end: int) -> bool:
+        ways = self.sampled[[row.first, row.first + len(row.places) - 1, end]]
+        axis = (ways[1] - ways[0]) / (row.places[-1] - row.places[0])
+        way = ways[2] - ways[0]
+        return bool(np.linalg.norm(way - (way * axis).sum(axis=0) * axis, axis=0).max() < _SMALL)
+
+    @cached_property
+    def _rows(self) -> tuple[_Row, ...]:
+        """Points beside each joint whose axis is parallel to another."""
+        rows: list[_Row] = []
+        first, way = self.modelled, np.cumsum(self.lengths)
+        for group in self.beside:
+            thin = RADII[0 if way[group.joints[-1]] < way[-1] / 2.0 else 1] * float(way[-1])
+            count = 1 + max(1, int(np.ceil((group.high - group.low) / (_GAP * thin))))
+            for joint, origin in zip(group.joints, group.origins, strict=True):
+                places = group.side * (np.linspace(group.low, group.high, count) - origin)
+                rows.append(_Row(joint, first, places, group))
+                first += count
+        return tuple(rows)
 
     @cached_property
     def tools(self) -> tuple[Capsule, ...]:
@@ -125,10 +255,6 @@ class ArmCapsules:
             for k in range(len(self.targets))
             if self.along[self.flange + 1 + k] - self.along[self.flange] >= _SMALL
         )
-
-    def moved_by(self, point: int) -> range:
-        """Return the joints, from 0, that move a point."""
-        return range(min(point - 1, self.joints)) if point <= self.flange else range(self.joints)
 
     def _last_at(self, point: int) -> int:
         """Return the last of the points that lie where this one lies."""

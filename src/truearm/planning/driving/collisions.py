@@ -8,7 +8,6 @@ the other, so that two postures with much room answer for what lies between them
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -19,40 +18,22 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.planning.constraints.segments import box_distance, segment_distance
 from truearm.planning.driving.arm_capsules import ArmCapsules, Capsule
 from truearm.planning.driving.cell import FLOOR, Cell
+from truearm.planning.driving.rooms import Measure, Piece, Room
 
 LINKS: Final = "links"
+#: Before the name of a box.
+KEPT_OUT: Final = "keep_out "
 #: What is kept on top of the clearance, so that it holds between the postures that are looked at, too [m].
 MARGIN: Final = 2e-3
 #: A joint that changes a height by less than this for each rad does not count: its axis is upright [m].
 _UPRIGHT: Final = 5e-4
 #: Two places on the arm are kept apart if the way between them along the arm is so many times what they keep.
 APART: Final = 3.0
-_AT_ONCE: Final = 20_000
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """A capsule without what is next to one of its ends, as shares of its length."""
-
-    capsule: Capsule
-    first: float = 0.0
-    last: float = 1.0
-
-
-@dataclass(frozen=True)
-class _Room:
-    """What is kept clear of what: the floor, a box, or another link."""
-
-    what: str
-    words: str
-    piece: _Piece | None = None
-    other: _Piece | None = None
-    point: int = 0
-    radius: float = 0.0
-    box: int = 0
+#: So few postures at once that what is computed of them stays in the cache of a processor.
+_AT_ONCE: Final = 1_000
+_NEAR: Final = " come near each other"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +63,14 @@ class CollisionCheck:
     as much of them that the way along the arm between the rest is :data:`APART` times what they keep, their radii and
     the clearance. What no posture keeps apart is left out.
 
+    Links between parallel axes are plates, wide enough to hold the link wherever along the axes it may lie: rooms to
+    them are never more than those to the link.
+
+    Attributes
+    ----------
+    left_out
+        What no posture keeps apart, in words.
+
     Raises
     ------
     InputError
@@ -89,13 +78,19 @@ class CollisionCheck:
     """
 
     def __init__(self, robot: Robot, cell: Cell) -> None:
-        self.cell, self.arm = cell, ArmCapsules(robot)
+        self.robot, self.cell, self.arm = robot, cell, ArmCapsules(robot)
         self.need = cell.clearance + MARGIN
         self._refuse_held()
+        self._stubs: dict[str, None] = {}
         rooms = [*self._to_the_floor(), *self._to_the_boxes()]
         between = self._between_links()
-        ever = np.flatnonzero((self._measured(between, self.arm.sampled) >= self.need).any(axis=1))
-        self._rooms = [*rooms, *(between[k] for k in ever)]
+        ever = set(np.flatnonzero((Measure(between, cell)(self.arm.sampled) >= self.need).any(axis=1)).tolist())
+        self._rooms = [*rooms, *(room for k, room in enumerate(between) if k in ever)]
+        self.left_out = (
+            *self._stubs,
+            *(room.words.removesuffix(_NEAR) for k, room in enumerate(between) if k not in ever),
+        )
+        self._measures: dict[str, Measure] = {}
 
     # -- at postures ---------------------------------------------------------------------------------------
 
@@ -107,7 +102,7 @@ class CollisionCheck:
         q
             Of the model [rad or m].
         """
-        parts = [self._measured(self._rooms, self.arm.points(part)) for part in _parts(q)]
+        parts = [self._measure(self.arm.points(part)) for part in _parts(q)]
         return np.concatenate([np.zeros((len(self._rooms), 0)), *parts], axis=1)
 
     def room(self, q: Array) -> Array:
@@ -127,12 +122,14 @@ class CollisionCheck:
         """
         names = sorted({room.what for room in self._rooms}, key=lambda name: (name not in (FLOOR, LINKS), name))
         lost = dict.fromkeys(names, 0)
+        for name in names:
+            if name not in self._measures:
+                self._measures[name] = Measure([room for room in self._rooms if room.what == name], self.cell)
         found = [np.zeros((0, self.arm.joints))]
         for part in _parts(q):
             points, left = self.arm.points(part), np.arange(len(part))
             for name in names:
-                rooms = [room for room in self._rooms if room.what == name]
-                clear = (self._measured(rooms, points[..., left]) >= self.need).all(axis=0)
+                clear = (self._measures[name](points[..., left]) >= self.need).all(axis=0)
                 lost[name] += int(np.sum(~clear))
                 left = left[clear]
             found.append(part[left])
@@ -154,7 +151,7 @@ class CollisionCheck:
         way = np.arange(count)
         while len(way):
             # Ways that have failed are given up, and stretches that their ends answer for are done.
-            spread = self._speeds @ np.abs(ends - starts).T
+            spread = self.spread(starts, ends)
             sure = ((at_start + at_end - spread) / 2.0 >= self.cell.clearance) | (spread <= 2.0 * MARGIN)
             left = np.flatnonzero(~sure.all(axis=0) & (least[way] >= self.need))
             way, starts, ends = way[left], starts[left], ends[left]
@@ -172,6 +169,15 @@ class CollisionCheck:
             way = np.concatenate([way, way])
         return Checked(least >= self.need, least, worst)
 
+    def spread(self, starts: Array, ends: Array) -> Array:
+        """Return how much each room changes at most on ways, each end ``(n, joints)`` [m], ``(rooms, n)``."""
+        return np.asarray(self._speeds @ np.abs(ends - starts).T)
+
+    @property
+    def whats(self) -> tuple[str, ...]:
+        """What each room is kept to: the floor, a box or the links."""
+        return tuple(room.what for room in self._rooms)
+
     @cached_property
     def _speeds(self) -> Array:
         """How fast each room changes at most with each joint [m per rad, or m per m], ``(rooms, joints)``."""
@@ -181,20 +187,28 @@ class CollisionCheck:
                 speeds[k] = self._speed_of(room.point, 0)
                 if self._upright:
                     speeds[k, 0] = 0.0
-            elif room.other is None:
-                speeds[k] = self._speed_of(room.piece.capsule.end, 0)
             else:
                 # Joints up to the start of the one move both alike.
-                speeds[k] = self._speed_of(room.other.capsule.end, room.piece.capsule.start)
+                moved, beyond = (room.piece, 0) if room.other is None else (room.other, room.piece.capsule.start)
+                speeds[k] = np.max([self._speed_of(point, beyond) for point in moved.capsule.points], axis=0)
         return speeds
 
     def _speed_of(self, point: int, beyond: int) -> Array:
-        """Return how fast a point moves with each joint, seen from the link that begins at point `beyond`."""
+        """Return how fast a point moves with each joint, seen from the link that begins at point `beyond`.
+
+        A point beside a joint is no farther from the axes that are parallel to that joint's than the joint is.
+        """
         arm, speed = self.arm, np.zeros(self.arm.joints)
+        at, parallel = arm.joint_of(point), arm.parallel_at(point)
         for j, joint in enumerate(arm.robot.joints):
-            if beyond < j + 1 <= min(point, arm.flange):
-                speed[j] = 1.0 if joint.kind == "prismatic" else arm.along[point] - arm.along[j + 1]
+            if beyond < j + 1 <= min(at, arm.flange):
+                aside = arm.aside[point] if j + 1 < parallel else 0.0
+                speed[j] = 1.0 if joint.kind == "prismatic" else arm.along[at] - arm.along[j + 1] + aside
         return speed
+
+    @cached_property
+    def _measure(self) -> Measure:
+        return Measure(self._rooms, self.cell)
 
     @cached_property
     def _upright(self) -> bool:
@@ -207,61 +221,55 @@ class CollisionCheck:
 
     # -- what is kept clear of what -------------------------------------------------------------------------
 
-    def _measured(self, rooms: list[_Room], points: Array) -> Array:
-        found = np.empty((len(rooms), points.shape[2]))
-        pairs: list[tuple[int, _Piece, _Piece]] = []
-        boxed: dict[int, list[tuple[int, _Piece]]] = {}
-        for k, room in enumerate(rooms):
-            if room.piece is None:
-                assert self.cell.floor is not None
-                found[k] = points[room.point, 2] - room.radius - self.cell.floor
-            elif room.other is None:
-                boxed.setdefault(room.box, []).append((k, room.piece))
-            else:
-                pairs.append((k, room.piece, room.other))
-        for number, near in boxed.items():
-            box = self.cell.boxes[number]
-            thick = np.array([piece.capsule.radius for _, piece in near])
-            apart = box_distance(*_ends([piece for _, piece in near], points), box.low, box.high)
-            found[[k for k, _ in near]] = apart - thick[:, None]
-        if pairs:
-            rows, one, other = zip(*pairs, strict=True)
-            radii = np.array([a.capsule.radius + b.capsule.radius for a, b in zip(one, other, strict=True)])
-            found[list(rows)] = segment_distance(*_ends(one, points), *_ends(other, points)) - radii[:, None]
-        return found
-
     def _moving(self) -> list[Capsule]:
         """Return the capsules that move."""
         fixed = self.arm.fixed
         return [c for c in (*self.arm.links, *self.arm.tools) if not (c.start in fixed and c.end in fixed)]
 
-    def _to_the_floor(self) -> list[_Room]:
+    def _to_the_floor(self) -> list[Room]:
         if self.cell.floor is None:
             return []
         radius: dict[int, float] = {}
         for capsule in (*self.arm.links, *self.arm.tools):
-            for point in (capsule.start, capsule.end):
+            for point in capsule.points:
                 radius[point] = max(radius.get(point, 0.0), capsule.radius)
         # What no joint raises or lowers is where it was mounted.
         level = np.ptp(self.arm.sampled[:, 2], axis=1) < 1e-3
         return [
-            _Room(FLOOR, f"{self._point(k)} comes near the {self.cell.surface}", point=k, radius=r)
+            Room(FLOOR, f"{self._point(k)} comes near the {self.cell.surface}", point=k, radius=r)
             for k, r in sorted(radius.items())
             if not level[k]
         ]
 
-    def _to_the_boxes(self) -> list[_Room]:
+    def _to_the_boxes(self) -> list[Room]:
         rooms = []
         for number, box in enumerate(self.cell.boxes):
             for capsule in self._moving():
-                first = 0.0
-                if capsule.start in self.arm.fixed:
-                    first = min(1.0, (capsule.radius + self.need) / self._length(capsule))
                 words = f"{self._name(capsule)} comes near the box '{box.name}'"
-                rooms.append(_Room(f"keep_out {box.name}", words, _Piece(capsule, first), box=number))
+                rooms.append(Room(f"{KEPT_OUT}{box.name}", words, self._beyond_fixed(capsule, number), box=number))
         return rooms
 
-    def _between_links(self) -> list[_Room]:
+    def _beyond_fixed(self, capsule: Capsule, box: int) -> Piece:
+        """Return a capsule without what is next to its start where that stands still.
+
+        A plate sticks out there along the axis of its joint. It counts from what is farther out on, unless that is near
+        the box whatever the joints do, as over a table on which the arm stands.
+        """
+        if capsule.start not in self.arm.fixed:
+            return Piece(capsule)
+        near = capsule.radius + self.need
+        first = min(1.0, near / self._length(capsule))
+        starts = [start for start, _ in capsule.lines]
+        out = [k for k, start in enumerate(starts) if self.arm.aside[start] + 2.0 * capsule.gap > near]
+        for k in tuple(out):
+            stub = Capsule(starts[k], starts[k], capsule.radius)
+            if (Measure([Room("", "", Piece(stub), box=box)], self.cell)(self.arm.sampled) < self.need).all():
+                out.remove(k)
+                name = self.cell.boxes[box].name
+                self._stubs[f"{self._name(capsule)}, next to {self._point(capsule.start)}, and the box '{name}'"] = None
+        return Piece(capsule, first, whole=frozenset(out))
+
+    def _between_links(self) -> list[Room]:
         links, rooms = self.arm.links, []
         for i, one in enumerate(links):
             for other in (*links[i + 1 :], *self.arm.tools):
@@ -269,11 +277,11 @@ class CollisionCheck:
                 surplus = APART * (one.radius + other.radius + self.need) - float(between)
                 pieces = self._without_connection(one, other, max(surplus, 0.0))
                 if pieces is not None:
-                    words = f"{self._name(one)} and {self._name(other)} come near each other"
-                    rooms.append(_Room(LINKS, words, *pieces))
+                    words = f"{self._name(one)} and {self._name(other)}{_NEAR}"
+                    rooms.append(Room(LINKS, words, *pieces))
         return rooms
 
-    def _without_connection(self, one: Capsule, other: Capsule, length: float) -> tuple[_Piece, _Piece] | None:
+    def _without_connection(self, one: Capsule, other: Capsule, length: float) -> tuple[Piece, Piece] | None:
         """Take away a length where two links are connected, half of each, all of the longer if one is too short."""
         long, far = self._length(one), self._length(other)
         taken = length / 2.0, length / 2.0
@@ -281,7 +289,7 @@ class CollisionCheck:
             taken = (length, 0.0) if long > far else (0.0, length)
         if taken[0] >= long or taken[1] >= far:
             return None
-        return _Piece(one, 0.0, 1.0 - taken[0] / long), _Piece(other, taken[1] / far)
+        return Piece(one, 0.0, 1.0 - taken[0] / long), Piece(other, taken[1] / far)
 
     def _length(self, capsule: Capsule) -> float:
         """Return how long a capsule is at most [m]."""
@@ -294,6 +302,7 @@ class CollisionCheck:
         return f"the link from {start} to {self._point(capsule.end)}"
 
     def _point(self, point: int) -> str:
+        point = self.arm.joint_of(point)
         if point == 0:
             return "the base"
         if point > self.arm.flange:
@@ -319,14 +328,6 @@ class CollisionCheck:
                     allowed="a box beside the base, or below it: in the base frame",
                     cure="Check its unit, and that it is in the base frame of the robot.",
                 )
-
-
-def _ends(pieces: Sequence[_Piece], points: Array) -> tuple[Array, Array]:
-    """Return both ends of pieces, each ``(pieces, 3, n)``."""
-    start = points[[piece.capsule.start for piece in pieces]]
-    along = points[[piece.capsule.end for piece in pieces]] - start
-    first, last = (np.array(share)[:, None, None] for share in zip(*((p.first, p.last) for p in pieces), strict=True))
-    return start + first * along, start + last * along
 
 
 def _least(rooms: Array) -> tuple[Array, NDArray[np.intp]]:

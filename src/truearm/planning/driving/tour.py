@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final, Literal
 
 import numpy as np
 
 from truearm.modeling.chain import Array
+from truearm.notices import Notice
 from truearm.planning.driving.cell import FLOOR
 
 #: Why the arm stops: in its safe configuration, on a way around something, right before a measurement, or to measure.
@@ -48,9 +50,14 @@ class Tour:
     clearance
         What is kept between the arm and the floor, boxes and its own links [m].
     room
-        The smallest such distance that was found on the ways [m]; infinite if there is nothing to come close to.
+        The smallest such distance on the ways [m]; infinite if there is nothing to come close to.
     surface
         What the plane at the height `floor` is called.
+    distances
+        How near the arm comes to each thing on the ways [m], the smallest first: ``floor``, ``keep_out`` and the name
+        of a box, ``links`` for its own.
+    notices
+        What is to be known of what was kept clear.
     """
 
     stops: tuple[Stop, ...]
@@ -58,6 +65,8 @@ class Tour:
     clearance: float
     room: float
     surface: str = FLOOR
+    distances: Mapping[str, float] = field(default_factory=dict)
+    notices: tuple[Notice, ...] = ()
 
     @property
     def joints(self) -> Array:

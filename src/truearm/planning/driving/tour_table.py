@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Mapping
 
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
 from truearm.modeling.robot import Robot
-from truearm.planning.driving.cell import stands
-from truearm.planning.driving.links_beside import links_beside
+from truearm.planning.driving.cell import FLOOR, stands
+from truearm.planning.driving.collisions import KEPT_OUT, LINKS
 from truearm.planning.driving.tour import Tour
 from truearm.shown import counted
 
@@ -42,17 +43,34 @@ def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list
     vias = sum(stop.kind == "via" for stop in tour.stops)
     over = f", {counted(vias, 'via point')} among them" if vias else ""
     text = [f"Driven from home ({home}) and back in {counted(len(tour.stops) - 1, 'move')}{over}."]
-    near = "its own links and boxes"
-    if tour.floor is not None:
-        near = f"the {tour.surface} at {tour.floor * 1e3:g} mm, boxes and links"
-    if math.isfinite(tour.room):
-        # Down to a tenth of a millimetre: never more than there is.
-        room = f"{math.floor(tour.room * 1e4) / 10:g} mm or more from {near}"
-        if links_beside(robot):
-            text.append(f"All the way the lines of the model with their thickness stay {room}; links may be nearer.")
-        else:
-            text.append(f"All the way the arm stays {room}.")
+    near = distance_words(tour.distances, tour.floor, tour.surface)
+    if near:
+        text.append(f"All the way the arm stays {near}.")
     if not stands(robot):
         mounted = "Its mounting surface is not" if tour.floor is None else "Only its mounting surface is"
         text.append(f"{mounted} kept clear: by its gravity the robot does not stand; boxes say what else is there.")
     return text
+
+
+def distance_words(distances: Mapping[str, float], floor: float | None, surface: str) -> str:
+    """Return how near an arm comes to each thing, as :func:`~.nearest.nearest_on` has it; nothing if to none.
+
+    Parameters
+    ----------
+    floor
+        Its height [m]; None if none is kept clear.
+    surface
+        What it is called.
+    """
+    # Down to a tenth of a millimetre: never more than there is.
+    near = [(f"{math.floor(room * 1e4) / 10:g} mm", _thing(what, floor, surface)) for what, room in distances.items()]
+    return ", ".join(f"{room}{'' if k else ' or more'} from {thing}" for k, (room, thing) in enumerate(near))
+
+
+def _thing(what: str, floor: float | None, surface: str) -> str:
+    """Return what the arm comes near in words."""
+    if what == LINKS:
+        return "its own links"
+    if what == FLOOR and floor is not None:
+        return f"the {surface} at {floor * 1e3:g} mm"
+    return f"the box '{what.removeprefix(KEPT_OUT)}'"

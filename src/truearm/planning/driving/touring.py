@@ -9,6 +9,8 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
+from truearm.planning.driving.nearest import nearest_on
+from truearm.planning.driving.said_of_cells import cell_notices
 from truearm.planning.driving.tour import HOME, Stop, Tour
 from truearm.planning.driving.ways import Way, WayFinder
 
@@ -49,12 +51,11 @@ def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Arr
     ends = np.concatenate([entered, finder.home[None]])
     names = (HOME, *labels, HOME)
     ways = finder.between(starts, ends)
-    stops, room = [Stop(finder.home, "home")], math.inf
+    stops = [Stop(finder.home, "home")]
     for k, way in enumerate(ways):
         if way is None:
             _refuse_way(finder, starts[k], ends[k], names[k], names[k + 1])
         assert isinstance(way, Way)
-        room = min(room, way.room)
         stops += [Stop(over, "home" if np.array_equal(over, finder.home) else "via") for over in way.over]
         if k < len(labels):
             if not np.array_equal(entered[k], joints[k]):
@@ -62,7 +63,10 @@ def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Arr
             stops.append(Stop(joints[k], "measure", labels[k]))
     stops.append(Stop(finder.home, "home"))
     cell = finder.check.cell
-    tour = Tour(tuple(stops), cell.floor, cell.clearance, room, cell.surface)
+    distances = nearest_on(finder.check, np.array([stop.joints for stop in stops]))
+    room = min(distances.values(), default=math.inf)
+    notices = cell_notices(finder.check)
+    tour = Tour(tuple(stops), cell.floor, cell.clearance, room, cell.surface, distances, notices)
     _refuse_winding(finder, tour)
     return tour
 

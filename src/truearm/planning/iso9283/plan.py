@@ -9,7 +9,7 @@ prints no orientation; the tip points down, ahead, or at right angles to the pla
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -48,6 +48,9 @@ POSING_DISTANCES: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 #: Each next cube is so much smaller.
 _SHRUNK: Final = 0.95
 _SMALLEST: Final = 0.05
+#: The same where cubes are tried everywhere in the largest.
+_SHRUNK_WITHIN: Final = 0.9
+_SMALLEST_WITHIN: Final = 0.3
 #: No joint turns, or slides, further than this between two neighbouring points of a path [rad or m].
 _LARGEST_MOVE: Final = 0.35
 _POINTS: Final = 33
@@ -72,6 +75,8 @@ def performance_plan(
     ahead: Direction = "+x",
     nearest: float = 0.0,
     floor: float = 0.0,
+    unclear: Callable[[Array], str] | None = None,
+    unsuited: Callable[[PerformancePlan], str] | None = None,
 ) -> PerformancePlan:
     """Plan the tests of a robot.
 
@@ -99,11 +104,18 @@ def performance_plan(
         How long the drift is watched.
     ahead, nearest, floor
         Where the largest cube is looked for, as :func:`truearm.planning.poses.largest_cube.largest_cube` has them.
+    unclear
+        What keeps the arm from standing at joint positions ``(n, joints)`` [rad or m], in words, nothing if it may at
+        all of them; None for anywhere.
+    unsuited
+        What of a plan cannot be driven, in words, nothing if all can; None for all. Where one of these two is given and
+        the cube is left open, smaller ones everywhere in the largest are tried.
 
     Raises
     ------
     InputError
-        If the arm has fewer than six joints, or cannot come to every pose and along every path of the cube.
+        If the arm has fewer than six joints, or cannot come to every pose and along every path of the cube, or those
+        are not clear or cannot be driven.
     """
     if len(robot.joints) < _LEAST_JOINTS:
         raise InputError(
@@ -116,45 +128,76 @@ def performance_plan(
         raise InputError("there is no such direction", where="ahead", came=ahead, allowed=", ".join(DIRECTIONS))
     find = cube is None
     whole = cube if cube is not None else largest_cube(robot, target=target, ahead=ahead, nearest=nearest, floor=floor)
-    side = whole.side
+    kept = unclear is not None or unsuited is not None
     missed = ""
-    while side >= (_SMALLEST if find else 1.0) * whole.side:
-        tried = Cube(whole.centre, side)
-        turned = [rotation] if rotation is not None else _orientations(tried.plane(plane), ahead)
-        for R in turned:
-            # The cube is that of the robot: the same whichever tests are planned in it.
-            if find and set(tests) != set(TESTS):
-                layout = _Layout(robot, target, tried, plane, R, tuple(TESTS))
-                if not layout.reached():
-                    missed = layout.missed
-                    continue
-            layout = _Layout(robot, target, tried, plane, R, tests)
-            if layout.reached():
-                planned = tuple(_test(one, velocities, loads, layout) for one in tests)
-                return PerformancePlan(
-                    robot,
-                    target,
-                    tried,
-                    plane,
-                    layout.poses(),
-                    layout.paths,
-                    layout.starts(),
-                    planned,
-                    rated_load,
-                    rated_velocity,
-                    limit_band,
-                    hours,
-                )
+
+    def planned_in(tried: Cube, R: Array, wanted: Sequence[str]) -> PerformancePlan | None:
+        """Return the plan of some tests in a cube; None, and what is missed, where there is none."""
+        nonlocal missed
+        layout = _Layout(robot, target, tried, plane, R, wanted)
+        if not layout.reached(unclear):
             missed = layout.missed
-        side *= _SHRUNK
-        if not find:
-            break
+            return None
+        found = PerformancePlan(
+            robot,
+            target,
+            tried,
+            plane,
+            layout.poses(),
+            layout.paths,
+            layout.starts(),
+            tuple(_test(one, velocities, loads, layout) for one in wanted),
+            rated_load,
+            rated_velocity,
+            limit_band,
+            hours,
+        )
+        words = "" if unsuited is None else unsuited(found)
+        missed = words or missed
+        return None if words else found
+
+    for tried in [whole] if not find else _within(whole, ahead) if kept else _shrunk(whole):
+        for R in [rotation] if rotation is not None else _orientations(tried.plane(plane), ahead):
+            # The cube is that of the robot: the same whichever tests are planned in it.
+            if find and set(tests) != set(TESTS) and planned_in(tried, R, tuple(TESTS)) is None:
+                continue
+            found = planned_in(tried, R, tests)
+            if found is not None:
+                return found
     raise InputError(
-        "the robot cannot come to all poses and along all paths of the cube with one orientation, in one posture",
+        "the robot cannot come to all poses and along all paths of the cube with one orientation, in one posture"
+        + (", and keep clear" if kept else ""),
         where=robot.name,
         came=f"missed: {missed}",
-        cure="Take a smaller cube, another centre, plane or orientation.",
+        cure="See that boxes, floor and limits leave the arm room, lower `clearance`, or look in another direction."
+        if find and kept
+        else "Take a smaller cube, another centre, plane or orientation.",
     )
+
+
+def _shrunk(whole: Cube) -> Iterator[Cube]:
+    """Yield ever smaller cubes about the same centre."""
+    side = whole.side
+    while side >= _SMALLEST * whole.side:
+        yield Cube(whole.centre, side)
+        side *= _SHRUNK
+
+
+def _within(whole: Cube, ahead: str) -> Iterator[Cube]:
+    """Yield ever smaller cubes inside another one: in its middle, then where they are away from base, floor and boxes.
+
+    Of each size those that are higher, farther ahead and to the sides of the middle.
+    """
+    out = np.zeros(3)
+    out["xy".index(ahead[1])] = 1.0 if ahead[0] == "+" else -1.0
+    up = np.array([0.0, 0.0, 1.0])
+    aside = np.cross(up, out)
+    share = 1.0
+    while share >= _SMALLEST_WITHIN:
+        room = (1.0 - share) * whole.side / 2.0
+        for way in (0.0 * up, up, out, up + out, aside, -aside, -up) if room > 0.0 else (0.0 * up,):
+            yield Cube(whole.centre + room * way, share * whole.side)
+        share *= _SHRUNK_WITHIN
 
 
 def _orientations(plane: DiagonalPlane, ahead: str) -> list[Array]:
@@ -249,8 +292,8 @@ class _Layout:
             ),
         }
 
-    def reached(self) -> bool:
-        """Find one posture for all; say what is missed where there is none."""
+    def reached(self, unclear: Callable[[Array], str] | None = None) -> bool:
+        """Find one posture for all, in which nothing is `unclear`; say what is missed where there is none."""
         names: list[str] = [*self.names, *(f"{pose} from {axis}" for pose, axis in self.begin)]
         points = [*self.places.values(), *self.distances.values(), *self.begin.values()]
         turned = [self.rotation] * len(points)
@@ -270,6 +313,10 @@ class _Layout:
             if lost:
                 self.missed = lost[0]
                 continue
+            words = "" if unclear is None else unclear(poses.joints)
+            if words:
+                self.missed = f"a posture that keeps clear at every pose ({words})"
+                continue
             found = inverse(self.robot, position, rotation, target=self.target, seed=seed, branch=branch)
             usable = np.array([status.usable for status in found.status])
             if not usable.all():
@@ -280,6 +327,10 @@ class _Layout:
                 for name, rows in on_paths
                 if np.abs(np.diff(found.joints[rows], axis=0)).max(initial=0.0) > _LARGEST_MOVE
             ]
+            words = "" if unclear is None or far else unclear(found.joints)
+            if words:
+                self.missed = f"a posture that keeps clear on every path ({words})"
+                continue
             if not far:
                 self.found = found.joints
                 return True

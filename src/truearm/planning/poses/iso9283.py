@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truearm.errors import InputError
+from truearm.errors import InputError, Words
 from truearm.modeling.chain import Array
 from truearm.planning.paths.paths import Circle, Line, point
 
@@ -126,7 +126,10 @@ class Cube:
     def __init__(self, centre: ArrayLike | Sequence[float], side: float) -> None:
         if not (math.isfinite(side) and side > 0):
             raise InputError(
-                "the side of a cube must be positive", where="side of the cube", came=side, allowed="above 0"
+                "the side of a cube must be positive",
+                where="side of the cube",
+                came=Words(f"{1e3 * side:g} mm"),
+                allowed="above 0",
             )
         object.__setattr__(self, "centre", point("centre of the cube", centre))
         object.__setattr__(self, "side", float(side))

@@ -6,7 +6,7 @@ from typing import Final
 
 from truearm.errors import InputError, did_you_mean
 from truearm.simulation.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
-from truearm.simulation.devices.device import Arm, Device, in_view_of, measured_with
+from truearm.simulation.devices.device import Arm, Device, in_view_of, measured_with, seen_by
 from truearm.simulation.devices.hexapod_poses import HEXAPOD
 from truearm.simulation.devices.known_points import CALIBRATION_TABLE, TOUCH_UP
 from truearm.simulation.devices.lengths import BALLBAR, STRINGS
@@ -15,7 +15,7 @@ from truearm.simulation.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
 from truearm.simulation.devices.touching import PLANE, POINT, SPHERE, TWO_SOCKETS, TWO_SPHERES
 from truearm.simulation.devices.tracker import MEASUREMENT_ARM, TRACKER
 
-__all__ = ["DEVICES", "Arm", "Device", "in_view_of", "measured_with", "named_device"]
+__all__ = ["DEVICES", "Arm", "Device", "in_view_of", "measured_with", "named_device", "seen_by"]
 
 DEVICES: Final[tuple[Device, ...]] = (
     TRACKER,

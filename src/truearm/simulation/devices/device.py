@@ -79,6 +79,13 @@ class Device(ABC):
         """Return which readings the device cannot have read, ``(readings,)``; one without a range reads all."""
         return np.zeros(len(data.target), dtype=bool)
 
+    def visible(self, robot: Robot, joints: Array) -> NDArray[np.bool_]:
+        """Return which targets of a robot it reads at joint positions ``(n, joints)``, ``(n, targets)``.
+
+        What the arm itself hides is not asked.
+        """
+        return np.ones((len(joints), len(robot.targets)), dtype=bool)
+
     @abstractmethod
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return what it reads of an arm.
@@ -126,13 +133,18 @@ def measured_with(
             came=f"{counted(count, 'configuration')}, deviation {sigma}",
             allowed="1 configuration or more, deviation 0 or more",
         )
+    twin, placed = seen_by(device, nominal, twin)
+    return device.campaign(placed, _InOrder(twin), count, device.sigma if sigma is None else sigma, rng)
+
+
+def seen_by(device: Device, nominal: Robot, twin: Twin) -> tuple[Twin, Robot]:
+    """Return a twin with the tool of a device, if it needs one, and the nominal robot where that twin stands."""
     if device.tool is not None:
         carrying = twin.robot.with_frames(twin.robot.base, device.tool.targets)
         twin = replace(twin, robot=carrying)
     values = twin.robot.values
     places = {t.name: [values[t.parameter(axis)] for axis in "xyz"] for t in twin.robot.targets}
-    placed = nominal.with_frames(_true_base(nominal, twin.robot), places)
-    return device.campaign(placed, _InOrder(twin), count, device.sigma if sigma is None else sigma, rng)
+    return twin, nominal.with_frames(_true_base(nominal, twin.robot), places)
 
 
 def in_view_of(device: Device, robot: Robot) -> Robot:

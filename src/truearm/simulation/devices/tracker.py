@@ -64,14 +64,14 @@ class MeasurementArm(Device):
         """Return which places are out of reach of its base."""
         return np.asarray(np.linalg.norm(data.position, axis=1) > self.reach)
 
+    def visible(self, robot: Robot, joints: Array) -> NDArray[np.bool_]:
+        """Return which targets are within reach, ``(n, targets)``."""
+        far = [np.linalg.norm(robot.world_poses(joints, target.name)[0], axis=1) for target in robot.targets]
+        return np.stack(far, axis=1) < self.reach
+
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return the positions of all targets within reach, at random configurations."""
-
-        def visible(robot: Robot, joints: Array) -> NDArray[np.bool_]:
-            far = [np.linalg.norm(robot.world_poses(joints, target.name)[0], axis=1) for target in robot.targets]
-            return np.stack(far, axis=1) < self.reach
-
-        joints, seen = shown(nominal, count, rng, visible, self.name)
+        joints, seen = shown(nominal, count, rng, self.visible, self.name)
         return positions(nominal, arm, joints, seen, sigma, rng, self.name)
 
 

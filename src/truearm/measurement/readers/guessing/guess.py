@@ -12,7 +12,7 @@ from typing import Final
 from ruamel.yaml import YAML
 
 from truearm.errors import InputError
-from truearm.measurement.readers.guessing.layouts import GuessedLayout, guess_layout
+from truearm.measurement.readers.guessing.layouts import GuessedLayout, guess_layout, number_of
 from truearm.measurement.readers.guessing.mapping_text import (
     OPEN,
     Guess,
@@ -121,7 +121,9 @@ def guess_mapping(path: Path) -> Guessed:
     _write_missing(text, [*joints, *quaternion], list(positions.values()), others)
     _write_labels(text, left, joints, positions, quaternion, sure)
     _write_joints(text, joints)
-    text.lines += [f"# Note: {escaped(note)}." for note in layout.notes]
+    used = {column.place for column in columns} - {column.place for column in left.columns}
+    odd = _no_numbers([column for column in columns if column.place in used and column.is_numeric], layout.lines)
+    text.lines += [f"# Note: {escaped(note)}." for note in (*layout.notes, *odd)]
     if layout.header and any({"tcp", "x"} <= set(column.words) for column in left.columns):
         text.lines.append("# Note: tables of RoboDK with tool points come in by truearm import robodk.")
     unused = [column.name for column in left.columns if column.name]
@@ -130,6 +132,21 @@ def guess_mapping(path: Path) -> Guessed:
         text.lines.append(f"# Not used: {shown}")
     made = Guessed("\n".join(text.lines) + "\n", tuple(text.guesses))
     return made if made.open or not joints else _tried(made, path)
+
+
+def _no_numbers(columns: Sequence[Column], lines: Sequence[int]) -> list[str]:
+    """Return where columns of numbers hold something else for the first time."""
+    found = []
+    for column in columns:
+        if len(column.values) + sum(text in column.nothing for text in column.given) == len(column.given):
+            continue
+        row, text = next(
+            (row, text)
+            for row, text in enumerate(column.texts)
+            if text and text not in column.nothing and number_of(text, column.decimal) is None
+        )
+        found.append(f"line {lines[row]}, column {column.name}: {text[:40]!r} is no number as others are written")
+    return found
 
 
 def _refuse_other_numbers(path: Path, positions: Mapping[tuple[str, ...], Sequence[Column]]) -> None:
@@ -238,11 +255,13 @@ def _write_labels(
     sigma = left.take(deviations_among(left.columns, ("x", "y", "z")))
     turned = bool(quaternion) or angles is not None
     sigma_rot = left.take(deviations_among(left.columns, ("rx", "ry", "rz"))) if turned else []
+    if angles is not None and not sigma_rot:  # sA, sB, sC beside A, B, C
+        sigma_rot = left.take(deviations_among(left.columns, [(column.words or ("",))[-1] for column in angles[0]]))
     unclear = [*quaternion, *(column for column in unclear if column not in left.columns)] if several else []
     temperature = named_like([c for c in left.columns if c.is_numeric], "temperature")
     left.take([temperature] if temperature else [])
     time = time_among(left.columns)
-    left.take([time.column] if time is not None and time.column is not None else [])
+    left.take([] if time is None else time.columns)
     label, target, pattern = _names(left, several)
     if pattern is not None and label is not None:
         text.add(
@@ -266,6 +285,8 @@ def _write_labels(
             "configuration: {each: row}",
         )
     every = [column for three in positions.values() for column in three]
+    if (visit := None if label is None else _visit(left, label, target)) is not None:
+        text.add("visit", f"{{column: {named(visit)}}}", "its name; labels come again with another number")
     text.add("length_unit", *length_unit(every))
     text.lines.append("readings:")
     names_target = pattern is not None and "target" in pattern
@@ -364,6 +385,21 @@ def _names(left: _Left, several: bool) -> tuple[Column | None, Column | None, st
     return label, target, None
 
 
+def _visit(left: _Left, label: Column, target: Column | None) -> Column | None:
+    """Return the column that tells apart rows of one label and one target, if one is called like that."""
+    named_so = named_like([column for column in left.columns if column.is_numeric and column.can_name], "visit")
+    if named_so is None or len(named_so.given) < len(named_so.texts):
+        return None
+    reading = list(zip(label.texts, label.texts if target is None else target.texts, strict=True))
+    if label.distinct == len(label.texts) or named_so.distinct < 2:
+        return None
+    apart = len(set(zip(reading, named_so.texts, strict=True))) - len(set(reading))
+    if not apart and target is None:
+        return None
+    left.take([named_so])
+    return named_so
+
+
 def _write_joints(text: MappingText, joints: Sequence[Column]) -> None:
     if not joints:
         value = "{file: joints.csv}"
@@ -399,7 +435,7 @@ def _tried(made: Guessed, path: Path) -> Guessed:
     """Try an import with a guessed mapping, in memory."""
     content = validated(YAML(typ="safe", pure=True).load(made.text), MappingFile, "the guessed mapping")
     try:
-        data = read_with(TableFiles(path, Path("the guessed mapping"), content, None))
+        data = read_with(TableFiles(path, Path("the guessed mapping"), content, None))[0]
     except InputError as error:
         return replace(made, refusal=str(error))
     return replace(made, configurations=data.configurations, targets=data.targets)

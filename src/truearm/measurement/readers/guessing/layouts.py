@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -16,10 +16,12 @@ from truearm.files import read_bytes
 from truearm.limits import refuse_beyond
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, split_line
 from truearm.measurement.readers.sheets import Workbook, is_workbook, open_workbook, sheet_cells, texts_of
+from truearm.shown import counted
 from truearm.units import as_number
 
-#: Lines that are looked at.
+#: Lines that are looked at to see how a table is laid out, and to see what its columns hold.
 _LOOKED_AT: Final = 400
+_MOST_LINES: Final = 100_000
 #: Characters of them.
 _CHARACTERS: Final = 400_000
 #: Lines of titles that may stand above the headings of a sheet.
@@ -39,7 +41,8 @@ UNITS: Final = {
 
 #: Texts that mean that nothing was measured.
 NOTHING: Final = re.compile(
-    r"n\.?/?a\.?|nan|none|null|nil|-+|\?+|\*+|missing|failed|fail|lost|invalid|#n/a|#div/0!|no data|nodata|occluded",
+    r"n\.?/?[avd]\.?|k\.?/?a\.?|verdeckt|ung.ltig|fehlt|nan|none|null|nil|-+|\?+|\*+|"
+    r"missing|failed|fail|lost|invalid|#n/a|#div/0!|no data|nodata|occluded",
     re.IGNORECASE,
 )
 #: Among so many lines there may be headings.
@@ -70,7 +73,9 @@ class GuessedLayout:
     units
         Unit of each column by a line of units, empty where there is none.
     columns
-        The cells of the first rows, column by column.
+        The cells of all rows, column by column.
+    lines
+        Line of each row.
     header
         Whether there is a header.
     notes
@@ -83,6 +88,7 @@ class GuessedLayout:
     headings: tuple[str, ...]
     units: tuple[str, ...]
     columns: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
     header: bool
     notes: tuple[str, ...] = ()
 
@@ -130,7 +136,21 @@ def guess_layout(path: Path) -> GuessedLayout:
         entries["encoding"] = (encoding, "it is no UTF-8 text")
     if comment is not None:
         entries["comment"] = (comment, "lines begin with it")
-    return _with_header(best, entries, path)
+    behind = _lines_behind(text, lines)
+    some = islice(behind, max(_MOST_LINES - len(lines), 0))
+    made = _with_header(replace(best, rows=[*best.rows, *_cut(some, comment, best.delimiter)]), entries, path)
+    if next(behind, None) is None:
+        return made
+    seen = f"only the first {_MOST_LINES} lines were looked at; an import refuses by its cell what does not fit below"
+    return replace(made, notes=(*made.notes, seen))
+
+
+def _lines_behind(text: str, lines: Sequence[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Return the lines behind the first ones that are not blank, with their numbers."""
+    last = lines[-1][0] if lines else 0
+    for number, line in islice(enumerate(lines_of(text), 1), last, None):
+        if line.strip():
+            yield number, line.rstrip("\r\n")
 
 
 def _first_lines(text: str) -> list[tuple[int, str]]:
@@ -172,9 +192,9 @@ def _comment(lines: Rows | list[tuple[int, str]]) -> str | None:
     return None
 
 
-def _split(lines: Sequence[tuple[int, str]], comment: str | None, delimiter: str, decimal: str) -> _Split:
+def _cut(lines: Iterable[tuple[int, str]], comment: str | None, delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the cells of lines with their numbers, those of comments below zero."""
     sign = _DELIMITERS[delimiter]
-    rows: Rows = []
     for number, line in lines:
         bare = line.lstrip()
         is_comment = comment is not None and bare.startswith(comment)
@@ -186,7 +206,11 @@ def _split(lines: Sequence[tuple[int, str]], comment: str | None, delimiter: str
                 cells = [cell.strip() for cell in next(csv.reader([cut], delimiter=sign, skipinitialspace=True), [])]
             except csv.Error:
                 continue
-        rows.append((-number if is_comment else number, cells))
+        yield -number if is_comment else number, cells
+
+
+def _split(lines: Sequence[tuple[int, str]], comment: str | None, delimiter: str, decimal: str) -> _Split:
+    rows = list(_cut(lines, comment, delimiter))
     widths = Counter(len(cells) for number, cells in rows if number > 0 and _numbers(cells, decimal) >= 2)
     width, _ = max(widths.items(), key=lambda item: item[0] * item[1], default=(0, 0))
     found = sum(_numbers(cells, decimal) for number, cells in rows if number > 0 and len(cells) == width)
@@ -206,10 +230,11 @@ def number_of(text: str, decimal: str) -> float | None:
 
 def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path: Path) -> GuessedLayout:
     """Find the first line with data, and the names and units above it."""
-    counts = sorted(_numbers(cells, split.decimal) for n, cells in split.rows if n > 0 and len(cells) == split.width)
+    first_rows = split.rows[:_LOOKED_AT]
+    counts = sorted(_numbers(cells, split.decimal) for n, cells in first_rows if n > 0 and len(cells) == split.width)
     enough = max(_ENOUGH, counts[len(counts) // 2] / 2)
-    whole = [n > 0 and len(cells) == split.width for n, cells in split.rows]
-    data = [i for i, (_, cells) in enumerate(split.rows) if whole[i] and _numbers(cells, split.decimal) >= enough]
+    whole = [n > 0 and len(cells) == split.width for n, cells in first_rows]
+    data = [i for i, (_, cells) in enumerate(first_rows) if whole[i] and _numbers(cells, split.decimal) >= enough]
     headed = [i for i, found in enumerate(whole[:_HEADED]) if found and _is_heading(split.rows[i][1], split.decimal)]
     place = next((i for i in data if i > max(headed, default=-1)), data[0])
     above = [
@@ -220,10 +245,17 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
     units = ("",) * split.width
     if above and _is_units(above[-1][1]):
         units = tuple(UNITS.get(_bare(cell), "") for cell in above.pop()[1])
-    rows = [cells for n, cells in split.rows[place:] if n > 0 and len(cells) == split.width]
-    columns = tuple(zip(*rows, strict=True))
+    below = [(n, cells) for n, cells in split.rows[place:] if n > 0]
+    rows = [(n, cells) for n, cells in below if len(cells) == split.width]
+    columns = tuple(zip(*(cells for _, cells in rows), strict=True))
+    other = [(n, len(cells)) for n, cells in below if len(cells) != split.width and any(cells)]
+    notes: tuple[str, ...] = ()
+    if other:
+        more = f", and so have {len(other) - 1} lines more" if len(other) > 1 else ""
+        notes = (f"line {other[0][0]} has {counted(other[0][1], 'cell')} where others have {split.width}{more}",)
     first = split.rows[place][0]
-    made = GuessedLayout(entries, split.decimal, (), (), units, columns, header=bool(above))
+    lines = tuple(n for n, _ in rows)
+    made = GuessedLayout(entries, split.decimal, (), (), units, columns, lines, header=bool(above), notes=notes)
     numbers = tuple(str(n) for n in range(1, split.width + 1))
     if not above:
         entries["header"] = ("none", "no line of names stands above the numbers")
@@ -245,7 +277,8 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
     entries["header"] = (line, "the last line of names above the numbers")
     if first != line + 1:
         entries["first_row"] = (first, "the first line of numbers")
-    notes = (f"line {above[-2][0]} looks like a second line of headings",) if len(above) > 1 else ()
+    if len(above) > 1:
+        notes = (f"line {above[-2][0]} looks like a second line of headings", *notes)
     return replace(made, names=tuple(names), headings=tuple(names), notes=notes)
 
 
@@ -276,9 +309,7 @@ def _of_workbook(path: Path) -> GuessedLayout:
             if any(map(any, shown)):
                 left[name] = sum(_numbers(row, ".") for row in shown), cells
             continue
-        rows: Rows = [
-            (number, [column[row] for column in cells.columns]) for row, number in enumerate(cells.lines[:_LOOKED_AT])
-        ]
+        rows: Rows = [(number, [column[row] for column in cells.columns]) for row, number in enumerate(cells.lines)]
         split = _measured(rows)
         if split.numbers and (best is None or split.numbers > best[0].numbers):
             best = split, name

@@ -54,7 +54,10 @@ _LABEL: Final = frozenset(
 _TARGET: Final = frozenset(
     {"target", "ball", "smr", "reflector", "marker", "prism", "nest", "kugel", "feature", "body"}
 )
-_TIME: Final = frozenset({"time", "timestamp", "stamp", "date", "datum", "zeit", "uhrzeit", "datetime"})
+_TIME: Final = frozenset(
+    {"time", "timestamp", "stamp", "date", "datum", "zeit", "uhrzeit", "datetime", "when", "day", "tag", "clock"}
+)
+_VISIT: Final = frozenset({"visit", "round", "pass", "lap", "repeat", "repetition", "umlauf", "durchgang", "runde"})
 _TEMPERATURE: Final = frozenset({"temp", "temperature", "temperatur"})
 #: Angles about three axes by the names of their columns: axes, whether they turn along, and who writes so.
 _ANGLES: Final = {
@@ -62,6 +65,10 @@ _ANGLES: Final = {
     ("w", "p", "r"): ("xyz", "fixed", "FANUC's W, P, R"),
     ("roll", "pitch", "yaw"): ("xyz", "fixed", "roll, pitch and yaw as ROS and most programs mean them"),
 }
+
+
+#: No instrument's uncertainty is larger [mm].
+_LARGEST_UNCERTAINTY: Final = 10.0
 
 
 @dataclass(frozen=True)
@@ -205,6 +212,12 @@ def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
         for key, three in triples_among(columns, "xyz").items()
         if not (_DEVIATION | _DEVIATION_LETTERS | _NO_POSITION) & set(key) and _may_be(three, LENGTH_UNITS)
     }
+    if not found:  # px, py, pz of ROS and tx, ty, tz of trackers, where nothing else is called like a position
+        named = {column.words[0]: column for column in columns if len(column.words) == 1}
+        glued = [[named.get(letter + axis) for axis in "xyz"] for letter in "pt"]
+        for three in ([column for column in names if column is not None] for names in glued):
+            if len(three) == 3 and _may_be(three, LENGTH_UNITS):
+                return {(): (three[0], three[1], three[2])}
     letters = {key for key in found if len("".join(key)) == 1}
     if all(_NO_TARGET & set(key) for key in letters):
         found = {key: three for key, three in found.items() if key not in letters}
@@ -307,15 +320,24 @@ def deviations_among(columns: Sequence[Column], of: Sequence[str]) -> list[Colum
         if (_DEVIATION & set(column.words) or (_DEVIATION_LETTERS & set(column.words) and is_expanded([column])))
         and not (_TURNED | {"x", "y", "z"}) & set(column.words)
     ]
-    return plain[:1]
+    alone = [column for column in columns if column.words == ("u",) and column.unit and _is_small(column)]
+    return (plain or alone)[:1]
+
+
+def _is_small(column: Column) -> bool:
+    """Return whether what stands in a column can be uncertainties of an instrument: above zero, below a centimetre."""
+    size = column.values * {"m": 1e3, "um": 1e-3, "in": 25.4}.get(column.unit, 1.0)
+    return len(size) > 0 and bool((size > 0.0).all() and (size < _LARGEST_UNCERTAINTY).all())
 
 
 def is_expanded(columns: Sequence[Column]) -> bool:
-    """Return whether names say that deviations are expanded uncertainties."""
+    """Return whether names say that deviations are expanded uncertainties, as a U alone does (JCGM 100:2008, 6.2)."""
+    if len(columns) == 1 and columns[0].name[:1] == "U" and columns[0].words == ("u",) and columns[0].unit:
+        return True
     return any(_EXPANDED & {*column.words, *map("".join, pairwise(column.words))} for column in columns)
 
 
 def named_like(columns: Sequence[Column], kind: str) -> Column | None:
-    """Return the first column that is called like a label, a target, a time or a temperature."""
-    words = {"label": _LABEL, "target": _TARGET, "time": _TIME, "temperature": _TEMPERATURE}[kind]
+    """Return the first column that is called like a label, a target, a visit, a time or a temperature."""
+    words = {"label": _LABEL, "target": _TARGET, "visit": _VISIT, "time": _TIME, "temperature": _TEMPERATURE}[kind]
     return next((column for column in columns if words & set(column.words)), None)

@@ -10,7 +10,7 @@ from typing import Final
 
 from truearm.errors import InputError, did_you_mean, name_place
 from truearm.files import read_yaml
-from truearm.modeling.conventions import convention
+from truearm.modeling.conventions import JointKind, convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.fixtures import Fixture
@@ -20,13 +20,23 @@ from truearm.modeling.formats.curve_entry import coefficient_si, curve_parameter
 from truearm.modeling.formats.robot_file.correlations import factor_from
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
-from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
+from truearm.modeling.parts import (
+    JOINT_SPEEDS,
+    NO_PAYLOAD,
+    Inertia,
+    Joint,
+    LinkMass,
+    Payload,
+    Target,
+    Tool,
+    Truth,
+)
 from truearm.modeling.proof import HELD, Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.schemas import shown_entry
 from truearm.shown import counted, listed
-from truearm.units import SHOWN_AS, as_number, sized_si, to_si
+from truearm.units import SHOWN_AS, as_number, from_si, sized_si, to_si
 
 
 def read_robot(path: Path) -> Robot:
@@ -296,10 +306,10 @@ def _position(text: str, robot: Robot, where: str, cure: str) -> tuple[float, ..
     return tuple(to_si(value, unit) for value, unit in zip(known, units, strict=True))
 
 
-#: Entries of a joint in every convention.
 #: No joint's bearing is farther from the joint's origin [m].
 _FARTHEST_BEARING: Final = 10.0
-_OF_ANY_JOINT: Final = ("name", "type", "limits", "transmission_periods", "bearing")
+#: Entries of a joint in every convention.
+_OF_ANY_JOINT: Final = ("name", "type", "limits", "transmission_periods", "bearing", "max_speed")
 
 
 def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Joint:
@@ -358,7 +368,23 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
                 allowed=f"up to {_FARTHEST_BEARING:g} m either way",
                 cure="Give the distance from the joint's origin in the file's unit of length.",
             )
-    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods, bearing)
+    speed = None if entry.max_speed is None else _max_speed(entry.max_speed, entry.type, unit, f"{where}.max_speed")
+    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods, bearing, speed)
+
+
+def _max_speed(value: float, kind: JointKind, unit: str, where: str) -> float:
+    """Return how fast a joint goes at 100 % [rad/s or m/s]; `unit` is the file's, a second."""
+    slowest, fastest = JOINT_SPEEDS[kind]
+    speed = to_si(value, unit)
+    if not slowest * (1.0 - 1e-9) <= speed <= fastest * (1.0 + 1e-9):
+        raise InputError(
+            "no joint is so slow or so fast at 100 %",
+            where=where,
+            came=f"{value:g} {unit}/s",
+            allowed=f"{from_si(slowest, unit):g} to {from_si(fastest, unit):g} {unit}/s",
+            cure=f"Give it in {unit}/s, the file's unit, or take the entry out if it is not known.",
+        )
+    return speed
 
 
 def _vector(name: str, value: object, unit: str, where: str, *, direction: bool) -> dict[str, float]:

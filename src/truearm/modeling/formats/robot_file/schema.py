@@ -92,6 +92,7 @@ class JointEntry(BaseModel):
     limits: tuple[Number, Number] | None = None
     transmission_periods: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
     bearing: Number | None = None
+    max_speed: Number | None = None
 
 
 class MassEntry(_Entry):

@@ -53,9 +53,11 @@ def _digest(robot: Robot) -> str:
     The numbers are those of files: what was written and read again has the same.
     """
     content = {name: entry for name, entry in file_content(robot).items() if name not in _BESIDE}
-    # With what the controller computes says nothing of where the arm goes, and may be told after the calibration.
+    # With what the controller computes and how fast joints are says nothing of where the arm goes, and may be told
+    # after the calibration.
     controller = {name: entry for name, entry in content.pop("controller", {}).items() if name != "kinematics"}
     content |= {"controller": controller} if controller else {}
+    content["joints"] = [{key: v for key, v in joint.items() if key != "max_speed"} for joint in content["joints"]]
     content["parameters"] = {name: entry["value"] for name, entry in content.get("parameters", {}).items()}
     proof = {name: entry for name, entry in content.get("proof", {}).items() if name != "sha256"}
     if robot.proof is not None and "correlations" in proof:  # in digits, whichever way they are written

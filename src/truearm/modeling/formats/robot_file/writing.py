@@ -130,6 +130,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
             row["transmission_periods"] = j.transmission_periods
         if j.bearing is not None:
             row["bearing"] = written(j.bearing, "mm")
+        if j.max_speed is not None:
+            row["max_speed"] = written(j.max_speed, "deg" if j.kind == "revolute" else "mm")
         return flow(row)
 
     content: dict[str, Any] = {

@@ -1,0 +1,254 @@
+"""Slips with orientations: quaternions in another order, turns the other way round, angles of another convention.
+
+Readings hold quaternions alone. What three angles they came from is not known, so every way to write three numbers is
+tried as the one that was taken, with every other one as the one that was meant: the numbers are found again from the
+orientations by the first, and read by the second. Twelve orders of axes that move along and the same twelve about fixed
+axes (Craig, Introduction to Robotics, appendix B), and rotation vectors; in radians, and in radians that were called
+degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.start_values.frames import initial_frames
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.modeling.chain import Array
+from truearm.modeling.orientations import turned_about
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rotation_from_quaternion, rotation_from_vector, rotation_vector
+from truearm.notices import Notice
+
+#: Codes of what is told here.
+ORIENTATION_SLIPS: Final = frozenset({"quaternion-order", "orientation-order"})
+#: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
+_TURNED_WITHIN: Final = 0.1
+#: A slip explains orientations that it leaves so near to the robot's [rad], and so many times nearer than they came.
+_EXPLAINED_WITHIN: Final = 0.03
+_LEAST_IMPROVEMENT: Final = 4.0
+#: Slips that leave so little more than the best one are as good.
+_AS_GOOD: Final = 1.5
+#: So many ways that are as good are told one by one.
+_MOST_TOLD: Final = 3
+#: Fewer orientations agree with one of so many ways by chance.
+_FEWEST: Final = 6
+_ORDERS: Final = tuple("".join(axes) for axes in product("xyz", repeat=3) if axes[0] != axes[1] != axes[2])
+#: Conventions that controllers and instruments write most often; None is a rotation vector.
+_COMMON: Final = frozenset({"zyx moving", "xyz moving", "zyz moving", "zxz moving", "xyz fixed", "zyx fixed", None})
+_INVERSE: Final = np.array([1.0, -1.0, -1.0, -1.0])
+#: Orders of a quaternion's numbers that programs write, beside w, x, y, z: in words, and where w, x, y and z stand.
+_NUMBERS: Final = (
+    ("their numbers are in the order x, y, z, w", [3, 0, 1, 2]),
+    ("w, x, y, z were taken for x, y, z, w", [1, 2, 3, 0]),
+)
+
+
+def orientation_slips(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return which slip with orientations makes them agree with the robot; nothing if they do, or if none does.
+
+    Parameters
+    ----------
+    robot
+        The nominal robot, which is placed by the positions.
+    """
+    if data.quaternion is None or not data.has_orientation.any():
+        return []
+    placed = initial_frames(robot, replace(data, quaternion=None, sigma_rot=None))
+    readings = _Readings.of(placed, data)
+    if not readings.rows:
+        return []
+    read = data.quaternion[readings.taken]
+    given = readings.left(rotation_from_quaternion(read))
+    if given <= _TURNED_WITHIN:
+        return []
+    left, words = min((readings.left(rotation_from_quaternion(mended)), words) for words, mended in _of_numbers(read))
+    if left * _LEAST_IMPROVEMENT <= given:
+        return [Notice("quaternion-order", f"The quaternions do not turn as the robot does: {words}.", "error")]
+    if readings.rows < _FEWEST:
+        return []
+    return _of_angles(readings, rotation_from_quaternion(read), given)
+
+
+def _of_numbers(read: Array) -> Iterator[tuple[str, Array]]:
+    """Return the quaternions as they would be with their numbers in another order, or turning the other way round."""
+    yield "they turn the other way round, as transposed matrices do. Change the sign of qw", read * _INVERSE
+    for words, order in _NUMBERS:
+        yield f"{words}. Exchange the columns", read[:, order]
+        yield f"{words}, and they turn the other way round. Mend the columns", read[:, order] * _INVERSE
+
+
+@dataclass(frozen=True, eq=False)
+class _Readings:
+    """Orientations of targets that have several, and those of the flange at the same configurations.
+
+    Attributes
+    ----------
+    flange
+        Of the placed robot, transposed, ``(rows, 3, 3)``.
+    taken
+        Which readings of the data they are, target by target, ``(rows,)``.
+    ends
+        Behind the last row of each target.
+    """
+
+    flange: Array
+    taken: IntArray
+    ends: tuple[int, ...]
+
+    @classmethod
+    def of(cls, placed: Robot, data: Dataset) -> _Readings:
+        """Return those of some data."""
+        groups = [np.flatnonzero(data.has_orientation & (data.target == t)) for t in range(len(data.targets))]
+        groups = [mine for mine in groups if len(mine) > 1]
+        taken = np.concatenate([*groups, np.zeros(0, dtype=np.intp)]).astype(np.intp)
+        _, R = placed.world_poses(data.postures)
+        ends = tuple(np.cumsum([len(mine) for mine in groups]).tolist())
+        return cls(np.swapaxes(R[data.configuration[taken]], 1, 2), taken, ends)
+
+    @property
+    def rows(self) -> int:
+        """How many there are."""
+        return len(self.taken)
+
+    def left(self, *ways: Array) -> float:
+        """Return how far targets' orientations on the flange differ from their means, as a root mean square [rad].
+
+        Parameters
+        ----------
+        ways
+            What was read, ``(rows, 3, 3)``. Of two ways that wins in each row that is nearer to the other rows.
+        """
+        squares, start = 0.0, 0
+        on_flange = [self.flange @ turned for turned in ways]
+        for end in self.ends:
+            mine = [turned[start:end] for turned in on_flange]
+            start = end
+            squares += min(_squares_off(_nearest(mine, first[0])) for first in mine)
+        return float(np.sqrt(squares / self.rows))
+
+
+def _nearest(ways: list[Array], to: Array) -> Array:
+    """Return of each row the way that is nearest to a rotation."""
+    if len(ways) == 1:
+        return ways[0]
+    near = [np.einsum("nij,ij->n", turned, to) for turned in ways]
+    return np.where((near[0] >= near[1])[:, None, None], ways[0], ways[1])
+
+
+def _squares_off(R: Array) -> float:
+    """Return the sum of squares of the angles between rotations and their mean."""
+    U, _, Vt = np.linalg.svd(R.mean(axis=0))
+    mean = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    return float(np.sum(rotation_vector(mean.T @ R) ** 2))
+
+
+# -- angles ------------------------------------------------------------------------------------------------
+
+
+def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]:
+    """Say as what the numbers of the orientations agree with the robot's, if they do as another convention's."""
+    tried = []
+    for taken in (*_ORDERS, None):
+        ways = _vectors(turned) if taken is None else _moving_angles(turned, taken)
+        for factor in (1.0, 180.0 / np.pi):
+            for meant in (*(f"{order} {axes}" for order in _ORDERS for axes in ("moving", "fixed")), None):
+                if taken is None and meant is None and factor == 1.0:
+                    continue
+                alike = taken is not None and meant is not None and _is_proper(taken) == _is_proper(meant)
+                left = readings.left(
+                    *(_rotations(numbers * factor, meant) for numbers in (ways[:1] if alike else ways))
+                )
+                if left <= _EXPLAINED_WITHIN and left * _LEAST_IMPROVEMENT <= given:
+                    rare = (taken is not None and f"{taken} moving" not in _COMMON, meant not in _COMMON)
+                    tried.append((left, sum(rare), _in_words(taken, meant, factor != 1.0)))
+    least = min((left for left, *_ in tried), default=0.0)
+    told = [
+        words
+        for _, left, words in sorted((rare, left, words) for left, rare, words in tried)
+        if left <= _AS_GOOD * least
+    ]
+    if not told:
+        return []
+    more = len(told) - _MOST_TOLD
+    beyond = f"; or in {more} other ways, which these configurations do not tell apart" if more > 0 else ""
+    return [
+        Notice(
+            "orientation-order",
+            "The orientations do not turn as the robot does, and would if their three numbers were read otherwise: "
+            f"{'; or '.join(told[:_MOST_TOLD])}{beyond}. Mend the mapping, or whatever made quaternions of them.",
+            "error",
+        )
+    ]
+
+
+def _rotations(numbers: Array, meant: str | None) -> Array:
+    """Return the rotations that numbers mean, ``(rows, 3, 3)``; None for a rotation vector."""
+    if meant is None:
+        return rotation_from_vector(numbers)
+    order, _, axes = meant.partition(" ")
+    first, second, third = (turned_about("xyz".index(a), column) for a, column in zip(order, numbers.T, strict=True))
+    return np.asarray(first @ second @ third if axes == "moving" else third @ second @ first)
+
+
+def _vectors(R: Array) -> list[Array]:
+    """Return the two shortest rotation vectors of rotations [rad], ``(n, 3)`` each."""
+    short = rotation_vector(R)
+    angle = np.linalg.norm(short, axis=1, keepdims=True)
+    return [short, short * (1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9))]
+
+
+def _is_proper(order: str) -> bool:
+    """Return whether the first axis comes again, so that the middle angle is from 0 to 180 deg, and not within 90."""
+    return order[0] == order[2]
+
+
+def _moving_angles(R: Array, order: str) -> list[Array]:
+    """Return the two ways to write rotations as angles about three axes that move along [rad], ``(n, 3)`` each.
+
+    The usual one is first: its middle angle is within 90 deg of 0, or from 0 to 180 deg where an axis comes again.
+    """
+    i, j = "xyz".index(order[0]), "xyz".index(order[1])
+    k = 3 - i - j
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    if _is_proper(order):
+        middle = np.arccos(np.clip(R[:, i, i], -1.0, 1.0))
+        first = np.arctan2(R[:, j, i], -sign * R[:, k, i])
+        last = np.arctan2(R[:, i, j], sign * R[:, i, k])
+    else:
+        middle = np.arcsin(np.clip(sign * R[:, i, k], -1.0, 1.0))
+        first = np.arctan2(-sign * R[:, j, k], R[:, k, k])
+        last = np.arctan2(-sign * R[:, i, j], R[:, i, i])
+    other = -middle if _is_proper(order) else np.pi - middle
+    second = np.column_stack([first + np.pi, other, last + np.pi])
+    return [np.column_stack([first, middle, last]), (second + np.pi) % (2.0 * np.pi) - np.pi]
+
+
+def _in_words(taken: str | None, meant: str | None, degrees: bool) -> str:
+    """Say as what numbers were read, and as what they agree, by the entries of a mapping.
+
+    Turns about moving axes are those about fixed ones in the opposite order, with the columns in that order.
+    """
+    unit = ", and as radians that were called degrees" if degrees else ""
+    if taken is None:
+        return f"not a rotation vector but {_way(meant)}{unit}"
+    if meant == f"{taken} moving":
+        return f"{_way(meant)}, but in radians that were called degrees"
+    other = ""
+    if meant is not None:
+        order, _, axes = meant.partition(" ")
+        opposite = {"moving": "fixed", "fixed": "moving"}[axes]
+        other = f" (of the columns from right to left: not {_way(f'{taken[::-1]} fixed')} but "
+        other += f"{_way(f'{order[::-1]} {opposite}')})"
+    return f"not {_way(f'{taken} moving')} but {_way(meant)}{other}{unit}"
+
+
+def _way(way: str | None) -> str:
+    if way is None:
+        return "a rotation vector"
+    order, _, axes = way.partition(" ")
+    return f"angles about {order} of {axes} axes"

@@ -1,0 +1,434 @@
+"""Where the measuring of a plan stands: what was read, what of it is kept, and what comes next."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError, did_you_mean
+from truearm.measurement.measuring.readings import REASONS, Quality, Reading
+from truearm.modeling.chain import Array
+
+Event = Literal["reading", "aside", "left"]
+Kind = Literal["nests", "configuration"]
+#: Kind, number of the round or index of the configuration, and name of a point that is measured there.
+Place = tuple[Kind, int, str]
+#: What may be written of a reading by hand.
+_LONGEST_WORDS: Final = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """One line of the log.
+
+    Attributes
+    ----------
+    number
+        Counted from 1.
+    event
+        ``reading``; ``aside``, the operator takes back a reading that was kept; ``left``, a point that cannot be
+        measured.
+    label
+        Of the configuration; empty if it is not known.
+    name
+        Of the target or nest.
+    is_nest
+        Whether it is a nest.
+    reading
+        What was read; None for other events.
+    reason
+        Why it is not kept, of ``REASONS``; empty for what is kept.
+    words
+        More about that.
+    of
+        Number of the reading that is taken back.
+    """
+
+    number: int
+    event: Event
+    label: str
+    name: str
+    is_nest: bool = False
+    reading: Reading | None = None
+    reason: str = ""
+    words: str = ""
+    of: int | None = None
+
+    @property
+    def kept(self) -> bool:
+        """Whether it is a reading that was kept when it came."""
+        return self.event == "reading" and not self.reason
+
+    def line(self) -> str:
+        """Return it as one line of text."""
+        what = f"{self.number:4d}  {self.label or '?'} {self.name}"
+        if self.event == "aside":
+            return f"{what}: reading {self.of} set aside by the operator" + (f" ({self.words})" if self.words else "")
+        figures = ""
+        reading = self.reading
+        if reading is not None and not reading.is_empty:
+            x, y, z = (reading.position * 1e3).tolist()
+            figures = f"  {x:.4f} {y:.4f} {z:.4f} mm"
+            if reading.deviation is not None:
+                figures += f"  deviation {reading.deviation * 1e3:.4f} mm"
+        if not self.reason:
+            return f"{what}{figures}"
+        said = f"{REASONS[self.reason]}{f': {self.words}' if self.words else ''}"
+        return f"{what}{figures}  {'left out' if self.event == 'left' else 'set aside'}: {said}"
+
+
+@dataclass(frozen=True)
+class Step:
+    """What is measured together: a round of the nests, or the targets at a configuration.
+
+    Attributes
+    ----------
+    kind
+        ``nests`` or ``configuration``.
+    configuration
+        Index of the configuration at which the robot stands.
+    label
+        Its name.
+    names
+        What is still to be measured, in order.
+    number, of
+        Which of the steps it is, from 1.
+    """
+
+    kind: Kind
+    configuration: int
+    label: str
+    names: tuple[str, ...]
+    number: int
+    of: int
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """All readings as arrays, in the order in which they came.
+
+    Attributes
+    ----------
+    names, labels
+        Of the points and the configurations, ``(k,)`` each.
+    is_nest, kept
+        Whether it is a nest, and whether it is kept now, ``(k,)``.
+    reasons
+        Why not, empty for what is kept, ``(k,)``.
+    time
+        [s], ``(k,)``.
+    position
+        In the instrument's frame [m], ``(k, 3)``, NaN where nothing was measured.
+    deviation, settling, samples
+        [m], [m] and a count, ``(k,)``, NaN where it is not told.
+    """
+
+    names: tuple[str, ...]
+    labels: tuple[str, ...]
+    is_nest: NDArray[np.bool_]
+    kept: NDArray[np.bool_]
+    reasons: tuple[str, ...]
+    time: Array
+    position: Array
+    deviation: Array
+    settling: Array
+    samples: Array
+
+
+class Session:
+    """The measuring of a plan.
+
+    A reading belongs to the configuration that it names, else to the first one at which its target is still to be
+    measured. It is kept or set aside as it comes, for a reason of the instrument alone; what was kept is not replaced
+    before the operator sets it aside. The nests are measured at the start, after every so many configurations, and at
+    the end.
+
+    Parameters
+    ----------
+    labels
+        Of the configurations, in the order of the plan.
+    targets
+        What is measured at each.
+    nests
+        Fixed points beside the robot.
+    every
+        How many configurations lie between two rounds of the nests.
+    quality
+        What a reading must be to be kept.
+    """
+
+    def __init__(
+        self, labels: Sequence[str], targets: Sequence[str], nests: Sequence[str], every: int, quality: Quality
+    ) -> None:
+        self.labels, self.targets, self.nests = tuple(labels), tuple(targets), tuple(nests)
+        self.every, self.quality = every, quality
+        self._index = {label: number for number, label in enumerate(self.labels)}
+        self._entries: list[Entry] = []
+        self._held: dict[Place, int] = {}  # numbers of the readings that are kept
+        self._left: set[Place] = set()
+        self._aside: dict[int, Entry] = {}
+        self._places: list[Place | None] = []  # of each entry
+        self._positions: dict[tuple[str, bytes], Entry] = {}
+        self._visited: dict[int, None] = {}  # configurations in the order in which the robot came to them first
+        self._at: int | None = None  # where it stands
+        self._whole: set[tuple[Kind, int]] = set()  # rounds and configurations of which nothing is left
+        self._from = 0  # no configuration before this one has anything left
+
+    # -- what there is -------------------------------------------------------------------------------------
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """Everything in the log."""
+        return tuple(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    @property
+    def kept(self) -> tuple[Entry, ...]:
+        """The readings that are kept now."""
+        return tuple(self._entries[number - 1] for number in sorted(self._held.values()))
+
+    @property
+    def aside_by_reason(self) -> dict[str, int]:
+        """How many readings are not kept, by the reason."""
+        found = Counter(self.reason_of(entry) for entry in self._entries if entry.event == "reading")
+        return {reason: found[reason] for reason in REASONS if found[reason]}
+
+    @property
+    def left_out(self) -> tuple[tuple[str, str], ...]:
+        """Configuration and name of the targets that were left out."""
+        gone = sorted(place for place in self._left - {*self._held} if place[0] == "configuration")
+        return tuple((self.labels[k], name) for _, k, name in gone)
+
+    def reason_of(self, entry: Entry) -> str:
+        """Return why a reading is not kept now, empty if it is."""
+        return self._aside[entry.number].reason if entry.number in self._aside else entry.reason
+
+    @property
+    def next(self) -> Step | None:
+        """What is to be measured now; None if nothing is left."""
+        here = self._open("configuration", self._at) if self._at is not None else ()
+        if here and self._at is not None:
+            return self._step("configuration", self._at, here)
+        if nests := self._open("nests", self._round):
+            return self._step("nests", self._standing, nests)
+        k = self._first_open()
+        return None if k is None else self._step("configuration", k, self._open("configuration", k))
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left to be measured."""
+        return self.next is None
+
+    @property
+    def outstanding(self) -> int:
+        """How many readings are still to be taken."""
+        configurations = sum(len(self._open("configuration", k)) for k in range(len(self.labels)))
+        return configurations + sum(len(self._open("nests", r)) for r in range(self._round, self.rounds))
+
+    @property
+    def rounds(self) -> int:
+        """How many rounds of the nests there shall be."""
+        return 1 + -(-len(self.labels) // self.every) if self.nests else 0
+
+    @property
+    def missed_rounds(self) -> int:
+        """How many rounds of the nests were passed over, not measured as a whole."""
+        return sum(bool(self._open("nests", r)) for r in range(min(self._round, self.rounds)))
+
+    def round_of(self, entry: Entry) -> int:
+        """Return in which round a nest was read, counted from 0."""
+        place = self._places[entry.number - 1]
+        return -1 if place is None else place[1]
+
+    def drawn(self) -> Drawn:
+        """Return all readings as arrays."""
+        entries = [entry for entry in self._entries if entry.reading is not None]
+        readings = [entry.reading for entry in entries if entry.reading is not None]
+        held = {*self._held.values()}
+
+        def figures(name: str) -> Array:
+            found = [getattr(reading, name) for reading in readings]
+            return np.array([np.nan if value is None else value for value in found], float)
+
+        return Drawn(
+            names=tuple(entry.name for entry in entries),
+            labels=tuple(entry.label for entry in entries),
+            is_nest=np.array([entry.is_nest for entry in entries], bool),
+            kept=np.array([entry.number in held for entry in entries], bool),
+            reasons=tuple(self.reason_of(entry) for entry in entries),
+            time=figures("time"),
+            position=np.array([reading.position for reading in readings]).reshape(-1, 3),
+            deviation=figures("deviation"),
+            settling=figures("settling"),
+            samples=figures("samples"),
+        )
+
+    # -- what comes ----------------------------------------------------------------------------------------
+
+    def judged(self, reading: Reading) -> Entry:
+        """Return what becomes of a reading; it is not part of the session before it is :meth:`add`-ed."""
+        place = self._place(reading.name, reading.label)
+        label = reading.label or "" if place is None else self._label(place)
+        reason, words = self._refusal(reading, place)
+        return Entry(len(self) + 1, "reading", label, reading.name, reading.name in self.nests, reading, reason, words)
+
+    def set_aside(self, number: int, words: str = "") -> Entry:
+        """Return the operator's word that a kept reading is none.
+
+        Raises
+        ------
+        InputError
+            If there is no such reading, or it is not kept.
+        """
+        if number not in self._held.values():
+            raise InputError(
+                "there is no kept reading of this number",
+                parameter="number",
+                came=number,
+                allowed="the number of a reading that is kept",
+            )
+        of = self._entries[number - 1]
+        words = _one_line(words)
+        return Entry(len(self) + 1, "aside", of.label, of.name, of.is_nest, None, "operator", words, number)
+
+    def leave_out(self, label: str, name: str, words: str = "") -> Entry:
+        """Return the word that a point cannot be measured at a configuration.
+
+        Raises
+        ------
+        InputError
+            If the plan has no such configuration or point, or it was measured.
+        """
+        known = (*self.targets, *self.nests)
+        for came, allowed, parameter in ((label, self.labels, "label"), (name, known, "name")):
+            if came not in allowed:
+                raise InputError(
+                    "the plan has no such configuration" if parameter == "label" else "there is no such point",
+                    parameter=parameter,
+                    came=came,
+                    allowed=", ".join(allowed[:20]),
+                    cure=did_you_mean(str(came), allowed),
+                )
+        if self._place(name, label) in self._held:
+            raise InputError("this was measured", parameter="name", came=name, cure="Set the reading aside instead.")
+        return Entry(len(self) + 1, "left", label, name, name in self.nests, None, "left-out", _one_line(words))
+
+    def add(self, *entries: Entry) -> None:
+        """Take what is in the log into account, in its order.
+
+        Raises
+        ------
+        InputError
+            If an entry does not follow from those before: the log was changed.
+        """
+        for entry in entries:
+            place = self._place_in_log(entry)
+            if entry.number != len(self) + 1 or not self._follows(entry, place):
+                raise InputError("this does not follow from what stands before it", where=f"number {entry.number}")
+            self._entries.append(entry)
+            self._places.append(place)
+            if place is None:
+                continue
+            if entry.event == "aside":
+                self._aside[int(entry.of or 0)] = entry
+                del self._held[place]
+            elif entry.event == "left" or entry.reason == "no-reading":
+                self._left.add(place)
+            elif entry.kept and entry.reading is not None:
+                self._held[place] = entry.number
+                self._positions.setdefault((entry.name, entry.reading.position.tobytes()), entry)
+            if self._open(*place[:2]):
+                self._whole.discard(place[:2])
+                self._from = min(self._from, place[1]) if place[0] == "configuration" else self._from
+            else:
+                self._whole.add(place[:2])
+            if place[0] == "configuration" and entry.event != "aside":
+                self._at = place[1]
+                self._visited.setdefault(self._at)
+
+    def _place_in_log(self, entry: Entry) -> Place | None:
+        if entry.event == "aside":
+            return self._places[entry.of - 1] if entry.of is not None and 0 < entry.of < entry.number else None
+        return self._place(entry.name, entry.label) if entry.label else None
+
+    def _follows(self, entry: Entry, place: Place | None) -> bool:
+        if entry.event == "aside":
+            return place is not None and place[2] == entry.name and self._held.get(place) == entry.of
+        if entry.event == "left" or entry.kept:
+            return place is not None and place not in self._held
+        return True
+
+    def _refusal(self, reading: Reading, place: Place | None) -> tuple[str, str]:
+        """Return why a reading is set aside, with more words; nothing if it is kept."""
+        if reading.name not in (*self.targets, *self.nests):
+            return "unknown-name", f"allowed: {', '.join((*self.targets, *self.nests))}"
+        if reading.name in self.targets and reading.label is not None and reading.label not in self._index:
+            return "unknown-configuration", f"{reading.label}; the plan begins with {self.labels[0]}"
+        fault = self.quality.fault(reading)
+        if fault[0]:
+            return fault
+        if place is None:
+            return "measured-already", "at every configuration"
+        if place in self._held:
+            return "measured-already", f"reading {self._held[place]}"
+        like = self._positions.get((reading.name, reading.position.tobytes()))
+        if place[0] == "configuration" and like is not None and like.number not in self._aside:
+            return "copy", f"reading {like.number}, of {like.label}"
+        return "", ""
+
+    def _place(self, name: str, label: str | None) -> Place | None:
+        """Return where a point was measured; None if that cannot be told."""
+        if name in self.nests:
+            return "nests", self._round, name
+        if name not in self.targets or (label is not None and label not in self._index):
+            return None
+        k = self._first_open() if label is None else self._index[label]
+        return None if k is None else ("configuration", k, name)
+
+    def _label(self, place: Place) -> str:
+        return self.labels[self._standing if place[0] == "nests" else place[1]]
+
+    @property
+    def _standing(self) -> int:
+        """Where the robot is, or goes first."""
+        return self._at if self._at is not None else 0
+
+    @property
+    def _round(self) -> int:
+        """Which round of the nests a nest that is read now belongs to."""
+        if self._first_open() is None:
+            return self.rounds - 1
+        return len(self._visited) // self.every
+
+    def _first_open(self) -> int | None:
+        """Return the configuration at which a target is measured that names none; None if all are."""
+        if self._at is not None and self._open("configuration", self._at):
+            return self._at
+        while self._from < len(self.labels) and ("configuration", self._from) in self._whole:
+            self._from += 1
+        return self._from if self._from < len(self.labels) else None
+
+    def _open(self, kind: Kind, k: int) -> tuple[str, ...]:
+        names = self.nests if kind == "nests" else self.targets
+        return tuple(n for n in names if (kind, k, n) not in self._held and (kind, k, n) not in self._left)
+
+    def _step(self, kind: Kind, k: int, names: tuple[str, ...]) -> Step:
+        return Step(kind, k, self.labels[k], names, len(self._whole) + 1, len(self.labels) + self.rounds)
+
+
+def _one_line(words: str) -> str:
+    if not isinstance(words, str) or len(words) > _LONGEST_WORDS or not (words == "" or words.isprintable()):
+        raise InputError(
+            "a few words of one line belong here",
+            parameter="words",
+            came=words if isinstance(words, str) else type(words).__name__,
+            allowed=f"up to {_LONGEST_WORDS} characters",
+        )
+    return words

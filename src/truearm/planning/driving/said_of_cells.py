@@ -1,0 +1,57 @@
+"""What is to be known of what a plan keeps clear of: links beside their lines, what is left out, odd boxes."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from truearm.notices import Notice
+from truearm.planning.driving.collisions import CollisionCheck
+from truearm.planning.driving.links_beside import beside_notices
+
+#: A box whose sides are all shorter is meant in another unit [m].
+_TINY: Final = 0.01
+
+
+def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
+    """Return what is to be known of what a check keeps clear of."""
+    notices = [*_box_notices(check), *beside_notices(check.robot)]
+    if check.left_out:
+        notices.append(
+            Notice(
+                "never-apart",
+                "Nearer to each other than the clearance whatever the joints do, and so not kept apart: "
+                f"{'; '.join(check.left_out)}.",
+                "note",
+            )
+        )
+    return tuple(notices)
+
+
+def _box_notices(check: CollisionCheck) -> list[Notice]:
+    """Return what is to be said of boxes that are tiny, or that the arm never comes near."""
+    notices = []
+    thick = max(capsule.radius for capsule in (*check.arm.links, *check.arm.tools))
+    reach = float((check.arm.along + check.arm.aside).max()) + thick
+    for box in check.cell.boxes:
+        longest = float((box.high - box.low).max())
+        away = float(np.linalg.norm(np.clip(0.0, box.low, box.high)))
+        if longest < _TINY:
+            notices.append(
+                Notice(
+                    "box-tiny",
+                    f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm. Check the unit of the "
+                    "constraints.",
+                )
+            )
+        elif away - reach > check.need:
+            notices.append(
+                Notice(
+                    "box-out-of-reach",
+                    f"The box '{box.name}' begins {away * 1e3:.0f} mm from the base, and the arm reaches at most "
+                    f"{reach * 1e3:.0f} mm: nothing is kept clear by it. Check its unit, and that it is in the base "
+                    "frame of the robot.",
+                )
+            )
+    return notices

@@ -1,0 +1,195 @@
+"""What came of measuring a plan: what is kept, what was set aside and why, and how the nests moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.measuring.about import About
+from truearm.measurement.measuring.kept_readings import StatedSigma, kept_readings, stated_sigma
+from truearm.measurement.measuring.nest_drift import NestDrift, nest_drift
+from truearm.measurement.measuring.readings import REASONS
+from truearm.measurement.measuring.session import Session
+from truearm.measurement.readers.canonical import csv_text
+from truearm.measurement.readers.rows import Configurations
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.shown import counted, listed
+from truearm.writing import write_files
+
+DATA: Final = "measurements.csv"
+PAGE: Final = "measure.html"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Measured(Record):
+    """A plan as it was measured so far.
+
+    Attributes
+    ----------
+    title
+        What the robot is called.
+    plan
+        The plan, for messages.
+    session
+        All readings.
+    configurations
+        Those of the plan.
+    about
+        What it was measured with.
+    instrument
+        Where the readings came from, in words.
+    folder
+        In which the files are.
+    command
+        How to go on, or to write the files again.
+    told
+        What to know about how it was measured.
+    """
+
+    title: str
+    plan: str
+    session: Session
+    configurations: Configurations
+    about: About
+    instrument: str
+    folder: Path
+    command: str
+    told: tuple[Notice, ...] = ()
+
+    @property
+    def data(self) -> Dataset | None:
+        """The readings that are kept; None if there is none of a target."""
+        return kept_readings(self.session, self.configurations, str(self.folder / DATA))
+
+    @property
+    def drift(self) -> NestDrift | None:
+        """How the nests moved; None before one was read."""
+        return nest_drift(self.session)
+
+    @property
+    def sigma(self) -> StatedSigma:
+        """With which standard deviation the measurements are written."""
+        return stated_sigma(self.session)
+
+    @property
+    def finished(self) -> bool:
+        """Whether nothing is left to be measured."""
+        return self.session.done
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know about the measurements."""
+        return (*self._unfinished(), *self._moved(), *self.told, *self.about.notices())
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files that are written: none before a reading of a target is kept."""
+        return () if self.data is None else (DATA, PAGE)
+
+    def write(self) -> None:
+        """Write measurements and report into the folder, if there are any."""
+        from truearm.reporting.measure_report import measure_report
+
+        data = self.data
+        if data is not None:
+            write_files(self.folder, {DATA: csv_text(data), PAGE: measure_report(self)}, self.command)
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm."""
+        session, drift = self.session, self.drift
+        return {
+            "finished": self.finished,
+            "configurations": {"measured": self._measured(), "planned": len(session.labels)},
+            "targets": list(session.targets),
+            "kept": {"targets": self._kept(), "nests": len(session.kept) - self._kept()},
+            "set_aside": session.aside_by_reason,
+            "left_out": len(session.left_out),
+            "outstanding": session.outstanding,
+            "nests": None
+            if drift is None
+            else {
+                "names": list(drift.names),
+                "rounds": len(drift.rounds),
+                "largest_mm": drift.largest * 1e3,
+                "together_mm": self._together(drift) * 1e3,
+                "sigma_mm": None if drift.sigma is None else drift.sigma * 1e3,
+            },
+            "sigma_mm": None if self.sigma.value is None else self.sigma.value * 1e3,
+            "sigma_from": self.sigma.words,
+            "about": {**self.about.fixed, "environment": [air.__dict__ for air in self.about.environment]},
+            "files": list(self.files),
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        session = self.session
+        text = [
+            f"{self._measured()} of {counted(len(session.labels), 'configuration')} measured, "
+            f"{counted(self._kept(), 'reading')} of {counted(len(session.targets), 'target')} kept."
+        ]
+        counts: Mapping[str, int] = session.aside_by_reason
+        total = sum(counts.values())
+        if total:
+            why = ", ".join(f"{count} {reason} ({REASONS[reason]})" for reason, count in counts.items())
+            text.append(f"{counted(total, 'reading')} set aside: {why}.")
+        if session.left_out:
+            places = listed([f"{label}/{name}" for label, name in session.left_out])
+            text.append(f"{counted(len(session.left_out), 'target')} left out (configuration/target): {places}.")
+        if (drift := self.drift) is not None:
+            repeat = "" if drift.sigma is None else f"; they repeat to {drift.sigma * 1e3:.4f} mm in a coordinate"
+            text.append(
+                f"Nests {listed(drift.names)} in {counted(len(drift.rounds), 'round')}: moved by up to "
+                f"{drift.largest * 1e3:.4f} mm, together by up to {self._together(drift) * 1e3:.4f} mm{repeat}."
+            )
+        if self._kept():
+            size = "" if self.sigma.value is None else f"{self.sigma.value * 1e3:.4f} mm, "
+            text.append(f"Standard deviation in the file: {size}{self.sigma.words}.")
+        return [*text, *notice_lines(self.warnings)]
+
+    def _kept(self) -> int:
+        return sum(not entry.is_nest for entry in self.session.kept)
+
+    def _measured(self) -> int:
+        return len({entry.label for entry in self.session.kept if not entry.is_nest})
+
+    @staticmethod
+    def _together(drift: NestDrift) -> float:
+        return float((drift.common**2).sum(axis=1).max() ** 0.5)
+
+    def _unfinished(self) -> list[Notice]:
+        step = self.session.next
+        if step is None:
+            return []
+        return [
+            Notice(
+                "unfinished",
+                f"{counted(self.session.outstanding, 'reading')} are still to be taken; next is {step.label}, "
+                f"{step.names[0]}. The same command goes on there.",
+            )
+        ]
+
+    def _moved(self) -> list[Notice]:
+        drift = self.drift
+        if drift is None or (noise := drift.noise((self.sigma.own and self._stated()) or None)) is None:
+            return []
+        far = self._together(drift)
+        if far <= 5.0 * noise * math.sqrt(2.0 / len(drift.names)):
+            return []
+        return [
+            Notice(
+                "nests-moved",
+                f"The nests moved together by up to {far * 1e3:.3f} mm, and a coordinate of a reading is off by "
+                f"{noise * 1e3:.4f} mm: instrument or floor moved. The readings are not corrected for it. Wait until "
+                "the instrument is warm, fix its stand, and measure again.",
+            )
+        ]
+
+    def _stated(self) -> float:
+        found = [e.reading.sigma for e in self.session.kept if e.reading is not None and e.reading.sigma is not None]
+        return math.sqrt(sum(value**2 for value in found) / len(found)) if found else 0.0

@@ -1,0 +1,195 @@
+"""A virtual instrument that measures a twin reading by reading, dwell by dwell, with the mishaps of a real one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import islice, takewhile
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError, did_you_mean
+from truearm.measurement.measuring.readings import Reading, dwell_figures
+from truearm.measurement.measuring.session import Session
+from truearm.measurement.measuring.sources import Incoming
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+from truearm.notices import Notice
+from truearm.simulation.devices import DEVICES
+from truearm.simulation.devices.artefacts import Artefact
+from truearm.simulation.devices.device import Device
+from truearm.simulation.devices.tracker import MeasurementArm, Tracker
+from truearm.simulation.twin import Twin
+
+#: Samples of a dwell, and how long it takes [s].
+SAMPLES: Final = 20
+_DWELL: Final = 2.0
+#: From one reading to the next [s].
+_PACE: Final = 10.0
+#: How far about the base nests stand [m].
+_NEST_CIRCLE: Final = 0.6
+#: A disturbed reading: so many deviations more scatter, or so many of unrest that dies out, or a beam that breaks.
+_UNREST: Final = 15.0
+_SCATTER: Final = 8.0
+#: So often a point is read in a row; then it is left out.
+_MOST_TRIES: Final = 20
+
+#: Instruments that read where targets are, without touching them: by name.
+VIRTUAL: Final[dict[str, Device]] = {
+    device.name: device for device in DEVICES if isinstance(device, Tracker | MeasurementArm | Artefact)
+}
+
+
+class VirtualInstrument:
+    """A source of readings: a device, simulated, that measures a twin at the configurations of a plan.
+
+    Each reading is the mean of the samples of a dwell. The device's deviation is that of the mean about the truth: a
+    sample scatters by it about the dwell's own place, so that the mean of many samples looks better than it is, as with
+    a real instrument. What it reads depends on the seed and on how many readings there are, so measuring
+    that was stopped goes on as if it had not been.
+
+    Parameters
+    ----------
+    device
+        One of ``VIRTUAL``.
+    twin
+        The true robot where the device sees it, with its targets.
+    placed
+        The nominal robot at the same place, for the line of sight.
+    joints
+        Of the plan, as the model counts them [rad or m], ``(n, joints)``.
+    nests
+        Names of fixed points; they stand about the base.
+    seed
+        Of all that is drawn.
+    disturbed
+        Share of the readings with a broken beam, an arm that still moves, or too much scatter.
+    drift
+        How far the instrument has moved at the last configuration [m], evenly over the plan.
+    sigma
+        Standard deviation of a coordinate of a reading [m]; the device's if None.
+    """
+
+    kind: Final = "virtual"
+
+    def __init__(
+        self,
+        device: Device,
+        twin: Twin,
+        placed: Robot,
+        joints: Array,
+        nests: tuple[str, ...] = (),
+        seed: int = 0,
+        disturbed: float = 0.0,
+        drift: float = 0.0,
+        sigma: float | None = None,
+    ) -> None:
+        self.device, self.placed = device, placed
+        self.sigma = device.sigma if sigma is None else sigma
+        self._joints, self._seed, self._disturbed = joints, seed, disturbed
+        self._frames = twin.frames(joints, number=np.arange(float(len(joints))))
+        rng = np.random.default_rng([seed, 0])
+        way = rng.standard_normal(3)
+        self._drift = drift * way / np.linalg.norm(way)
+        turn = 2 * np.pi * np.arange(len(nests)) / max(len(nests), 1)
+        around = _NEST_CIRCLE * np.column_stack([np.cos(turn), np.sin(turn), 0.1 * np.arange(len(nests))])
+        base = twin.robot.base
+        self._nests = dict(zip(nests, around @ base.rotation.T + base.translation, strict=True))
+
+    @property
+    def waiting(self) -> str:
+        """For what it waits."""
+        return "the next reading"
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """Nothing went wrong with it."""
+        return ()
+
+    def told(self) -> list[str]:
+        """Nothing could not be read."""
+        return []
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def visible(self, configuration: int) -> NDArray[np.bool_]:
+        """Return which targets it sees at a configuration, ``(targets,)``."""
+        return np.asarray(self.device.visible(self.placed, self._joints[configuration : configuration + 1])[0])
+
+    def poll(self, session: Session, seconds: float) -> list[Incoming]:
+        """Return the next reading, or that its target cannot be seen; it takes no time."""
+        step = session.next
+        if step is None:
+            return []
+        name, k = step.names[0], step.configuration
+        if step.kind == "configuration":
+            index = [target.name for target in self.placed.targets].index(name)
+            if not self.visible(k)[index]:
+                return [Incoming(left=(step.label, name, f"the {self.device.name} does not see it"))]
+        tries = takewhile(lambda entry: (entry.label, entry.name) == (step.label, name), reversed(session.entries))
+        if sum(1 for _ in islice(tries, _MOST_TRIES)) == _MOST_TRIES:
+            return [Incoming(left=(step.label, name, f"{_MOST_TRIES} readings in a row were set aside"))]
+        rng = np.random.default_rng([self._seed, 1, len(session)])
+        mishap = int(rng.integers(3)) if rng.random() < self._disturbed else -1
+        reading = self._read(name, k, rng, mishap, _PACE * len(session))
+        return [Incoming(replace(reading, label=step.label))]
+
+    def _read(self, name: str, k: int, rng: np.random.Generator, mishap: int, time: float) -> Reading:
+        turned = None
+        if name in self._nests:
+            place = self._nests[name]
+        else:
+            place, turned = self._frames[name][k, :3, 3], self._frames[name][k, :3, :3]
+        place = place + self._drift * (k / max(len(self._joints) - 1, 1))
+        # The mean of the samples has a variance of 1 / n of theirs; the rest of the deviation is common to the dwell.
+        own = self.sigma * np.sqrt(1.0 - 1.0 / SAMPLES) * rng.standard_normal(3)
+        spread = self.sigma * (_SCATTER if mishap == 2 else 1.0)
+        samples = place + own + spread * rng.standard_normal((SAMPLES, 3))
+        if mishap == 1:  # the arm comes to rest while it is measured
+            way = rng.standard_normal(3)
+            rest = np.exp(-np.linspace(0.0, 4.0, SAMPLES))[:, None]
+            samples = samples + _UNREST * self.sigma * rest * way / np.linalg.norm(way)
+        mean, deviation, settling = dwell_figures(samples)
+        quaternion = spread_angle = None
+        if isinstance(self.device, Artefact) and turned is not None:
+            spread_angle = self.sigma / self.device.size
+            small = np.concatenate([[1.0], 0.5 * spread_angle * rng.standard_normal(3)])
+            quaternion = quaternion_from_rotation(rotation_from_quaternion(small / np.linalg.norm(small)) @ turned)
+        return Reading(
+            name=name,
+            time=time + _DWELL,
+            position=mean,
+            quaternion=quaternion,
+            sigma=self.sigma or None,
+            sigma_rot=spread_angle or None,
+            samples=SAMPLES,
+            deviation=deviation,
+            settling=settling,
+            breaks=1 if mishap == 0 else 0,
+            origin=f"virtual {self.device.name}",
+        )
+
+
+def virtual_device(name: str) -> Device:
+    """Return a device that can measure a plan virtually.
+
+    Raises
+    ------
+    InputError
+        If there is none of this name, or it touches what it measures: then the postures are its own.
+    """
+    if name in VIRTUAL:
+        return VIRTUAL[name]
+    touches = any(device.name == name for device in DEVICES)
+    raise InputError(
+        "the arm is brought by hand to what this device reads, so it does not measure a plan by itself"
+        if touches
+        else "there is no device of this name",
+        parameter="device",
+        came=name,
+        allowed=", ".join(VIRTUAL),
+        cure="Measure a twin with it by 'truearm simulate'." if touches else did_you_mean(name, VIRTUAL),
+    )

@@ -1,0 +1,340 @@
+"""A plan measured from the first reading to a calibration, stopped and gone on with, by every source."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.jobs.examples import MEASURED_PLAN
+
+import truearm
+from truearm.errors import InputError
+from truearm.jobs.measure import open_campaign, sight
+from truearm.jobs.measuring_begun import BEGUN
+from truearm.measurement.measuring.reading_log import LOG
+from truearm.measurement.readers.canonical import read_csv
+from truearm.results.measured import DATA, PAGE
+from truearm.simulation.virtual_instrument import VIRTUAL, VirtualInstrument
+
+MAPPING = """\
+truearm: truearm-mapping/1
+configuration: {column: Pose}
+length_unit: mm
+readings: [{target_column: Point, x: X, y: Y, z: Z}]
+joints: {file: plan.csv}
+"""
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A plan of configurations at which the tracker sees a reflector."""
+    return seen_by("tracker", 24, tmp_path_factory.mktemp("planned"))
+
+
+def seen_by(device: str, poses: int, folder: Path) -> Path:
+    """Write a plan of configurations that a device can measure."""
+    data = truearm.simulate("irb120", truth="nominal", poses=poses, device=device).data
+    rows = (",".join(map(repr, row)) for row in np.degrees(data.joints).tolist())
+    path = folder / "plan.csv"
+    path.write_text(MEASURED_PLAN.splitlines()[0] + "\n" + "".join(f"{k},{row}\n" for k, row in enumerate(rows, 1)))
+    return path
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    path = tmp_path / "plan.csv"
+    path.write_text(MEASURED_PLAN)
+    return path
+
+
+def arm(plan: Path, out: Path, **more: Any) -> Any:
+    given: dict[str, Any] = {"device": "measurement-arm", "nests": ["n"], "every": 2} | more
+    return truearm.measure(plan, "irb120", out=out, **given)
+
+
+def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(planned: Path, tmp_path: Path) -> None:
+    told: list[str] = []
+    found = truearm.measure(
+        planned,
+        "irb120",
+        out=tmp_path,
+        device="tracker",
+        seed=3,
+        disturbed=0.2,
+        nests=["n1", "n2", "n3"],
+        every=6,
+        tell=told.append,
+    )
+    assert found.finished
+    assert len(told) == len(found.session.entries)
+    reasons = found.session.aside_by_reason
+    assert {*reasons} == {"beam-break", "not-settled", "scatter"}
+    assert sum(reasons.values()) > 3
+    assert [notice.code for notice in found.warnings] == ["not-said"]
+    assert {p.name for p in tmp_path.iterdir()} == {BEGUN, DATA, LOG, PAGE, "truearm.manifest.json"}
+    data = read_csv(tmp_path / DATA)
+    assert data.sigma is not None
+    assert set(data.sigma[data.has_reading].tolist()) == {VIRTUAL["tracker"].sigma}
+    assert data.references is not None
+    calibration = truearm.calibrate("irb120", tmp_path / DATA, train=18)
+    assert calibration.validation is not None
+    assert calibration.validation.position is not None
+    assert calibration.validation.position.mean < 1e-4
+    page = (tmp_path / PAGE).read_text()
+    for word in ("beam-break", "n1", "how well it fits", "not said"):
+        assert word in page
+
+
+def test_what_was_stopped_goes_on_to_the_same_files(plan: Path, tmp_path: Path) -> None:
+    whole = tmp_path / "whole"
+    arm(plan, whole, seed=1, disturbed=0.3)
+    for stopped in (1, 4, 7):
+        part = tmp_path / f"part-{stopped}"
+        with open_campaign(
+            plan, "irb120", part, device="measurement-arm", nests=["n"], every=2, seed=1, disturbed=0.3
+        ) as campaign:
+            for _ in range(stopped):
+                campaign.step()
+            step = campaign.session.next
+            unfinished = campaign.finish()
+        assert step is not None
+        assert f"next is {step.label}, {step.names[0]}" in unfinished.warnings[0].message
+        told: list[str] = []
+        arm(plan, part, seed=1, disturbed=0.3, tell=told.append)
+        assert told[0].startswith(f"Going on after {stopped} entries")
+        for name in (LOG, DATA):
+            assert (part / name).read_bytes() == (whole / name).read_bytes()
+    before = (whole / DATA).read_bytes()
+    assert arm(plan, whole, seed=1, disturbed=0.3).finished
+    assert (whole / DATA).read_bytes() == before
+
+
+def test_a_torn_line_is_said_and_measured_again(plan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arm(plan, out)
+    log, data = (out / LOG).read_bytes(), (out / DATA).read_bytes()
+    (out / LOG).write_bytes(log[:-7])
+    found = arm(plan, out)
+    (notice,) = [notice for notice in found.warnings if notice.code == "torn-line"]
+    assert notice.level == "note"
+    assert ((out / LOG).read_bytes(), (out / DATA).read_bytes()) == (log, data)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"targets": ["nest"], "nests": ["m"]}, "nests"),
+        ({"every": 3}, "every"),
+        ({"seed": 2}, "source of readings"),
+        ({"most_deviation": 1e-3}, "limit of what is kept"),
+    ],
+)
+def test_a_folder_that_began_otherwise_is_refused(
+    plan: Path, tmp_path: Path, change: dict[str, Any], word: str
+) -> None:
+    out = tmp_path / "out"
+    arm(plan, out)
+    with pytest.raises(InputError, match=f"began with another {word}") as refusal:
+        arm(plan, out, **change)
+    assert refusal.value.parameter == "out"
+
+
+def test_another_plan_robot_or_instrument_is_refused(plan: Path, tmp_path: Path) -> None:
+    out, about = tmp_path / "out", tmp_path / "about.yaml"
+    about.write_text("truearm: truearm-about/1\nunits: {}\ninstrument: {serial: A}\n")
+    arm(plan, out, about=about)
+    about.write_text("truearm: truearm-about/1\nunits: {}\ninstrument: {serial: B}\n")
+    with pytest.raises(InputError, match="another instrument or robot"):
+        arm(plan, out, about=about)
+    with pytest.raises(InputError, match="another robot"):
+        truearm.measure(plan, "irb1600", out=out, device="measurement-arm", nests=["n"], every=2)
+    plan.write_text(MEASURED_PLAN.replace("P2,20", "P2,21"))
+    with pytest.raises(InputError, match="another plan"):
+        arm(plan, out)
+    (out / BEGUN).unlink()
+    with pytest.raises(InputError, match="nothing says of which plan"):
+        arm(plan, out)
+    (out / BEGUN).write_text("{}")
+    with pytest.raises(InputError, match="how a measuring began"):
+        arm(plan, out)
+
+
+def test_rows_of_a_folder_become_the_same_file_as_the_import_of_the_table(plan: Path, tmp_path: Path) -> None:
+    inside, mapping = tmp_path / "in", tmp_path / "map.yaml"
+    inside.mkdir()
+    mapping.write_text(MAPPING)
+    rows = "".join(f"P{k},{name},{k}.5,{n},3\n" for k in (1, 2, 3) for n, name in enumerate("ab"))
+    (inside / "points.csv").write_text(f"Pose,Point,X,Y,Z\n{rows}")
+    found = truearm.measure(plan, "irb120", out=tmp_path / "out", watch=inside, mapping=mapping, targets=["a", "b"])
+    assert found.finished
+    imported = truearm.import_table(inside / "points.csv", mapping).data
+    data = read_csv(tmp_path / "out" / DATA)
+    assert (data.labels, data.targets) == (imported.labels, imported.targets)
+    np.testing.assert_array_equal(data.position, imported.position)
+    np.testing.assert_array_equal(data.joints, imported.joints)
+    assert data.number is not None
+
+
+def test_a_folder_into_which_nothing_comes_is_left_after_a_while(plan: Path, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "map.yaml").write_text(MAPPING)
+    given: dict[str, Any] = {"watch": tmp_path / "in", "mapping": tmp_path / "map.yaml", "targets": ["a"]}
+    found = truearm.measure(plan, "irb120", out=tmp_path / "out", wait=0.0, **given)
+    assert found.files == ()
+    assert found.data is None
+    assert "unfinished" in {notice.code for notice in found.warnings}
+    (tmp_path / "in" / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\n")
+    assert truearm.measure(plan, "irb120", out=tmp_path / "out", wait=0.0, **given).files == (DATA, PAGE)
+
+
+def test_ctrl_c_ends_with_what_is_there(plan: Path, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "map.yaml").write_text(MAPPING)
+    (tmp_path / "in" / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\n")
+    told: list[str] = []
+
+    def tell(line: str) -> None:
+        told.append(line)
+        threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+    found = truearm.measure(
+        plan,
+        "irb120",
+        out=tmp_path / "out",
+        watch=tmp_path / "in",
+        mapping=tmp_path / "map.yaml",
+        targets=["a"],
+        tell=tell,
+    )
+    assert len(told) == 1
+    assert found.files == (DATA, PAGE)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_program_sends_readings_to_a_port(plan: Path, tmp_path: Path) -> None:
+    def talk(line: str) -> None:
+        if not line.startswith("Listening"):
+            return
+        words = line.replace(",", "").split()
+        number, token = int(words[words.index("port") + 1]), words[words.index("token") + 1]
+
+        def send() -> None:
+            with socket.create_connection(("127.0.0.1", number), timeout=5.0) as stream:
+                stream.sendall(f"token {token}\n".encode())
+                for k in range(3):
+                    stream.sendall(f"reading a {k} 2 3 mm\n".encode())
+                while stream.recv(4096):
+                    pass
+
+        threading.Thread(target=send, daemon=True).start()
+
+    found = truearm.measure(plan, "irb120", out=tmp_path / "out", listen=0, targets=["a"], wait=10.0, tell=talk)
+    assert found.finished
+    assert len(found.session.kept) == 3
+    assert "token" not in found.command
+
+
+@pytest.mark.parametrize("device", VIRTUAL)
+def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_path: Path) -> None:
+    plan = seen_by(device, 12, tmp_path)
+    with open_campaign(plan, "irb120", tmp_path / "out", device=device, truth="nominal", noise=1e-9) as campaign:
+        source = campaign.source
+        assert isinstance(source, VirtualInstrument)
+        seen = sight(campaign)
+        assert seen is not None
+        assert campaign.placed is not None
+        while not campaign.session.done:
+            campaign.step()
+        for entry in campaign.session.kept:
+            assert entry.reading is not None
+            k = campaign.session.labels.index(entry.label)
+            place, _ = campaign.placed.world_poses(campaign.joints[k : k + 1], entry.name)
+            np.testing.assert_allclose(entry.reading.position, place[0], atol=1e-7)
+            assert (entry.reading.quaternion is None) == (device in ("tracker", "measurement-arm"))
+        found = campaign.measured()
+        assert len(found.session.kept) >= 12
+        assert sight(campaign) is None
+
+
+def test_what_an_instrument_that_drifts_does_to_the_nests_is_said(plan: Path, tmp_path: Path) -> None:
+    plan.write_text(MEASURED_PLAN + "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9)))
+    found = arm(plan, tmp_path / "out", nests=["n1", "n2", "n3"], noise=1e-5, drift=3e-4)
+    (notice,) = [n for n in found.warnings if n.code == "nests-moved"]
+    assert notice.level == "warning"
+    drift = found.drift
+    assert drift is not None
+    assert drift.largest == pytest.approx(3e-4, rel=0.2)
+    assert np.isfinite(drift.moved).all()
+    calm = arm(plan, tmp_path / "calm", nests=["n1", "n2", "n3"], noise=1e-5)
+    assert "nests-moved" not in {n.code for n in calm.warnings}
+    summary = json.loads(json.dumps(found.summary()))
+    assert summary["nests"]["rounds"] == len(drift.rounds)
+
+
+def test_a_point_of_which_no_reading_can_be_kept_is_left_out_after_twenty(plan: Path, tmp_path: Path) -> None:
+    found = arm(plan, tmp_path / "out", most_settling=0.0, nests=[])
+    assert found.session.aside_by_reason == {"not-settled": 60}
+    assert len(found.session.left_out) == 3
+    assert found.files == ()
+
+
+def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        arm(plan, tmp_path / "out", command="")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "parameter", "word"),
+    [
+        ({"device": None}, "device, watch, listen", "nobody says"),
+        ({"listen": 0}, "device, listen", "one source"),
+        ({"device": "ballbar"}, "device", "brought by hand"),
+        ({"device": "traker"}, "device", "Did you mean tracker"),
+        ({"mapping": "m.yaml"}, "mapping", "belongs to `watch`"),
+        ({"token": "x" * 20}, "token", "belongs to `listen`"),
+        ({"device": None, "listen": 0, "seed": 1}, "seed", "belongs to `device`"),
+        ({"device": None, "listen": 0}, "targets", "which targets"),
+        ({"device": None, "listen": 0, "targets": ["a"], "token": "short"}, "token", "keeps others out"),
+        ({"device": None, "listen": 0, "targets": ["n"]}, "targets, nests", "a target and for a nest"),
+        ({"device": None, "listen": 70000, "targets": ["a"]}, "listen", "out of range"),
+        ({"device": None, "watch": "nowhere", "targets": ["a"]}, "mapping", "what the columns"),
+        ({"disturbed": 0.95}, "disturbed", "too many"),
+        ({"every": 0}, "every", "out of range"),
+        ({"nests": [" "]}, "nests", "a name belongs here"),
+        ({"targets": ["x"]}, "targets", "no such target"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(
+    plan: Path, tmp_path: Path, given: dict[str, Any], parameter: str, word: str
+) -> None:
+    with pytest.raises(InputError, match=word) as refusal:
+        arm(plan, tmp_path / "out", **given)
+    assert refusal.value.parameter == parameter
+
+
+def test_folders_that_cannot_be_watched_are_refused(plan: Path, tmp_path: Path) -> None:
+    mapping, out = tmp_path / "out" / DATA, tmp_path / "out"
+    out.mkdir()
+    mapping.write_text(MAPPING)
+    given: dict[str, Any] = {"device": None, "targets": ["a"], "watch": out}
+    with pytest.raises(InputError, match="would be overwritten"):
+        arm(plan, out, mapping=mapping, **given)
+    moved = mapping.rename(tmp_path / "map.yaml")
+    with pytest.raises(InputError, match="is written to") as refusal:
+        arm(plan, out, mapping=moved, **given)
+    assert refusal.value.parameter == "out"
+
+
+def test_a_plan_with_a_configuration_twice_is_refused(plan: Path, tmp_path: Path) -> None:
+    plan.write_text(MEASURED_PLAN + MEASURED_PLAN.splitlines()[1] + "\n")
+    with pytest.raises(InputError, match="appears twice") as refusal:
+        arm(plan, tmp_path / "out")
+    assert refusal.value.parameter == "plan"

@@ -1,0 +1,337 @@
+"""A session keeps readings for reasons of the instrument alone, says what comes next, and loses none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from truearm.errors import InputError
+from truearm.measurement.measuring.campaign import session_notices
+from truearm.measurement.measuring.kept_readings import kept_readings, stated_sigma
+from truearm.measurement.measuring.nest_drift import nest_drift
+from truearm.measurement.measuring.readings import REASONS, Quality, Reading, dwell_figures
+from truearm.measurement.measuring.session import Entry, Session
+from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.measurement.readers.rows import Configurations
+
+LABELS = ("P1", "P2", "P3", "P4")
+QUALITY = Quality(deviation=3e-5, settling=5e-5, samples=5)
+
+
+def session(targets: Iterable[str] = ("a", "b"), nests: Iterable[str] = (), every: int = 2) -> Session:
+    return Session(LABELS, tuple(targets), tuple(nests), every, QUALITY)
+
+
+def taken(of: Session, name: str, label: str | None = None, *, x: float | None = None, **more: Any) -> Entry:
+    """Take a reading whose place is another one each time, and return what became of it."""
+    place = np.array([0.1 + 0.01 * len(of) if x is None else x, 0.2, 0.3])
+    given = {"time": 10.0 * len(of), "samples": 20, "deviation": 1e-5, "settling": 1e-5} | more
+    entry = of.judged(Reading(name, position=place, label=label, **given))
+    of.add(entry)
+    return entry
+
+
+def through(of: Session, most: int = 200) -> list[tuple[str, str, str]]:
+    """Measure whatever comes next until nothing is left, and return what was asked for."""
+    asked: list[tuple[str, str, str]] = []
+    while (step := of.next) is not None and len(asked) < most:
+        asked.append((step.kind, step.label, step.names[0]))
+        taken(of, step.names[0], step.label)
+    return asked
+
+
+def plan(labels: tuple[str, ...] = LABELS) -> Configurations:
+    joints = np.radians(10.0 * np.arange(1.0, len(labels) + 1))[:, None] * [1.0, 2.0]
+    return Configurations(labels, joints, ("revolute", "revolute"), np.arange(len(labels)))
+
+
+# -- what comes next -------------------------------------------------------------------------------------------
+
+
+def test_targets_come_in_the_order_of_the_plan_and_nests_first_along_the_way_and_last() -> None:
+    of = session(nests=("n1", "n2"))
+    assert of.rounds == 3
+    assert of.outstanding == 3 * 2 + 4 * 2
+    asked = through(of)
+    kinds = [kind for kind, _, _ in asked]
+    assert kinds == [*["nests"] * 2, *["configuration"] * 4, *["nests"] * 2, *["configuration"] * 4, *["nests"] * 2]
+    assert [label for kind, label, _ in asked if kind == "nests"] == ["P1", "P1", "P2", "P2", "P4", "P4"]
+    assert [(label, name) for kind, label, name in asked if kind != "nests"] == [
+        (label, name) for label in LABELS for name in ("a", "b")
+    ]
+    assert of.done
+    assert (of.outstanding, of.missed_rounds) == (0, 0)
+
+
+def test_a_plan_of_one_configuration_has_nests_before_and_after() -> None:
+    of = Session(("P1",), ("a",), ("n",), 10, QUALITY)
+    assert [name for _, _, name in through(of)] == ["n", "a", "n"]
+
+
+def test_a_reading_that_names_no_configuration_belongs_to_the_first_that_is_open() -> None:
+    of = session()
+    found = [taken(of, name) for name in ("a", "b", "a", "b")]
+    assert [(entry.label, entry.reason) for entry in found] == [("P1", ""), ("P1", ""), ("P2", ""), ("P2", "")]
+
+
+def test_a_reading_of_another_configuration_is_kept_where_it_belongs() -> None:
+    of = session(targets=("a",))
+    assert taken(of, "a", "P3").label == "P3"
+    step = of.next
+    assert step is not None
+    assert step.label == "P1"
+    taken(of, "a", "P1")
+    (notice,) = [n for n in session_notices(of) if n.code == "other-order"]
+    assert "P1" in notice.message
+    assert notice.level == "note"
+    data = kept_readings(of, plan(), "kept")
+    assert data is not None
+    assert data.labels == ("P3", "P1")
+    assert "order" in csv_text(data)
+    assert data.number is not None
+    assert data.number.tolist() == [0, 1]
+
+
+def test_nests_that_are_passed_over_are_counted() -> None:
+    of = session(targets=("a",), nests=("n",), every=2)
+    for label in LABELS[:3]:
+        taken(of, "a", label)
+    assert of.missed_rounds == 1
+    assert [n.code for n in session_notices(of) if n.level == "warning"] == ["nests-missed"]
+    step = of.next
+    assert step is not None
+    assert step.names == ("n",)  # the second round is still to be measured
+
+
+def test_what_is_left_out_is_not_asked_for_but_may_come_all_the_same() -> None:
+    of = session()
+    of.add(of.leave_out("P1", "b", "behind the arm"))
+    taken(of, "a")
+    step = of.next
+    assert step is not None
+    assert (step.label, step.names) == ("P2", ("a", "b"))
+    assert of.left_out == (("P1", "b"),)
+    assert taken(of, "b", "P1").kept
+    assert not of.left_out
+
+
+# -- what a reading is worth -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("reason", "more"),
+    [
+        ("beam-break", {"breaks": 2}),
+        ("few-samples", {"samples": 4}),
+        ("not-settled", {"settling": 6e-5}),
+        ("scatter", {"deviation": 4e-5}),
+        ("unknown-configuration", {"label": "P9"}),
+    ],
+)
+def test_every_fault_of_the_instrument_sets_a_reading_aside_and_it_is_asked_for_again(
+    reason: str, more: dict[str, Any]
+) -> None:
+    of = session()
+    assert taken(of, "a", **more).reason == reason
+    assert of.aside_by_reason == {reason: 1}
+    step = of.next
+    assert step is not None
+    assert (step.label, step.names[0]) == ("P1", "a")
+    assert taken(of, "a").kept
+
+
+def test_a_name_that_is_not_known_is_set_aside() -> None:
+    assert taken(session(), "c").reason == "unknown-name"
+
+
+def test_a_second_reading_never_replaces_one_that_is_kept() -> None:
+    of = session()
+    first = taken(of, "a", "P1")
+    again = taken(of, "a", "P1")
+    assert (again.reason, again.words) == ("measured-already", "reading 1")
+    of.add(of.set_aside(first.number, "the nest was not clean"))
+    assert of.reason_of(first) == "operator"
+    third = taken(of, "a", "P1")
+    assert third.kept
+    assert [entry.number for entry in of.kept] == [third.number]
+    assert of.aside_by_reason == {"measured-already": 1, "operator": 1}
+
+
+def test_a_reading_that_repeats_another_place_to_the_last_digit_is_none() -> None:
+    of = session(targets=("a",))
+    taken(of, "a", x=0.5)
+    assert taken(of, "a", x=0.5).reason == "copy"
+
+
+def test_a_row_without_a_reading_leaves_its_target_out() -> None:
+    of = session()
+    entry = taken(of, "b", "P1", x=np.nan)
+    assert entry.reason == "no-reading"
+    assert of.left_out == (("P1", "b"),)
+
+
+def test_every_reading_stays_with_its_reason() -> None:
+    of = session()
+    for name, breaks in (("a", 0), ("a", 1), ("zz", 0), ("b", 0)):
+        taken(of, name, breaks=breaks)
+    assert [entry.reason for entry in of.entries] == ["", "beam-break", "unknown-name", ""]
+    assert {entry.reason for entry in of.entries} <= {"", *REASONS}
+    drawn = of.drawn()
+    assert drawn.position.shape == (4, 3)
+    assert drawn.kept.tolist() == [entry.kept for entry in of.entries]
+    assert len(drawn.names) == len(drawn.labels) == len(drawn.reasons) == len(drawn.time) == 4
+
+
+def test_readings_of_which_nothing_is_told_are_kept_and_counted() -> None:
+    of = session()
+    taken(of, "a", samples=None, deviation=None, settling=None)
+    (notice,) = [n for n in session_notices(of) if n.code == "not-judged"]
+    assert "1 of 1" in notice.message
+    assert notice.level == "note"
+
+
+def test_a_clock_that_goes_back_is_told_by_the_number() -> None:
+    of = session()
+    taken(of, "a")
+    taken(of, "b", time=-5.0)
+    (notice,) = [n for n in session_notices(of) if n.code == "clock-back"]
+    assert "reading 2" in notice.message
+
+
+@pytest.mark.parametrize(
+    ("call", "parameter"),
+    [
+        (lambda of: of.set_aside(1), "number"),
+        (lambda of: of.set_aside(2), "number"),
+        (lambda of: of.leave_out("P7", "a"), "label"),
+        (lambda of: of.leave_out("P1", "c"), "name"),
+        (lambda of: of.leave_out("P1", "b"), "name"),
+        (lambda of: of.leave_out("P2", "b", "two\nlines"), "words"),
+    ],
+)
+def test_words_of_the_operator_that_cannot_be_are_refused(call: Any, parameter: str) -> None:
+    of = session()
+    taken(of, "a", breaks=1)
+    taken(of, "b")
+    if parameter == "number" and call is not None:
+        of.add(of.set_aside(2))
+    with pytest.raises(InputError) as refusal:
+        call(of)
+    assert refusal.value.parameter == parameter
+
+
+def test_entries_that_do_not_follow_are_refused() -> None:
+    of, other = session(), session()
+    first = taken(other, "a")
+    taken(other, "b")
+    with pytest.raises(InputError, match="does not follow"):
+        of.add(other.entries[1])
+    of.add(first)
+    with pytest.raises(InputError, match="does not follow"):
+        of.add(Entry(2, "aside", "P1", "b", reason="operator", of=1))
+
+
+def test_the_figures_of_a_dwell() -> None:
+    rng = np.random.default_rng(0)
+    samples = 1e-5 * rng.standard_normal((4000, 3))
+    mean, deviation, settling = dwell_figures(samples)
+    assert np.abs(mean).max() < 1e-6
+    assert deviation == pytest.approx(1e-5, rel=0.03)
+    assert settling < 1e-6
+    samples[2000:, 0] += 5e-5
+    assert dwell_figures(samples)[2] == pytest.approx(5e-5, rel=0.02)
+
+
+# -- what comes of it ------------------------------------------------------------------------------------------
+
+
+def test_kept_readings_are_a_file_that_reads_back(tmp_path: Any) -> None:
+    of = session(nests=("n",))
+    through(of)
+    data = kept_readings(of, plan(), "kept")
+    assert data is not None
+    assert (data.configurations, len(data.target)) == (4, 8)
+    assert data.references is not None
+    assert data.references.targets == ("n",)
+    path = tmp_path / "data.csv"
+    path.write_text(csv_text(data))
+    assert csv_text(read_csv(path)) == path.read_text()
+
+
+def test_left_out_targets_are_missing_and_configurations_never_reached_are_not_there() -> None:
+    of = session()
+    taken(of, "a")
+    of.add(of.leave_out("P1", "b"))
+    taken(of, "b")
+    data = kept_readings(of, plan(), "kept")
+    assert data is not None
+    assert data.labels == ("P1", "P2")
+    assert data.has_position.tolist() == [True, False, False, True]
+
+
+def test_a_configuration_to_which_the_robot_comes_again_has_visits() -> None:
+    of = session()
+    taken(of, "a", "P1")
+    taken(of, "b", "P1", breaks=1)
+    taken(of, "a", "P2")
+    taken(of, "b", "P1")
+    data = kept_readings(of, plan(), "kept")
+    assert data is not None
+    assert data.visit is not None
+    assert data.visit.tolist() == [1, 2, 1, 1]
+
+
+def test_nothing_kept_is_no_data() -> None:
+    of = session()
+    taken(of, "a", breaks=1)
+    assert kept_readings(of, plan(), "kept") is None
+
+
+def test_the_deviation_is_the_instruments_or_that_of_the_nests_and_never_that_of_a_dwell() -> None:
+    stated = session()
+    taken(stated, "a", sigma=2e-5)
+    assert stated_sigma(stated).own
+    dwells = session(nests=("n",))
+    through(dwells)
+    assert (stated_sigma(dwells).value, stated_sigma(dwells).own) == (None, False)
+    rng = np.random.default_rng(1)
+    of = Session([f"P{k}" for k in range(200)], ("a",), ("n1", "n2"), 2, QUALITY)
+    while (step := of.next) is not None:
+        place = 2e-5 * rng.standard_normal(3) + (1.0 if step.names[0] == "n1" else 2.0)
+        of.add(of.judged(Reading(step.names[0], 1.0, place, label=step.label, deviation=1e-6)))
+    found = stated_sigma(of).value
+    assert found == pytest.approx(2e-5, rel=0.1)
+    data = kept_readings(of, plan(tuple(f"P{k}" for k in range(200))), "kept")
+    assert data is not None
+    assert data.sigma is not None
+    assert set(data.sigma.tolist()) == {found}
+
+
+def test_the_drift_of_nests_is_what_they_moved() -> None:
+    of = session(targets=("a",), nests=("n1", "n2"), every=1)
+    moved = 0.0
+    while (step := of.next) is not None:
+        if step.kind == "nests":
+            at = np.array([1.0 + moved, float(step.names[0][1]), 0.0])
+            of.add(of.judged(Reading(step.names[0], 60.0 * len(of), at, label=step.label)))
+        else:
+            taken(of, "a")
+            moved += 1e-5
+    drift = nest_drift(of)
+    assert drift is not None
+    assert drift.rounds == (0, 1, 2, 3, 4)
+    assert drift.largest == pytest.approx(4e-5)
+    np.testing.assert_allclose(drift.common[:, 0], 1e-5 * np.arange(5), atol=1e-12)
+    assert drift.time[0] == 0.0
+    assert drift.sigma is not None
+    assert drift.noise() is None or drift.noise() < 1e-9  # type: ignore[operator]
+
+
+def test_no_nest_no_drift() -> None:
+    of = session()
+    taken(of, "a")
+    assert nest_drift(of) is None
+    assert [n.code for n in session_notices(of)] == ["no-nests"]

@@ -1,0 +1,194 @@
+"""The log of readings survives a kill at any moment, and takes nothing that was not written by it."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.killing import killed, operations
+
+from truearm.errors import InputError
+from truearm.measurement.measuring.reading_log import LOG, ReadingLog
+from truearm.measurement.measuring.readings import REASONS, Reading
+from truearm.measurement.measuring.session import Entry
+
+
+def entry(number: int, *, reason: str = "") -> Entry:
+    rng = np.random.default_rng(number)
+    quaternion = rng.standard_normal(4)
+    reading = Reading(
+        name='smr "1", left',
+        time=1e9 * float(rng.random()),
+        position=rng.standard_normal(3),
+        quaternion=quaternion / np.linalg.norm(quaternion) if number % 2 else None,
+        label=f"P{number}",
+        sigma=None if number % 3 else 1.2345e-5,
+        sigma_rot=None if number % 3 else 1e-4,
+        samples=number,
+        deviation=float(rng.random()) * 1e-5,
+        settling=None,
+        breaks=number % 2,
+        origin="points, all.csv, line 3",
+        mark="0123abc",
+    )
+    return Entry(number, "reading", f"P{number}", reading.name, bool(number % 2), reading, reason, "Träger; 0.1 mm")
+
+
+def same(one: Entry, other: Entry) -> bool:
+    """Return whether two entries hold the same to the last digit."""
+    a, b = dict(one.__dict__), dict(other.__dict__)
+    x, y = a.pop("reading"), b.pop("reading")
+    if a != b or (x is None) != (y is None):
+        return False
+    if x is None:
+        return True
+    fields = [field for field in x.__dict__ if field not in ("position", "quaternion")]
+    turned = np.array_equal(x.quaternion, y.quaternion) if x.quaternion is not None else y.quaternion is None
+    return (
+        np.array_equal(x.position, y.position, equal_nan=True)
+        and turned
+        and all(getattr(x, field) == getattr(y, field) for field in fields)
+    )
+
+
+ENTRIES = (
+    *(entry(number, reason=reason) for number, reason in enumerate(("", "scatter", "beam-break"), 1)),
+    Entry(4, "aside", "P1", 'smr "1", left', True, None, "operator", "bumped", 1),
+    Entry(5, "left", "P2", "b", False, None, "left-out", ""),
+)
+
+
+def write(folder: Path, entries: tuple[Entry, ...] = ENTRIES) -> None:
+    log = ReadingLog(folder)
+    for one in entries[len(log.entries) :]:
+        log.append(one)
+    log.close()
+
+
+def read(folder: Path) -> tuple[Entry, ...]:
+    log = ReadingLog(folder)
+    log.close()
+    return log.entries
+
+
+def same_as(expected: tuple[Entry, ...], found: tuple[Entry, ...]) -> bool:
+    return len(found) == len(expected) and all(same(a, b) for a, b in zip(found, expected, strict=True))
+
+
+def test_what_is_written_is_read_again_to_the_last_digit(tmp_path: Path) -> None:
+    write(tmp_path)
+    assert same_as(ENTRIES, read(tmp_path))
+
+
+@pytest.mark.parametrize("lost", [1, 9, 10, 60])
+def test_a_part_of_a_line_at_the_end_is_cut_off(tmp_path: Path, lost: int) -> None:
+    write(tmp_path)
+    path = tmp_path / LOG
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-lost])
+    log = ReadingLog(tmp_path)
+    assert log.torn > 0
+    assert len(log.entries) in (len(ENTRIES) - 1, len(ENTRIES) - 2)
+    log.close()
+    write(tmp_path)
+    assert path.read_bytes() == whole
+
+
+def test_a_line_that_was_changed_is_refused_with_its_number(tmp_path: Path) -> None:
+    write(tmp_path)
+    path = tmp_path / LOG
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:2], lines[2].replace("P2", "P3", 1), *lines[3:]]))
+    with pytest.raises(InputError, match="line 3: this line is not as it was written"):
+        ReadingLog(tmp_path)
+
+
+@pytest.mark.parametrize("content", ["a,b\n1,2\n", "configuration\n"])
+def test_another_file_is_no_log_and_stays(tmp_path: Path, content: str) -> None:
+    (tmp_path / LOG).write_text(content)
+    with pytest.raises(InputError, match="no log of readings"):
+        ReadingLog(tmp_path)
+    assert (tmp_path / LOG).read_text() == content
+
+
+def test_a_link_or_a_folder_is_no_log(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").write_text("")
+    (tmp_path / LOG).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="this is none"):
+        ReadingLog(tmp_path)
+    (tmp_path / LOG).unlink()
+    (tmp_path / LOG).mkdir()
+    with pytest.raises(InputError, match="this is none"):
+        ReadingLog(tmp_path)
+
+
+def test_a_line_that_says_nothing_is_refused_although_its_checksum_fits(tmp_path: Path) -> None:
+    write(tmp_path)
+    body = "6,guess,,P1,a,target,,,,,,,,,,,,,,,,,,"
+    with (tmp_path / LOG).open("a") as stream:
+        stream.write(f"{body},{zlib.crc32(body.encode()):08x}\n")
+    with pytest.raises(InputError, match="line 7: this line cannot be understood"):
+        ReadingLog(tmp_path)
+
+
+def test_a_disk_that_does_not_take_a_line_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    log = ReadingLog(tmp_path)
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        log.append(ENTRIES[0])
+    monkeypatch.undo()
+    log.close()
+    with pytest.raises(InputError, match="cannot be written"):
+        ReadingLog(tmp_path / "nowhere")
+
+
+def test_one_process_at_a_time_has_it(tmp_path: Path) -> None:
+    log = ReadingLog(tmp_path)
+    with pytest.raises(InputError, match="another process is measuring"):
+        ReadingLog(tmp_path)
+    log.close()
+    ReadingLog(tmp_path).close()
+
+
+def test_names_that_would_break_a_line_are_escaped(tmp_path: Path) -> None:
+    log = ReadingLog(tmp_path)
+    odd = Reading("a\nb", 0.0, np.full(3, np.nan))
+    log.append(Entry(1, "reading", "", odd.name, reading=odd, reason="unknown-name"))
+    log.close()
+    (found,) = read(tmp_path)
+    assert found.name == r"a\nb"
+    assert found.reason in REASONS
+    assert found.label == ""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="a process cannot copy itself here")
+def test_a_kill_at_any_of_twenty_moments_damages_nothing(tmp_path: Path) -> None:
+    """A kill before an operation, in the middle of a line too: what is there is the beginning of the whole."""
+    folder = tmp_path / "log"
+    folder.mkdir()
+    count = operations(lambda: write(folder), folder)
+    write(folder)
+    whole = (folder / LOG).read_bytes()
+    lengths = set()
+    moments = np.random.default_rng(0).choice(count, min(20, count), replace=False)
+    for moment in sorted(moments.tolist()):
+        shutil.rmtree(folder)
+        folder.mkdir()
+        killed(lambda: write(folder), folder, moment)
+        there = (folder / LOG).read_bytes() if (folder / LOG).exists() else b""
+        assert whole.startswith(there)
+        log = ReadingLog(folder)
+        lengths.add(len(log.entries))
+        assert all(same(a, b) for a, b in zip(log.entries, ENTRIES, strict=False))
+        log.close()
+        write(folder)
+        assert (folder / LOG).read_bytes() == whole
+    assert len(lengths) > 2

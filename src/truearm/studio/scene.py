@@ -266,6 +266,46 @@ class Scene:
         )
         self._parts[name] = [shown]
 
+    def show_lines(self, name: str, segments: Array | None, colours: Colours = (90, 98, 106)) -> None:
+        """Draw straight lines ``(n, 2, 3)`` [m] in the world in one upload; None takes them away.
+
+        Parameters
+        ----------
+        colours
+            One for all, or one each ``(n, 3)`` from 0 to 255.
+        """
+        self._clear(name)
+        if segments is None or not len(segments):
+            return
+        # What viser takes for the colour of a line is proportional to its light.
+        light = (255.0 * (np.asarray(colours, float) / 255.0) ** 2.2).astype(np.uint8)
+        each = np.ascontiguousarray(np.broadcast_to(light.reshape(-1, 1, 3), (len(segments), 2, 3)))
+        shown = self._scene.add_line_segments(
+            f"/{name}", segments.astype(np.float32), each, thickness=0.005 * self.length
+        )
+        self._parts[name] = [shown]
+
+    def show_balls(self, name: str, centres: Array | None, radii: Array, colour: Colour = _FIXTURE) -> None:
+        """Draw a few transparent balls about centres ``(n, 3)`` with radii ``(n,)`` [m]; None takes them away."""
+        self._clear(name)
+        for number, (centre, radius) in enumerate(zip(() if centres is None else centres, radii, strict=False)):
+            if np.isfinite(radius) and radius > 0.0:
+                ball = self._scene.add_icosphere(
+                    f"/{name}/{number}",
+                    radius=float(radius),
+                    color=colour,
+                    opacity=_SEE_THROUGH,
+                    position=centre,
+                    cast_shadow=False,
+                )
+                self._parts[name].append(ball)
+
+    def show_names(self, name: str, places: Mapping[str, Array]) -> None:
+        """Write words at places [m] in the world; none take them away."""
+        self._clear(name)
+        for number, (words, place) in enumerate(places.items()):
+            self._parts[name].append(self._scene.add_label(f"/{name}/{number}", words, position=place))
+
     # -- parts ---------------------------------------------------------------------------------------------
 
     def _draw_robots(self, nominal: Robot | None, calibrated: Robot | None) -> None:

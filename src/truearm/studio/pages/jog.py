@@ -218,6 +218,13 @@ class JogPage:
         self._shown()
         self._show_recorded()
 
+    def go_to_joints(self, joints: Array, arm: str | None = None) -> None:
+        """Move the drawn arm, ``nominal`` or ``calibrated``, to joint positions of the model [rad or m]."""
+        if arm is not None and arm in self._arms and arm != self._arm.value:
+            self._take(arm)
+        self._jogged().go(joints)
+        self._moved()
+
     # What follows from where the arm is --------------------------------------------------------------------------
 
     def _jogged(self) -> Jogging:

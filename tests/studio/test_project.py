@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.killing import killed, leftovers, operations
@@ -121,7 +122,7 @@ def test_small_files_of_an_edit_are_undone_with_it(project: Project) -> None:
         {"model": ""},
     ],
 )
-def test_settings_that_cannot_be_are_refused_and_change_nothing(project: Project, changes: dict[str, object]) -> None:
+def test_settings_that_cannot_be_are_refused_and_change_nothing(project: Project, changes: dict[str, Any]) -> None:
     before = (project.folder / PROJECT_FILE).read_bytes()
     with pytest.raises(InputError):
         project.edit(**changes)

@@ -79,7 +79,7 @@ class PlanPage:
             self._cloud: Any = gui.add_checkbox("Predicted error", True, hint="and the chosen configurations, red")
             self._scale = gui.add_html("", visible=False)
             self._among: Any = gui.add_checkbox(
-                "Candidates", False, hint="where the flange is at those that are usable"
+                "All candidates", False, hint="where the flange is at those that are usable"
             )
             self._speed: Any = gui.add_number("Speed [deg/s, mm/s]", 60.0, min=0.1, max=1000.0, step=1.0)
             self._tour: Any = gui.add_button_group("Ways", ("drive", "stop"))

@@ -108,8 +108,5 @@ class Settings(BaseModel):
 
         stream, yaml = StringIO(), YAML()
         yaml.default_flow_style = False
-        said = self.model_dump(mode="json", exclude_none=True)
-        if self.performance == TestedFiles():
-            del said["performance"]
-        yaml.dump(said, stream)
+        yaml.dump(self.model_dump(mode="json", exclude_none=True), stream)
         return str(stream.getvalue())

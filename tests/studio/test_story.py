@@ -52,7 +52,7 @@ class Person:
     def write(self, label: str, text: str) -> None:
         """Type into the field behind a label; what is typed is taken a little later."""
         places = self.page.locator(f"xpath=//*[normalize-space(text())='{label}']").locator("visible=true")
-        places.locator("xpath=following::input[1]").fill(text)
+        places.first.locator("xpath=following::input[1]").fill(text)
 
     def wait_for(self, text: str) -> None:
         self.page.get_by_text(text).first.wait_for()

@@ -1,4 +1,4 @@
-"""The page as it is served: viser's, and what a browser without WebGL needs to show more than nothing."""
+"""The page as it is served: viser's, with tabs in one row, and what a browser without WebGL needs to show anything."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from websockets.http11 import Response
 
 _SCRIPT: Final = Path(__file__).with_name("without_webgl.js")
 _BEFORE: Final = b"<head>"
+#: The tabs of all pages stand in one row.
+_STYLE: Final = b"<style>[role=tab] { padding-left: 6px !important; padding-right: 6px !important }</style>"
 
 
 def complete(response: Response) -> None:
@@ -29,5 +31,5 @@ def _completed(body: bytes, packed: bool) -> bytes:
     if not found:
         return body
     title = rest.replace(b"<title>Viser</title>", b"<title>truearm studio</title>", 1)
-    whole = head + found + b"\n<script>\n" + _SCRIPT.read_bytes() + b"</script>" + title
+    whole = head + found + b"\n<script>\n" + _SCRIPT.read_bytes() + b"</script>" + _STYLE + title
     return gzip.compress(whole) if packed else whole

@@ -74,6 +74,13 @@ def test_boxes_are_rows_a_plain_file_and_in_the_scene(studio: Studio) -> None:
     assert read_yaml(file, Constraints).clearance is None
     window.edit(robot="ur5e")
     assert len(drawn(studio, "boxes")) == 4
+    for _ in range(3):
+        window._undo_edit()
+    assert list(boxes._rows) == ["box_2", "table"]
+    window._undo_edit()
+    assert sorted(boxes._rows) == ["box_1", "box_2"]
+    for _ in range(4):
+        window._redo_edit()
     typed(studio, boxes._file, "(none)")
     assert drawn(studio, "boxes") == []
     assert boxes._rows == {}
@@ -163,11 +170,12 @@ def test_base_targets_and_fixtures_go_into_a_robot_file_of_the_project(studio: S
     assert "of this name already" in places._rows["nest"].said.content
     typed(studio, places._rows["target_1"].name, "a\tb")
     assert places._rows["target_1"].said.content != ""
-    window._undo_edit()
-    assert window.project.settings.robot == "irb120"
+    while window.project.settings.robot != "irb120":
+        window._undo_edit()
     assert places._rows == {}
-    typed(studio, places._base, (1.0, 0.0, 0.0))
-    assert window.project.settings.robot == "irb120-cell-2.yaml"
+    assert not (folder / "irb120-cell.yaml").exists()
+    window._redo_edit()
+    assert load_robot(folder / "irb120-cell.yaml").base.translation == pytest.approx((2.0, 0.0, 0.5))
 
 
 def test_things_are_put_where_they_were_and_only_what_is_meant_changes() -> None:

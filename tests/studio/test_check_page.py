@@ -136,6 +136,21 @@ def test_a_calibration_is_without_what_is_excluded_and_says_so(
     assert "other readings than those that are excluded now" in proof._notices.content
 
 
+def test_where_nothing_is_wrong_nothing_is_drawn_before_it_is_asked_for(window: Window) -> None:
+    page, jog = page_of(window)
+    (window.project.folder / "data.csv").write_text(csv_text(DATA))
+    act(page._run)
+    assert (page._finding.value, page._draws.value) == ("(any reading)", False)
+    assert jog.scene._parts.get("readings", []) == []
+    act(page._draws, True)
+    assert len(jog.scene._parts["readings"][0].points) == len(DATA.position) - 1
+    page._reason._impl.value = "beam broken"
+    act(page._exclude)
+    window.edit(robot="irb1600")
+    assert not page._readings.visible
+    assert jog.scene._parts["excluded"] == []
+
+
 def test_readings_without_a_place_are_chosen_and_not_drawn() -> None:
     readings = (("1", "a"), ("1", "b"), ("2", "a"))
     found = Checked(Outcome(()), (), readings, np.full((3, 3), np.nan), np.zeros((3, 6)))

@@ -182,3 +182,7 @@ def test_a_pose_that_is_dragged_to_is_met_without_a_leap(name: str, elastic: boo
     with pytest.raises(InputError, match="cannot go to this pose"):
         arm.drag_to(far, R[0])
     assert arm.pose("world")[0] == pytest.approx(p[0], abs=1e-8)
+
+
+def test_an_arm_without_any_length_is_singular_everywhere() -> None:
+    assert Jogging(POINT).singular_value() == 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -73,6 +74,9 @@ def test_a_program_is_drawn_before_and_after_its_correction(
     act(space._go)
     row = drawn.names.index("pHole12, line 20")
     assert jog.jogging.joints == pytest.approx(correction.joints[row], abs=1e-5)
+    space.take(replace(drawn, meant=np.full_like(drawn.meant, np.nan)))
+    assert "No target was corrected." in space._said.content
+    assert jog.scene._parts["program-errors"] == []
     window.edit(program=None)
     assert not space.place.visible
     assert all(jog.scene._parts[name] == [] for name in ("program-way", "program-targets", "program-errors"))

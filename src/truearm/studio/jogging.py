@@ -83,6 +83,8 @@ class Jogging:
         self.joints: Array = np.clip(joints if fits and joints is not None else _start(robot), self.low, self.high)
         self._angles = np.zeros((1, 3))
         self._bent: Postures | None = None
+        self._pose: tuple[Postures, str | None, Array, Array] | None = None
+        self._reaches: dict[str | None, float] = {}
 
     @property
     def at(self) -> Postures:
@@ -158,8 +160,15 @@ class Jogging:
 
     def pose(self, frame: JogFrame = "base") -> tuple[Array, Array]:
         """Return the tip's position ``(3,)`` [m] and rotation ``(3, 3)`` in the base or the world."""
-        p, R = self.robot.forward(self.at, frame="world" if frame == "world" else "base", target=self.tip)
-        return p[0], R[0]
+        at, known = self.at, self._pose
+        if known is None or known[0] is not at or known[1] != self.tip:
+            p, R = self.robot.forward(at, frame="world", target=self.tip)
+            known = self._pose = (at, self.tip, p[0], R[0])
+        _, _, position, rotation = known
+        if frame == "world":
+            return position, rotation
+        base = self.robot.base
+        return (position - np.array(base.translation)) @ base.rotation, base.rotation.T @ rotation
 
     def pose_numbers(self, frame: JogFrame) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return x, y, z [mm] and turns about the fixed axes x, y and z, one after the other [deg].
@@ -226,7 +235,7 @@ class Jogging:
     def _near(self, position: Array, rotation: Array) -> bool:
         """Go to a pose in the world by steps from where the arm is; return whether that was possible."""
         x, y, z = rotation.T[:, :, None]
-        length = reach(self.robot, self.tip)
+        length = self._reach()
         task = PoseTask(self.robot, self.tip, self.orientation, position[:, None], (x, y, z), length)
         pool = Candidates(task, self.joints[None], None)
         pool.add(np.zeros(1, np.intp), self.robot.variables(self.at, self.robot.values)[: len(self.joints)].T)
@@ -277,7 +286,10 @@ class Jogging:
         It is 0 in a singular posture, and as ``ik`` has it for a whole pose.
         """
         jacobian = self.robot.joint_jacobian(self.at, self.tip)[0].copy()
-        jacobian[:3] /= reach(self.robot, self.tip)
+        length = self._reach()
+        if length == 0.0:  # all in one point: nothing moves it
+            return 0.0
+        jacobian[:3] /= length
         if self.orientation == "free":
             jacobian = jacobian[:3]
         elif self.orientation == "axis":
@@ -296,6 +308,11 @@ class Jogging:
         near = ", near a singular posture" if value < NEAR_SINGULAR else ""
         told.append(f"Smallest singular value: {value:.4f}{near}.")
         return told
+
+    def _reach(self) -> float:
+        if self.tip not in self._reaches:
+            self._reaches[self.tip] = reach(self.robot, self.tip)
+        return self._reaches[self.tip]
 
     def _controller(self) -> Controller | None:
         return counting(self.robot, self.whose)

@@ -29,6 +29,10 @@ Colours = NDArray[np.uint8] | Colour
 _SOLID: Final[tuple[Colour, Colour]] = ((222, 225, 230), (84, 96, 114))
 _GHOST: Final[tuple[Colour, Colour]] = ((70, 130, 180), (40, 90, 140))
 _SEE_THROUGH: Final = 0.35
+#: Light from above and from below, and how strong it is.
+_SKY: Final[Colour] = (255, 255, 255)
+_GROUND: Final[Colour] = (150, 155, 165)
+_ALL_ROUND, _SIDEWAYS = 2.1, 0.7
 _BOX: Final[Colour] = (214, 140, 60)
 _FIXTURE: Final[Colour] = (46, 139, 87)
 #: Lines of the floor on white, and on dark grey.
@@ -113,6 +117,7 @@ class Scene:
         self._server, self._scene = server, server.scene
         self._scene.set_up_direction("+z")
         self._scene.world_axes.visible = False
+        self._light()
         self.solid: DrawnRobot | None = None
         self.ghost: DrawnRobot | None = None
         self.joints: Array = np.zeros(0)
@@ -175,6 +180,7 @@ class Scene:
             for robot in (self.solid, self.ghost):
                 if robot is not None:
                     robot.move(at if robot.robot is of else at.joints)
+        self._server.flush()  # it would wait for others
 
     def show_tip(self, position: Array, rotation: Array) -> None:
         """Show the frame of the tip that is moved, in the world [m]."""
@@ -368,6 +374,12 @@ class Scene:
         look = np.array(base.translation) + base.rotation @ (self.length * np.array([0.02, -0.05, 0.08]))
         look += base.rotation @ np.array([0.0, 0.0, 0.6 * self.solid.floor])
         self._look_at(look, look + base.rotation @ (self.length * np.array([0.85, -1.15, 0.6])))
+
+    def _light(self) -> None:
+        """Light the scene from above and all around: viser's picture of a room costs a slow computer half a minute."""
+        self._scene.configure_environment_map(None)
+        self._scene.add_light_hemisphere("/light/sky", sky_color=_SKY, ground_color=_GROUND, intensity=_ALL_ROUND)
+        self._scene.add_light_directional("/light/side", intensity=_SIDEWAYS, position=(1.0, -2.0, 0.6))
 
     def _look_at(self, look: Array, place: Array) -> None:
         """Say from where windows look at first; those that are open follow the robot to another place."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import viser
+from viser._messages import FileTransferPartAck, RemoveNotificationMessage
 from websockets.asyncio.server import ServerConnection
 
 from truearm.errors import InputError
@@ -23,7 +24,9 @@ from truearm.studio import words
 from truearm.studio.gate import Gate
 from truearm.studio.page import Page
 from truearm.studio.project import Project
-from truearm.studio.work import Work
+from truearm.studio.uploads import Upload
+from truearm.studio.values import fits
+from truearm.studio.work import Work, unforeseen
 from truearm.writing import put_back_old
 
 #: So much of what was said stays to be read.
@@ -68,6 +71,8 @@ class Window:
         self._theme()
         self._frame(pages)
         gate.blocked = self._say_blocked
+        gate.uploads.told = self._say_came
+        gate.fits = self._fits
         gate.say = lambda text: self.tell(Notice("refused", text.removeprefix("refused: "), "warning"))
         server.on_client_connect(self._arrived)
         server.on_client_disconnect(self._gone)
@@ -83,16 +88,37 @@ class Window:
         """
 
         def called(event: Any) -> None:
-            if getattr(event, "client", None) is None:
-                return
-            with self.lock, confined_reads(self.project.folder):
-                try:
-                    do()
-                except InputError as error:
-                    self.refuse(error)
-                    self.refresh()
+            if getattr(event, "client", None) is not None:
+                self._do(do)
 
         return called
+
+    def _do(self, do: Callable[[], None]) -> None:
+        with self.lock, confined_reads(self.project.folder):
+            try:
+                do()
+            except InputError as error:
+                self.refuse(error)
+                self.refresh()
+            except Exception as error:  # it is told, and its place is on standard error
+                self.refuse(unforeseen(error))
+
+    def receive(self, button: Any, do: Callable[[Upload], None]) -> None:
+        """Let a button for uploads take in files: `do` is called as by :meth:`action`, with each that has come whole.
+
+        A file that `do` leaves where it has come is removed.
+        """
+
+        def take(upload: Upload) -> None:
+            try:
+                self._do(lambda: do(upload))
+            finally:
+                upload.discard()
+
+        def begin(upload: Upload) -> None:
+            threading.Thread(target=take, args=(upload,), daemon=True).start()
+
+        self.gate.uploads.takers[button._impl.uuid] = begin
 
     def settled(self, do: Callable[[], None]) -> Callable[[Any], None]:
         """Return a callback as :meth:`action` does, for a text that somebody types: it waits for the typing to rest."""
@@ -271,6 +297,7 @@ class Window:
         if self._work is not None:
             self._work.cancel()
         self.server.stop()
+        self.gate.uploads.stop()
 
     # The frame ---------------------------------------------------------------------------------------------------
 
@@ -391,3 +418,17 @@ class Window:
         for client, mine in [*self._windows.values()]:
             if mine is connection:
                 client.add_notification("Refused", why, color="orange", auto_close_seconds=10)
+
+    def _fits(self, number: str, value: object) -> bool:
+        element = self.gui._gui_input_handle_from_uuid.get(number)
+        return element is None or fits(element, value)  # viser drops what is for an element that is gone
+
+    def _say_came(self, connection: object, number: str, element: str, upload: Upload | None) -> None:
+        """Tell a window how much of its file has come; None lets it forget the file."""
+        came, size = (0, 0) if upload is None else (upload.came, upload.size)
+        for client, mine in [*self._windows.values()]:
+            if mine is connection:
+                line = client.gui._websock_interface
+                line.queue_message(FileTransferPartAck(element, number, came, size))
+                if upload is None:
+                    line.queue_message(RemoveNotificationMessage(f"upload-{number}"))

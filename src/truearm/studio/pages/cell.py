@@ -14,6 +14,7 @@ from truearm.studio.pages.cell_places import CellPlaces
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.scene import Scene
+from truearm.studio.uploads import Upload
 from truearm.studio.window import Window
 
 
@@ -40,7 +41,7 @@ class CellPage:
         self._robot.on_update(window.action(lambda: window.edit(robot=self._robot.value)))
         self._meshes.on_update(window.action(lambda: window.edit(meshes=chosen(self._meshes))))
         self._payload.on_update(window.settled(self._weigh))
-        self._upload.on_upload(window.action(self._take_in))
+        window.receive(self._upload, self._take_in)
 
     def refresh(self) -> None:
         """Show the robot of the settings, what stands around it, and the files of the folder."""
@@ -68,8 +69,7 @@ class CellPage:
     def _scene(self) -> Scene:
         return next(page.scene for page in self._window.pages if isinstance(page, JogPage))
 
-    def _take_in(self) -> None:
-        file = self._upload.value
-        name = self._window.project.take_in(file.name, file.content)
-        self._window.tell_lines(f"Taken into the project: {name}", [f"{len(file.content)} bytes"])
+    def _take_in(self, file: Upload) -> None:
+        name = self._window.project.take_in(file.name, file.path)
+        self._window.tell_lines(f"Taken into the project: {name}", [f"{file.size} bytes"])
         self._window.refresh()

@@ -15,7 +15,6 @@ from truearm.studio.cell_rules import CellRules, changed_rules, read_rules, with
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.fields import Fields
 from truearm.studio.window import Window
-from truearm.writing import write_text
 
 #: The file that is written where none is chosen.
 CONSTRAINTS: Final = "cell-constraints.yaml"
@@ -147,10 +146,7 @@ class CellBoxes:
         path = window.project.path(name)
         self._refuse_changed(path)
         rules = changed_rules(path, window.robot(), change)
-        write_text(path, rules.text)
-        window.project.look(name)
-        window.edit(constraints=name)
-        window.refresh()
+        window.edit(files={name: rules.text}, constraints=name)
 
     def _refuse_changed(self, path: Path) -> None:
         known = None if self._rules is None else self._rules.text

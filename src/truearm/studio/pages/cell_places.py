@@ -23,7 +23,6 @@ from truearm.studio.cell_places import (
     with_thing,
 )
 from truearm.studio.window import Window
-from truearm.writing import write_text
 
 #: Where a new fixture stands [mm], and how far beside it the next one.
 _FIRST, _ASIDE = (500.0, -300.0, 0.0), 100.0
@@ -152,11 +151,8 @@ class CellPlaces:
                 where=name,
                 cure="Edit it yourself, or give it a name that does not end in -cell.yaml.",
             )
-        write_text(path, text)
-        window.project.look(name)
         looks = settings.meshes if urdf_source(settings.robot) is None else settings.robot
-        window.edit(robot=name, meshes=looks)
-        window.refresh()
+        window.edit(files={name: text}, robot=name, meshes=looks)
 
 
 def _show(element: Any, value: Any) -> None:

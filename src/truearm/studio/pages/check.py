@@ -21,6 +21,8 @@ from truearm.studio.window import Window
 #: What is chosen instead of a finding, and instead of a reading.
 _ANY: Final = "(any reading)"
 _ALL: Final = "(all of them)"
+#: So many readings are offered at most.
+_LISTED: Final = 2000
 #: The file of excluded readings, where none is chosen.
 _FILE: Final = "excluded.csv"
 #: How other readings, chosen ones and excluded ones are drawn: name, colour, and size by the length of the arm.
@@ -105,6 +107,7 @@ class CheckPage:
             self._found.content = shown + words.lines(rest)
             names = (_ANY, *(_name(number, one) for number, one in enumerate(found.findings, 1) if one.at))
             offer(self._finding, names, names[1] if len(names) > 1 else _ANY, None)
+            self._draws.value = len(names) > 1  # where nothing is wrong, nothing stands in the way
             self._choose()
 
         window.start(
@@ -122,7 +125,7 @@ class CheckPage:
         found = self._checked
         if found is None:
             return
-        named = self._named(found)
+        named = self._named(found)[:_LISTED]
         every = () if self._finding.value == _ANY else (_ALL,)
         names = [*every, *(_reading(*found.readings[k]) for k in named)]
         offer(self._reading, dict.fromkeys(names), next(iter(names), _ALL), None)
@@ -170,7 +173,9 @@ class CheckPage:
         unseen = len(rows) - len(_seen(points[rows]))
         told = f"{counted(len(rows), 'reading')} chosen: red in the scene; excluded ones are orange, all others grey."
         self._drawn.content = words.paragraph(
-            told + (f" {unseen} of them have no place in the instrument's frame, and are not drawn." if unseen else "")
+            told
+            + (f" The first {_LISTED} can be chosen here." if len(self._named(found)) > _LISTED else "")
+            + (f" {unseen} of them have no place in the instrument's frame, and are not drawn." if unseen else "")
         )
 
     def _go(self) -> None:

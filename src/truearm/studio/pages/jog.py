@@ -33,6 +33,8 @@ _NEAREST: Final = "nearest"
 _WHOSE: Final = ("controller", "model")
 #: Of a motion that is played, a picture so often [s].
 _PICTURE: Final = 0.04
+#: Ends of a slider that differ by less are the same [deg or mm].
+_ROUNDING: Final = 1e-6
 _SAFE: Final = "This moves a drawing. No real robot is connected to this window, and none moves."
 
 
@@ -252,7 +254,7 @@ class JogPage:
                 self._handle.position, self._handle.wxyz = position, quaternion_from_rotation(rotation)
             for slider, number, (low, high) in zip(self._sliders, arm.numbers, arm.ranges(), strict=True):
                 high = max(high, low + 0.01)
-                if slider.min != low or slider.max != high:
+                if abs(slider.min - low) > _ROUNDING or abs(slider.max - high) > _ROUNDING:
                     slider.min, slider.max = min(low, slider.value), max(high, slider.value)
                     slider.value = min(max(number, low), high)
                     slider.min, slider.max = low, high

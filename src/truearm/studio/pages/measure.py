@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import traceback
 from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
@@ -22,6 +21,7 @@ from truearm.studio.pages.measured_with import MeasuredWith
 from truearm.studio.pages.measuring_scene import MeasuringScene
 from truearm.studio.pictures import Picture
 from truearm.studio.window import Window
+from truearm.studio.work import unforeseen
 
 #: So often a source is asked [s], and in every so manyth of these turns the pictures are drawn anew.
 _TURN: Final = 0.2
@@ -176,10 +176,7 @@ class MeasurePage:
                     self._given_up(error)
                     return
                 except Exception as error:  # it is told, and its place is on standard error
-                    traceback.print_exc()
-                    what = f"this failed in an unforeseen way ({type(error).__name__}: {error})"
-                    cure = "Run 'truearm measure' on the same files, and report what it says."
-                    self._given_up(InputError(what, cure=cure))
+                    self._given_up(unforeseen(error))
                     return
             self._window.rest(_TURN)
 
@@ -213,7 +210,11 @@ class MeasurePage:
     def _finish(self) -> None:
         """Write what is there, choose it as the project's measurements, and end."""
         measuring = self._going()
-        measuring.with_what_is_said_now()
+        try:
+            measuring.with_what_is_said_now()
+        except InputError:
+            self._close()
+            raise
         self._hand_over(measuring)
         self._close()
         self._window.refresh()

@@ -77,8 +77,9 @@ class PlanPage:
         self._download = gui.add_button("Download the file", visible=False)
         with gui.add_folder("In the scene"):
             self._cloud: Any = gui.add_checkbox("Predicted error", True, hint="and the chosen configurations, red")
+            self._scale = gui.add_html("", visible=False)
             self._among: Any = gui.add_checkbox(
-                "Candidates", False, hint="where the flange is at those that are usable"
+                "All candidates", False, hint="where the flange is at those that are usable"
             )
             self._speed: Any = gui.add_number("Speed [deg/s, mm/s]", 60.0, min=0.1, max=1000.0, step=1.0)
             self._tour: Any = gui.add_button_group("Ways", ("drive", "stop"))
@@ -142,6 +143,7 @@ class PlanPage:
 
     def _draw(self) -> None:
         scene = self._jog().scene
+        self._scale.visible = False
         found = self._planned if self._of == self._window.project.settings.robot else None
         files = self._written()
         for name in ("predicted", "chosen", "candidates"):
@@ -157,6 +159,8 @@ class PlanPage:
         if self._cloud.value:
             if found is not None:
                 low, high = float(found.errors.min()), float(found.errors.max())
+                told = f"From {1e3 * low:.3g} mm (dark) to {1e3 * high:.3g} mm (light); chosen configurations are red."
+                self._scale.content, self._scale.visible = words.paragraph(told), True
                 scene.show_points("predicted", in_world(found.places), coloured(found.errors, low, high))
                 scene.show_points("chosen", in_world(found.chosen), _CHOSEN)
             elif self._table() in files:

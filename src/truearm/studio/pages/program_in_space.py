@@ -86,6 +86,9 @@ class ProgramInSpace:
             told = "The program as the controller takes it to be. Correct it to see where the real robot goes with it."
             self._said.content = words.paragraph(told)
             return
+        if not np.isfinite(drawn.meant).any():
+            self._said.content = words.paragraph("No target was corrected.")
+            return
         errors = drawn.between(float(self._share.value))
         arrows = error_arrows(drawn.tips, errors, float(self._factor.value))
         scene.show_arrows("program-errors", Arrows(placed(arrows.segments), arrows.colours, arrows.words))

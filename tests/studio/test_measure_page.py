@@ -294,7 +294,7 @@ def test_rows_of_a_watched_folder_are_taken_and_broken_ones_named(page: MeasureP
     assert eventually(lambda: page.measuring is not None and len(session(page).entries) == 2)
     window = page._window
     assert eventually(lambda: "points.csv, line 3, column Y" in told(window))
-    assert "1OO" in page._notices.content
+    assert eventually(lambda: "1OO" in page._notices.content)
     with (project / "rows" / "points.csv").open("a") as stream:
         stream.write("P2,smr,410.1,100,310,0.005,0\n")
     assert eventually(lambda: len(session(page).entries) == 3)

@@ -186,6 +186,7 @@ def test_lines_of_sight_lead_to_the_targets_of_the_arm_at_the_next_configuration
     ends = [nominal.world_poses(q[None], target.name)[0][0] for target in nominal.targets]
     assert lines[:, 1] == pytest.approx(np.array(ends), abs=1e-6)
     assert "sees all of them" in page._next.content
+    assert [label.text for label in scene._parts["measured-names"]] == ["instrument", f"{step.names[0]}, next"]
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ class LinesOfSight:
     colours
         ``(n, 3)``.
     names
-        What stands at which place, ``(3,)`` each.
+        Of the instrument and of what is next, with their places ``(3,)``.
     """
 
     segments: Array
@@ -249,14 +249,15 @@ class Measuring:
             (_NEXT if asked else _OTHER) if visible else _HIDDEN
             for visible, asked in zip(seen.visible, seen.outstanding, strict=True)
         ]
-        said = [
-            f"{name}, hidden" if not visible else f"{name}, next" if asked else name
-            for name, visible, asked in zip(seen.names, seen.visible, seen.outstanding, strict=True)
-        ]
+        names = {"instrument": origin[0]}
+        step = self.campaign.session.next
+        if step is not None and step.kind == "configuration":
+            k = seen.names.index(step.names[0])  # labels of all of them would cover each other
+            names[f"{step.names[0]}, {'next' if seen.visible[k] else 'hidden'}"] = ends[k]
         return LinesOfSight(
             np.stack([np.broadcast_to(origin, ends.shape), ends], axis=1),
             np.array(colours, np.uint8),
-            {"instrument": origin[0], **dict(zip(said, ends, strict=True))},
+            names,
         )
 
 

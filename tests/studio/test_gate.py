@@ -330,3 +330,20 @@ def test_every_list_offers_texts_that_are_not_empty_as_others_would_stop_the_pag
     lists = [handle.options for handle in handles if hasattr(handle, "options")]
     assert len(lists) > 8
     assert all(isinstance(option, str) and option for options in lists for option in options)
+
+
+def test_what_is_typed_counts_for_what_is_done_next_and_what_is_refused_holds_it_up(serving: Serving) -> None:
+    studio = serving()
+    seeds: list[int] = []
+    event = type("Event", (), {"client": 1})
+    act = studio.window.action(lambda: seeds.append(studio.window.project.settings.seed))
+    studio.window.settled(lambda: studio.window.edit(seed=7))(event)
+    act(event)
+    assert seeds == [7]
+    studio.window.settled(lambda: studio.window.edit(seed=-1))(event)
+    act(event)
+    assert seeds == [7]
+    act(event)
+    assert seeds == [7, 7]
+    studio.window.settled(lambda: studio.window.edit(seed=8))(event)
+    assert eventually(lambda: studio.window.project.settings.seed == 8)  # after a little rest

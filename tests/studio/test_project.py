@@ -6,13 +6,15 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.killing import killed, leftovers, operations
 
 from truearm.errors import InputError
 from truearm.files import confined_reads, read_bytes, read_yaml
-from truearm.studio.project import PROJECT_FILE, Project, Settings, open_project
+from truearm.studio.project import PROJECT_FILE, Project, open_project
+from truearm.studio.settings import Settings
 
 
 @pytest.fixture
@@ -82,6 +84,26 @@ def test_edits_are_on_disk_at_once_and_undone_and_done_again(project: Project) -
     assert not project.redoable
 
 
+def test_small_files_of_an_edit_are_undone_with_it(project: Project) -> None:
+    file = project.folder / "excluded.csv"
+    assert project.edit({"excluded.csv": "one\n"}, exclude="excluded.csv")
+    assert not project.edit({"excluded.csv": "one\n"}, exclude="excluded.csv")
+    assert project.edit({"excluded.csv": "two\n"})
+    project.undo()
+    assert (file.read_text(), project.settings.exclude) == ("one\n", "excluded.csv")
+    project.undo()
+    assert (file.exists(), project.settings.exclude) == (False, None)
+    project.redo()
+    assert (file.read_text(), project.settings.exclude) == ("one\n", "excluded.csv")
+    assert project.changes() == ()
+    (project.folder / PROJECT_FILE).write_text("truearm: truearm-studio/1\n")
+    with pytest.raises(InputError, match="another program has changed this file"):
+        project.edit({"excluded.csv": "three\n"}, exclude=None)
+    assert file.read_text() == "one\n"
+    with pytest.raises(InputError, match="no place in the project"):
+        project.edit({"../excluded.csv": "three\n"})
+
+
 @pytest.mark.parametrize(
     "changes",
     [
@@ -90,6 +112,9 @@ def test_edits_are_on_disk_at_once_and_undone_and_done_again(project: Project) -
         {"result": "a/../../b"},
         {"cell": "..\\..\\b"},
         {"corrected": "C:\\x"},
+        {"exclude": "../a.csv"},
+        {"performance": {"plan": "/a.yaml"}},
+        {"performance": {"noise_mm": 0}},
         {"robot": "a\x1bb.yaml"},
         {"train": 0},
         {"seed": "x"},
@@ -97,7 +122,7 @@ def test_edits_are_on_disk_at_once_and_undone_and_done_again(project: Project) -
         {"model": ""},
     ],
 )
-def test_settings_that_cannot_be_are_refused_and_change_nothing(project: Project, changes: dict[str, object]) -> None:
+def test_settings_that_cannot_be_are_refused_and_change_nothing(project: Project, changes: dict[str, Any]) -> None:
     before = (project.folder / PROJECT_FILE).read_bytes()
     with pytest.raises(InputError):
         project.edit(**changes)

@@ -177,7 +177,7 @@ def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyP
         assert (folder / "result" / name).read_bytes() == (tmp_path / "by-command" / name).read_bytes(), name
 
     person.turn_to("Proof")
-    person.page.locator(".js-plotly-plot").first.wait_for()
+    person.page.locator(".js-plotly-plot").locator("visible=true").first.wait_for()
     result = json.loads((folder / "result" / "result.json").read_text())
     said = person.shown()
     for part in ("nominal", "validation", "train"):
@@ -216,8 +216,14 @@ def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyP
     person.turn_to("Programs")
     person.press("Correct the program")
     person.wait_for("Written to result/corrected: ")
+    person.wait_for("Where the calibrated robot goes with the original and with the corrected program: ")
     person.picture("programs")
     assert (folder / "result/corrected/plate.mod").read_bytes() == (folder / "corrected/plate.mod").read_bytes()
+
+    person.turn_to("Performance")
+    person.press("Evaluate the tests")
+    person.wait_for("no plan is chosen")
+    person.picture("performance", _SIZES)
 
     person.press("light / dark")
     for page in person.studio.window.pages:

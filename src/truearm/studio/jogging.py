@@ -13,6 +13,7 @@ from truearm.jobs.inverse import inverse
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import Controller, JointsOf
 from truearm.modeling.formats.joint_columns import counting
+from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.inverse.candidates import REACHED, Candidates
 from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
 from truearm.modeling.inverse.pose_solver import Orientation, PoseTask
@@ -31,6 +32,9 @@ _FREEDOM: Final[dict[int, Orientation]] = {3: "free", 4: "free", 5: "axis"}
 _ROUNDING: Final = 1e-9
 #: A pose that is dragged to may turn a joint by so much in one step [rad or m]; further away all branches are tried.
 _A_LITTLE: Final = 0.3
+#: Where branches have no names: from so many postures others are looked for, so many are offered, and two differ by so
+#: much in a joint [rad or m].
+_SEEDS, _MOST, _APART = 48, 8, 0.35
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,19 +250,35 @@ class Jogging:
         return False
 
     def branches(self) -> list[Branch]:
-        """Return all ways to the pose where the tip is now.
+        """Return the ways to the pose where the tip is now.
 
-        Raises
-        ------
-        InputError
-            If the branches of the arm have no names.
+        Of an arm whose branches have names these are all. Of any other arm they are what is found from many postures,
+        the nearest first: some of endlessly many, where the arm has more joints than the pose needs.
         """
         p, R = self.pose()
-        found = inverse(self.robot, p[None], R[None], target=self.tip, branch="all", seed=self.joints).solutions
-        return [
-            Branch(name, joints, status)
-            for name, joints, status in zip(found.branch, found.joints, found.status, strict=True)
-        ]
+        if self.orientation == "full" and branch_rule(self.robot) is not None:
+            found = inverse(self.robot, p[None], R[None], target=self.tip, branch="all", seed=self.joints).solutions
+            return [
+                Branch(name, joints, status)
+                for name, joints, status in zip(found.branch, found.joints, found.status, strict=True)
+            ]
+        seeds = self.robot.random_configurations(_SEEDS, np.random.default_rng(0))
+        count = len(seeds)
+        found = inverse(
+            self.robot,
+            np.repeat(p[None], count, axis=0),
+            None if self.orientation == "free" else np.repeat(R[None], count, axis=0),
+            target=self.tip,
+            seed=seeds,
+            orientation=self.orientation,
+        ).solutions
+        far = np.abs(found.joints - self.joints).max(axis=1)
+        kept: list[int] = []
+        for k in np.argsort(far, kind="stable").tolist():
+            others = [self.joints, *(found.joints[other] for other in kept)]
+            if found.usable[k] and all(np.abs(found.joints[k] - other).max() > _APART for other in others):
+                kept.append(k)
+        return [Branch(f"posture {n}", found.joints[k], found.status[k]) for n, k in enumerate(kept[:_MOST], 1)]
 
     def singular_value(self) -> float:
         """Return how little the tip moves with a joint motion of norm 1, positions in reach lengths.
@@ -266,7 +286,10 @@ class Jogging:
         It is 0 in a singular posture, and as ``ik`` has it for a whole pose.
         """
         jacobian = self.robot.joint_jacobian(self.at, self.tip)[0].copy()
-        jacobian[:3] /= self._reach()
+        length = self._reach()
+        if length == 0.0:  # all in one point: nothing moves it
+            return 0.0
+        jacobian[:3] /= length
         if self.orientation == "free":
             jacobian = jacobian[:3]
         elif self.orientation == "axis":

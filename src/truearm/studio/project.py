@@ -7,87 +7,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from filecmp import cmp
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, Final, Literal
-
-from pydantic import BaseModel, ConfigDict, Field
+from typing import Any, Final, Literal
 
 from truearm.errors import InputError, refusals_at, refusals_of
-from truearm.files import exists, path_argument, read_yaml
+from truearm.files import exists, path_argument, read_text, read_yaml
 from truearm.limits import refuse_beyond
 from truearm.manifest import MANIFEST, hash_of
 from truearm.printable import is_one_line
 from truearm.schemas import validated
+from truearm.studio.settings import Settings
 from truearm.studio.uploads import clear_uploads
-from truearm.writing import put_back_old, put_in_place, writable_folder, write_text_over
+from truearm.writing import put_back_old, put_in_place, writable_folder, write_text, write_text_over
 
 #: What makes a folder a project.
 PROJECT_FILE: Final = "truearm-studio.yaml"
 #: So many edits can be undone.
 _KEPT: Final = 100
-
-_Name = Annotated[str, Field(min_length=1)]
-
-
-class Settings(BaseModel):
-    """Schema ``truearm-studio/1``: what the studio's pages say.
-
-    Attributes
-    ----------
-    robot
-        A library id, or a file of the folder.
-    data
-        File of measurements; None for none yet.
-    payload
-        What the robot carried, as a text such as ``2.7kg,50mm,25mm,100mm``.
-    model, train, loss, seed
-        As for :func:`truearm.calibrate`.
-    result
-        Folder of the calibration's results, in the project's.
-    program
-        File of a robot program.
-    cell
-        File that says where tools and frames are; None for what the program says.
-    taught
-        As for :func:`truearm.compensate`; None if that was not said.
-    controller_kinematics
-        Likewise.
-    corrected
-        Folder of the corrected program.
-    dark
-        Whether the window is dark.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    truearm: Literal["truearm-studio/1"] = "truearm-studio/1"
-    robot: _Name = "irb120"
-    data: _Name | None = None
-    payload: _Name | None = None
-    model: _Name = "geometric"
-    train: Annotated[int, Field(strict=True, ge=1)] | Literal["all"] | None = None
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
-    loss: _Name = "linear"
-    result: _Name = "result"
-    program: _Name | None = None
-    cell: _Name | None = None
-    taught: tuple[_Name, ...] | None = None
-    controller_kinematics: _Name | None = None
-    corrected: _Name = "result/corrected"
-    dark: bool = False
-
-    def text(self) -> str:
-        """Return the file."""
-        from ruamel.yaml import YAML
-        from ruamel.yaml.compat import StringIO
-
-        stream, yaml = StringIO(), YAML()
-        yaml.default_flow_style = False
-        said = {name: list(value) if isinstance(value, tuple) else value for name, value in self if value is not None}
-        yaml.dump(said, stream)
-        return str(stream.getvalue())
-
-
-#: Settings that name a file of the folder, or a folder in it.
-_PATHS: Final = ("data", "result", "program", "cell", "corrected")
+#: Settings that name a file of the folder, or a folder in it; those of the tests.
+_PATHS: Final = ("data", "exclude", "result", "program", "cell", "corrected", "constraints", "path", "meshes")
+_TESTED: Final = ("plan", "poses", "paths", "settling", "forces", "alignment", "compare", "result")
 
 
 @dataclass(frozen=True)
@@ -104,6 +42,20 @@ class ChangedFile:
 
     name: str
     how: Literal["changed", "new", "gone"]
+
+
+@dataclass(frozen=True)
+class _Edit:
+    """What an edit changes: settings, and the texts of files by their names, None where there is none."""
+
+    settings_before: Settings
+    settings: Settings
+    files_before: Mapping[str, str | None]
+    files: Mapping[str, str | None]
+
+    def back(self) -> _Edit:
+        """Return the edit that takes it back."""
+        return _Edit(self.settings, self.settings_before, self.files, self.files_before)
 
 
 class Project:
@@ -126,8 +78,8 @@ class Project:
 
     def __init__(self, folder: Path, settings: Settings, written: str | None) -> None:
         self.folder, self.settings = folder, settings
-        self._undone: list[Settings] = []
-        self._before: list[Settings] = []
+        self._undone: list[_Edit] = []
+        self._before: list[_Edit] = []
         self._written = written
         self._seen = self._stamps()
 
@@ -171,23 +123,29 @@ class Project:
         name = getattr(self.settings, setting)
         return None if name is None else self.path(name, setting)
 
-    def edit(self, **changes: Any) -> bool:
+    def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> bool:
         """Change settings and write the file; return whether anything changed.
+
+        Parameters
+        ----------
+        files
+            Texts of other small files of the project that are part of the edit, by their names: they are undone too.
 
         Raises
         ------
         InputError
-            For a value that cannot be, or if another program has changed the file: it is not overwritten.
+            For a value that cannot be, or if another program has changed a file: it is not overwritten.
         """
         content = {**self.settings.model_dump(mode="json"), **changes}
         new = validated(content, Settings, PROJECT_FILE)
         _check_paths(self, new)
-        if new == self.settings:
+        before = {name: self._text_of(name) for name in files or {}}
+        edit = _Edit(self.settings, new, before, dict(files or {}))
+        if new == self.settings and edit.files == before:
             return False
-        self._write(new)
-        self._before = [*self._before, self.settings][-_KEPT:]
+        self._make(edit)
+        self._before = [*self._before, edit][-_KEPT:]
         self._undone.clear()
-        self.settings = new
         return True
 
     @property
@@ -203,16 +161,14 @@ class Project:
     def undo(self) -> None:
         """Take back the last edit of the settings; nothing if there is none."""
         if self._before:
-            self._write(self._before[-1])
-            self._undone.append(self.settings)
-            self.settings = self._before.pop()
+            self._make(self._before[-1].back())
+            self._undone.append(self._before.pop())
 
     def redo(self) -> None:
         """Do an undone edit again; nothing if there is none."""
         if self._undone:
-            self._write(self._undone[-1])
-            self._before.append(self.settings)
-            self.settings = self._undone.pop()
+            self._make(self._undone[-1])
+            self._before.append(self._undone.pop())
 
     def reload(self) -> None:
         """Take the settings from the file as it is now; edits before are no longer undone."""
@@ -277,6 +233,37 @@ class Project:
             put_in_place(came, path)
         self.look(name)
         return name
+
+    def _make(self, edit: _Edit) -> None:
+        """Write what an edit changes: files first, for the settings may name them."""
+        for name, text in edit.files_before.items():
+            if self._text_of(name) != text:
+                raise InputError(
+                    "another program has changed this file, and it is not overwritten",
+                    where=name,
+                    cure="Reload the project, and make the edit again.",
+                )
+        self._put(edit.files)
+        if edit.settings != self.settings:
+            try:
+                self._write(edit.settings)
+            except InputError:
+                self._put(edit.files_before)
+                raise
+        self.settings = edit.settings
+
+    def _put(self, files: Mapping[str, str | None]) -> None:
+        for name, text in files.items():
+            if text is None:
+                self.path(name).unlink(missing_ok=True)
+            else:
+                write_text(self.path(name), text)
+        if files:
+            self.look(*files)
+
+    def _text_of(self, name: str) -> str | None:
+        path = self.path(name)
+        return read_text(path) if exists(path) else None
 
     def _write(self, settings: Settings) -> None:
         """Write the file, unless it is not as this project has left it."""
@@ -371,6 +358,14 @@ def _check_paths(project: Project, settings: Settings) -> None:
         value = getattr(settings, name)
         if value is not None:
             project.path(value, name)
+    for name in ("candidates_from", "accurate_at", "out"):
+        value = getattr(settings.plan, name)
+        if value is not None:
+            project.path(value, name)
+    for name in _TESTED:
+        value = getattr(settings.performance, name)
+        if value is not None:
+            project.path(value, f"performance.{name}")
     if settings.robot not in library():
         project.path(settings.robot, "robot")
     if settings.controller_kinematics not in (None, "nominal", "proprietary", "unknown"):

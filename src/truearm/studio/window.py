@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -159,8 +159,8 @@ class Window:
                     taken = self._do(do) and taken
         return taken
 
-    def edit(self, **changes: Any) -> None:
-        """Change settings of the project; pages are shown anew where something changed.
+    def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> None:
+        """Change settings of the project, and small files; pages are shown anew where something changed.
 
         Raises
         ------
@@ -168,7 +168,7 @@ class Window:
             If a value cannot be.
         """
         with self.lock:
-            if self.project.edit(**changes):
+            if self.project.edit(files, **changes):
                 self.refresh()
 
     def tell(self, notice: Notice) -> None:
@@ -187,13 +187,22 @@ class Window:
             if self.gate.is_working(connection):
                 client.add_notification("Refused", text, color="red", auto_close_seconds=20)
 
-    def start(self, title: str, do: Callable[..., Any], done: Callable[[Any], None], **arguments: Any) -> None:
+    def start(
+        self,
+        title: str,
+        do: Callable[..., Any],
+        done: Callable[[Any], None],
+        told: Callable[[str], None] = lambda _: None,
+        **arguments: Any,
+    ) -> None:
         """Run a function of :mod:`truearm.studio.tasks` in a process of its own, with progress and cancel.
 
         Parameters
         ----------
         done
             Called with what it returned, under the lock.
+        told
+            Called with each word of its progress, under the lock.
 
         Raises
         ------
@@ -208,6 +217,8 @@ class Window:
 
             def said(text: str) -> None:
                 self._doing.content = words.paragraph(f"{title}: {text}")
+                with self.lock:
+                    told(text)
 
             def ended(outcome: Any) -> None:
                 with self.lock:

@@ -335,7 +335,8 @@ def test_every_list_offers_texts_that_are_not_empty_as_others_would_stop_the_pag
 def test_what_is_typed_counts_for_what_is_done_next_and_what_is_refused_holds_it_up(serving: Serving) -> None:
     studio = serving()
     seeds: list[int] = []
-    event = type("Event", (), {"client": 1})
+    field = type("Field", (), {"value": "7"})
+    event = type("Event", (), {"client": 1, "target": field})
     act = studio.window.action(lambda: seeds.append(studio.window.project.settings.seed))
     studio.window.settled(lambda: studio.window.edit(seed=7))(event)
     act(event)
@@ -347,3 +348,15 @@ def test_what_is_typed_counts_for_what_is_done_next_and_what_is_refused_holds_it
     assert seeds == [7, 7]
     studio.window.settled(lambda: studio.window.edit(seed=8))(event)
     assert eventually(lambda: studio.window.project.settings.seed == 8)  # after a little rest
+
+
+def test_fields_that_are_typed_in_one_after_the_other_are_both_taken(serving: Serving) -> None:
+    studio = serving()
+    with window(studio) as line:
+        working(studio, line)
+        calibrate = next(page for page in studio.window.pages if page.title == "Calibrate")
+        for field, text in ((calibrate._train, "12"), (calibrate._seed, "7")):  # type: ignore[attr-defined]
+            send(line, type="GuiUpdateMessage", uuid=field._impl.uuid, updates={"value": text})
+        assert eventually(
+            lambda: (studio.window.project.settings.train, studio.window.project.settings.seed) == (12, 7)
+        )

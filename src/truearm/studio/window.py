@@ -143,10 +143,15 @@ class Window:
                     self._typing.pop(key)[0].cancel()
                 timer = threading.Timer(_REST, self._typed, (key,))
                 timer.daemon = True
-                self._typing[key] = (timer, do)
+                self._typing[key] = (timer, partial(self._take_typed, event.target, event.target.value, do))
                 timer.start()
 
         return called
+
+    def _take_typed(self, field: Any, text: Any, do: Callable[[], None]) -> None:
+        """Do what follows from a text: a field typed in before may have shown all fields anew meanwhile."""
+        field.value = text
+        do()
 
     def _typed(self, *keys: object) -> bool:
         """Take what was typed; return whether nothing of it was refused."""

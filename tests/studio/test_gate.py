@@ -167,8 +167,12 @@ def test_values_of_no_kind_that_an_element_has_are_refused_and_harm_nothing(
         for uuid in [*studio.window.gui._gui_input_handle_from_uuid]:
             for value in odd:
                 send(line, type="GuiUpdateMessage", uuid=uuid, updates={"value": value})
-        send(line, type="GuiUpdateMessage", uuid=element(studio, "Robot"), updates={"value": "kr5"})
-        assert eventually(lambda: studio.window.project.settings.robot == "kr5")
+
+        def chosen() -> bool:  # numbers that a job refuses are taken before, and hold this up
+            send(line, type="GuiUpdateMessage", uuid=element(studio, "Robot"), updates={"value": "kr5"})
+            return studio.window.project.settings.robot == "kr5"
+
+        assert eventually(chosen)
         assert alive(studio)
     assert any("an element was to have a value that it cannot have" in text for text in said)
     assert "Traceback" not in capfd.readouterr().err
@@ -330,3 +334,33 @@ def test_every_list_offers_texts_that_are_not_empty_as_others_would_stop_the_pag
     lists = [handle.options for handle in handles if hasattr(handle, "options")]
     assert len(lists) > 8
     assert all(isinstance(option, str) and option for options in lists for option in options)
+
+
+def test_what_is_typed_counts_for_what_is_done_next_and_what_is_refused_holds_it_up(serving: Serving) -> None:
+    studio = serving()
+    seeds: list[int] = []
+    field = type("Field", (), {"value": "7"})
+    event = type("Event", (), {"client": 1, "target": field})
+    act = studio.window.action(lambda: seeds.append(studio.window.project.settings.seed))
+    studio.window.settled(lambda: studio.window.edit(seed=7))(event)
+    act(event)
+    assert seeds == [7]
+    studio.window.settled(lambda: studio.window.edit(seed=-1))(event)
+    act(event)
+    assert seeds == [7]
+    act(event)
+    assert seeds == [7, 7]
+    studio.window.settled(lambda: studio.window.edit(seed=8))(event)
+    assert eventually(lambda: studio.window.project.settings.seed == 8)  # after a little rest
+
+
+def test_fields_that_are_typed_in_one_after_the_other_are_both_taken(serving: Serving) -> None:
+    studio = serving()
+    with window(studio) as line:
+        working(studio, line)
+        calibrate = next(page for page in studio.window.pages if page.title == "Calibrate")
+        for field, text in ((calibrate._train, "12"), (calibrate._seed, "7")):  # type: ignore[attr-defined]
+            send(line, type="GuiUpdateMessage", uuid=field._impl.uuid, updates={"value": text})
+        assert eventually(
+            lambda: (studio.window.project.settings.train, studio.window.project.settings.seed) == (12, 7)
+        )

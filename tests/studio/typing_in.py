@@ -15,7 +15,7 @@ def typed(studio: Studio, element: Any, value: Any) -> None:
     with studio.window.lock:
         element._impl.value = value
         for callback in element._impl.update_cb:
-            callback(SimpleNamespace(client=object()))
+            callback(SimpleNamespace(client=object(), target=element))
     end = time.monotonic() + 30.0
     while any(isinstance(one, threading.Timer) for one in threading.enumerate()) and time.monotonic() < end:
         time.sleep(0.005)

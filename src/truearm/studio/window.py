@@ -66,6 +66,7 @@ class Window:
         self._windows: dict[int, tuple[viser.ClientHandle, ServerConnection]] = {}
         self._banners: dict[int, list[Any]] = {}
         self._changes: tuple[Any, ...] = ()
+        self._typing: dict[object, tuple[threading.Timer, Callable[[], None]]] = {}
         self._stopped = threading.Event()
         self.pages: list[Page] = []
         self._theme()
@@ -89,11 +90,14 @@ class Window:
 
         def called(event: Any) -> None:
             if getattr(event, "client", None) is not None:
-                self._do(do)
+                with self.lock:
+                    if self._typed(*self._typing):
+                        self._do(do)
 
         return called
 
-    def _do(self, do: Callable[[], None]) -> None:
+    def _do(self, do: Callable[[], None]) -> bool:
+        """Do something for the user, and show what is refused; return whether nothing was."""
         with self.lock, confined_reads(self.project.folder):
             try:
                 do()
@@ -102,6 +106,9 @@ class Window:
                 self.refresh()
             except Exception as error:  # it is told, and its place is on standard error
                 self.refuse(unforeseen(error))
+            else:
+                return True
+        return False
 
     def receive(self, button: Any, do: Callable[[Upload], None]) -> None:
         """Let a button for uploads take in files: `do` is called as by :meth:`action`, with each that has come whole.
@@ -121,19 +128,41 @@ class Window:
         self.gate.uploads.takers[button._impl.uuid] = begin
 
     def settled(self, do: Callable[[], None]) -> Callable[[Any], None]:
-        """Return a callback as :meth:`action` does, for a text that somebody types: it waits for the typing to rest."""
-        act, waiting = self.action(do), list[threading.Timer]()
+        """Return a callback as :meth:`action` does, for a text that somebody types.
+
+        It waits for the typing to rest, or for what is done next: that is done with what was typed, or not at all where
+        that is refused.
+        """
+        key = object()
 
         def called(event: Any) -> None:
+            if getattr(event, "client", None) is None:
+                return
             with self.lock:
-                while waiting:
-                    waiting.pop().cancel()
-                timer = threading.Timer(_REST, act, (event,))
+                if key in self._typing:
+                    self._typing.pop(key)[0].cancel()
+                timer = threading.Timer(_REST, self._typed, (key,))
                 timer.daemon = True
-                waiting.append(timer)
+                self._typing[key] = (timer, partial(self._take_typed, event.target, event.target.value, do))
                 timer.start()
 
         return called
+
+    def _take_typed(self, field: Any, text: Any, do: Callable[[], None]) -> None:
+        """Do what follows from a text: a field typed in before may have shown all fields anew meanwhile."""
+        field.value = text
+        do()
+
+    def _typed(self, *keys: object) -> bool:
+        """Take what was typed; return whether nothing of it was refused."""
+        taken = True
+        with self.lock:
+            for key in keys:
+                timer, do = self._typing.pop(key, (None, None))
+                if timer is not None and do is not None:
+                    timer.cancel()
+                    taken = self._do(do) and taken
+        return taken
 
     def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> None:
         """Change settings of the project, and small files; pages are shown anew where something changed.

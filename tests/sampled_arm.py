@@ -74,11 +74,12 @@ def sampled_room(
                 room = np.minimum(room, link.drum_behind[1][:, 2] - link.radius - cell.floor)
         for box in cell.boxes:
             near = link.radius + cell.clearance + MARGIN if k == 0 else 0.0
-            sticks_out = 0.0 if link.drum_before is None else _long(link.drum_before)
+            drum = link.drum_before
+            sticks_out = 0.0 if drum is None else _long(drum)
             p = link.points(min(near, link.long) if sticks_out <= near else 0.0, 0.0, points)
-            if 0.0 < near < sticks_out:
+            if drum is not None and 0.0 < near < sticks_out:
                 # The drum counts from what is farther out on, too.
-                p = p[:, np.linalg.norm(p - link.drum_before[0][:, None], axis=2).min(axis=0) >= near]
+                p = p[:, np.flatnonzero(np.linalg.norm(p - drum[0][:, None], axis=2).min(axis=0) >= near)]
             gap = np.linalg.norm(p - np.clip(p, box.low, box.high), axis=2).min(axis=1)
             room = np.minimum(room, gap - link.radius)
     return room

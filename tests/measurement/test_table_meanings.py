@@ -233,6 +233,8 @@ def test_joints_come_from_a_file_with_the_columns_of_the_canonical_csv(tmp_path:
         read(tmp_path, LONG, mapping, joints.replace("configuration", "pose"))
     with pytest.raises(InputError, match=r"the configuration has no joints in .*column configuration"):
         read(tmp_path, LONG, mapping, joints.replace("\nb,", "\nc,"))
+    with pytest.raises(InputError, match=r"got 'P001'.*Did you mean 1\? A pattern .* reads the number alone"):
+        read(tmp_path, LONG.replace("a", "P001"), mapping, joints.replace("\na,", "\n1,"))
     (tmp_path / "map.yaml").write_text(MAP)
     with pytest.raises(InputError, match="takes the joint positions from the table itself") as refusal:
         read_table(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)

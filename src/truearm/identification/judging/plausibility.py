@@ -140,14 +140,14 @@ def _computed(robot: Robot, data: Dataset, off: Array) -> list[Notice]:
 
 
 def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
-    words, count = [], 0
+    words, beyond = [], np.zeros(data.configurations, dtype=bool)
     for i, joint in enumerate(robot.joints):
         if joint.limits is None:
             continue
         low, high = joint.limits
         out = (data.joints[:, i] < low - _LIMIT_ROUNDING) | (data.joints[:, i] > high + _LIMIT_ROUNDING)
         if out.any():
-            count += int(out.sum())
+            beyond |= out
             unit = "deg" if joint.kind == "revolute" else "mm"
             worst = data.joints[np.argmax(np.maximum(data.joints[:, i] - high, low - data.joints[:, i])), i]
             first = data.labels[int(np.argmax(out))]
@@ -162,6 +162,7 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
             "beyond-limits",
             f"Joint positions are beyond the limits of {robot.name}: {'; '.join(words)}. Check units, joint order and "
             "the limits in the robot file.",
+            at=tuple((data.labels[c], "") for c in np.flatnonzero(beyond).tolist()),
         )
     ]
 
@@ -251,6 +252,7 @@ def _far_off(fit: Fit, data: Dataset, off: Array) -> tuple[list[Notice], list[Su
             "joints-mistaken",
             f"The {what} the joint positions of another one: {listed(words)}. Their rows were exchanged or copied: "
             "mend the joint positions, or leave them out.",
+            at=tuple((data.labels[c], "") for c in mistaken),
         )
     ], suspects
 
@@ -272,14 +274,16 @@ def _often_off(data: Dataset, off: Array) -> list[Notice]:
     read = int(np.isfinite(off).sum())
     if len(far) < max(_FEWEST_OFTEN, _OFTEN_SHARE * read):
         return []
-    where = [f"{data.labels[data.configuration[r]]}/{data.targets[data.target[r]]}" for r in far.tolist()]
+    at = tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in far.tolist())
     return [
         Notice(
             "outliers",
             f"{len(far)} of {read} readings ({len(far) / read:.0%}) are more than {_OFTEN_RATIO:g} times farther off "
-            f"than half of all, up to {float(size[far].max()) * 1e3:.2g} mm (configuration/target): {listed(where)}. "
+            f"than half of all, up to {float(size[far].max()) * 1e3:.2g} mm (configuration/target): "
+            f"{listed(['/'.join(one) for one in at])}. "
             "Errors of instruments and joints are not so uneven. Look for what these readings have in common; "
             "`loss=cauchy` lets them count little.",
+            at=at,
         )
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
@@ -405,12 +406,20 @@ def _of_rows(
     for row, label in enumerate(labels):
         if label not in index:
             near = nearest_names(label, index, 1)
+            number = re.search(r"[0-9]+$", label)
+            if number and (alone := str(int(number[0]))) in index:
+                cure = (
+                    f"Did you mean {alone}? A pattern of the mapping reads the number alone: "
+                    "names: {column: ..., pattern: '[^0-9]*0*(?P<configuration>[0-9]+)'}."
+                )
+            else:
+                cure = f"Did you mean {near[0]}?" if near else "Check joints.key, or add the row."
             raise InputError(
                 f"the configuration has no joints in {table.source}",
                 where=f"{cells.source}, line {cells.lines[row]}",
                 came=label,
                 allowed=f"a label in column {key}",
-                cure=f"Did you mean {near[0]}?" if near else "Check joints.key, or add the row.",
+                cure=cure,
             )
     return np.array([index[label] for label in labels], dtype=np.intp)
 

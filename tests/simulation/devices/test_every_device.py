@@ -395,7 +395,7 @@ def test_an_arm_that_turns_its_back_is_refused(name: str) -> None:
     rng = np.random.default_rng(0)
     twin = truth_twin(nominal("irb120"), "nominal", rng)
     refused = []
-    for turn in np.linspace(0.0, np.pi, 4, endpoint=False):
+    for turn in (0.0, np.pi / 2):
         base = Transform((2.0, 0.5, 0.0), (float(np.cos(turn)), 0.0, 0.0, float(np.sin(turn))))
         turned = replace(twin, robot=twin.robot.with_frames(base, {"1": (0.0, 0.0, 0.1)}))
         try:

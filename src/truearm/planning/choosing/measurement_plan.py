@@ -24,7 +24,7 @@ from truearm.planning.choosing.observability import INDICES, OfPredictions, obse
 from truearm.planning.choosing.ordering import short_order
 from truearm.planning.choosing.prediction import Prediction, There, model_error, predict
 from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
-from truearm.planning.constraints.constraints import Constraints, allowed
+from truearm.planning.constraints.constraints import Constraints, allowed, refuse_clearance_of
 from truearm.planning.driving.drawing import drawn_clear
 from truearm.planning.driving.joint_window import joint_window, on_principal_turn
 from truearm.planning.driving.ways import WayFinder
@@ -232,6 +232,7 @@ def plan_measurements(
     """
     _check_objective(objective, poses, accurate_at)
     seen = model.prepared(robot)
+    refuse_clearance_of(seen, constraints, where)
     kept = dict(allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin))
     if finder is not None:
         kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}

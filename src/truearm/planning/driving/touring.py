@@ -66,7 +66,7 @@ def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Arr
     distances = nearest_on(finder.check, np.array([stop.joints for stop in stops]))
     room = min(distances.values(), default=math.inf)
     notices = cell_notices(finder.check)
-    tour = Tour(tuple(stops), cell.floor, cell.clearance, room, cell.surface, distances, notices)
+    tour = Tour(tuple(stops), cell.floor, cell.clearance, room, cell.surface, distances, notices, finder.check.connected)
     _refuse_winding(finder, tour)
     return tour
 

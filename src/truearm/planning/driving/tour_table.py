@@ -65,7 +65,10 @@ def distance_words(distances: Mapping[str, float], floor: float | None, surface:
         How much of the arm is left out where two links are connected, at most [m].
     """
     # Down to a tenth of a millimetre: never more than there is.
-    near = [(f"{math.floor(room * 1e4) / 10:g} mm", _thing(what, floor, surface, connected)) for what, room in distances.items()]
+    near = [
+        (f"{math.floor(room * 1e4) / 10:g} mm", _thing(what, floor, surface, connected))
+        for what, room in distances.items()
+    ]
     return ", ".join(f"{room}{'' if k else ' or more'} from {thing}" for k, (room, thing) in enumerate(near))
 
 

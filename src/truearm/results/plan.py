@@ -130,9 +130,9 @@ class Plan(Record):
         )
         if prediction.sufficient_number is None and prediction.tells_little:
             little = (
-                f"Not calibrated it misses them by about {significant(prediction.nominal * 1e3, 3)} mm, by the priors "
-                "of its parameters: these configurations tell hardly more of it. See what keeps them in one place, the "
-                "limits of the joints say, or take more."
+                f"Before a calibration the robot misses them by about {significant(prediction.nominal * 1e3, 3)} mm, "
+                "by the priors of its parameters: these configurations tell little of it. Widen the limits that keep "
+                "them together, or take more."
             )
             return first, little, assumed
         if prediction.sufficient_number is None:

@@ -131,8 +131,8 @@ class Plan(Record):
         if prediction.sufficient_number is None and prediction.tells_little:
             little = (
                 f"Before a calibration the robot misses them by about {significant(prediction.nominal * 1e3, 3)} mm, "
-                "by the priors of its parameters: these configurations tell little of it. Widen the limits that keep "
-                "them together, or take more."
+                "by the priors of its parameters: these configurations tell little of it. Take more, or widen the "
+                "limits that keep them together."
             )
             return first, little, assumed
         if prediction.sufficient_number is None:

@@ -289,7 +289,7 @@ def plan_measurements(
     order = order[short_order(candidates.joints[usable[order]])]
     chosen = usable[order]
     joints = candidates.joints[chosen]
-    if labels is None and len(np.unique(joints, axis=0)) < len(joints):
+    if drawn is not None and len(np.unique(joints, axis=0)) < len(joints):
         raise InputError(
             "configurations that were chosen coincide, as the joints have hardly any range",
             parameter="constraints",

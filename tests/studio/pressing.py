@@ -11,16 +11,13 @@ import pytest
 from truearm.errors import InputError
 from truearm.studio.window import Window
 
-#: An event of a user; those of the studio itself have no client.
-BY_A_USER = SimpleNamespace(client=object())
-
 
 def act(element: Any, value: Any = None) -> None:
     """Do with an element what a user does: give it a value, or press it."""
     if value is not None:
         element._impl.value = value
     for callback in element._impl.update_cb:
-        callback(BY_A_USER)
+        callback(SimpleNamespace(client=object(), target=element))  # those of the studio itself have no client
 
 
 def at_once(window: Window, monkeypatch: pytest.MonkeyPatch) -> list[str]:

@@ -5,118 +5,26 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from filecmp import cmp
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, Final, Literal
-
-from pydantic import BaseModel, ConfigDict, Field
+from typing import Any, Final, Literal
 
 from truearm.errors import InputError, refusals_at, refusals_of
-from truearm.files import exists, path_argument, read_bytes, read_text, read_yaml
+from truearm.files import exists, path_argument, read_text, read_yaml
 from truearm.limits import refuse_beyond
 from truearm.manifest import MANIFEST, hash_of
 from truearm.printable import is_one_line
 from truearm.schemas import validated
-from truearm.writing import put_back_old, writable_folder, write_files, write_text
+from truearm.studio.settings import Settings
+from truearm.studio.uploads import clear_uploads
+from truearm.writing import put_back_old, put_in_place, writable_folder, write_text, write_text_over
 
 #: What makes a folder a project.
 PROJECT_FILE: Final = "truearm-studio.yaml"
 #: So many edits can be undone.
 _KEPT: Final = 100
-
-_Name = Annotated[str, Field(min_length=1)]
-
-
-class TestedFiles(BaseModel):
-    """Of a project: the tests by ISO 9283.
-
-    Attributes
-    ----------
-    plan, poses, paths, settling, forces, alignment, compare
-        Files, as for :func:`truearm.iso9283_evaluate`.
-    noise_mm, noise_rot_deg
-        Of the instrument.
-    result
-        Folder of the evaluation.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    plan: _Name | None = None
-    poses: _Name | None = None
-    paths: _Name | None = None
-    settling: _Name | None = None
-    forces: _Name | None = None
-    alignment: _Name | None = None
-    compare: _Name | None = None
-    noise_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.01
-    noise_rot_deg: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.005
-    result: _Name = "iso9283/result"
-
-
-class Settings(BaseModel):
-    """Schema ``truearm-studio/1``: what the studio's pages say.
-
-    Attributes
-    ----------
-    robot
-        A library id, or a file of the folder.
-    data
-        File of measurements; None for none yet.
-    exclude
-        File of readings that are excluded; None for none.
-    payload
-        What the robot carried, as a text such as ``2.7kg,50mm,25mm,100mm``.
-    model, train, loss, seed
-        As for :func:`truearm.calibrate`.
-    result
-        Folder of the calibration's results, in the project's.
-    program
-        File of a robot program.
-    cell
-        File that says where tools and frames are; None for what the program says.
-    taught
-        As for :func:`truearm.compensate`; None if that was not said.
-    controller_kinematics
-        Likewise.
-    corrected
-        Folder of the corrected program.
-    performance
-        Files of tests by ISO 9283.
-    dark
-        Whether the window is dark.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    truearm: Literal["truearm-studio/1"] = "truearm-studio/1"
-    robot: _Name = "irb120"
-    data: _Name | None = None
-    exclude: _Name | None = None
-    payload: _Name | None = None
-    model: _Name = "geometric"
-    train: Annotated[int, Field(strict=True, ge=1)] | Literal["all"] | None = None
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
-    loss: _Name = "linear"
-    result: _Name = "result"
-    program: _Name | None = None
-    cell: _Name | None = None
-    taught: tuple[_Name, ...] | None = None
-    controller_kinematics: _Name | None = None
-    corrected: _Name = "result/corrected"
-    performance: TestedFiles = TestedFiles()
-    dark: bool = False
-
-    def text(self) -> str:
-        """Return the file."""
-        from ruamel.yaml import YAML
-        from ruamel.yaml.compat import StringIO
-
-        stream, yaml = StringIO(), YAML()
-        yaml.default_flow_style = False
-        yaml.dump(self.model_dump(mode="json", exclude_none=True), stream)
-        return str(stream.getvalue())
-
-
 #: Settings that name a file of the folder, or a folder in it; those of the tests.
-_PATHS: Final = ("data", "exclude", "result", "program", "cell", "corrected")
+_PATHS: Final = ("data", "exclude", "result", "program", "cell", "corrected", "constraints", "path", "meshes")
 _TESTED: Final = ("plan", "poses", "paths", "settling", "forces", "alignment", "compare", "result")
 
 
@@ -155,6 +63,11 @@ class Project:
 
     Not safe for several threads: the studio holds its lock around every call.
 
+    Parameters
+    ----------
+    written
+        Hash of the file as it was before it was read: another program that writes meanwhile is noticed.
+
     Attributes
     ----------
     folder
@@ -163,11 +76,11 @@ class Project:
         What holds now; it is what the file says.
     """
 
-    def __init__(self, folder: Path, settings: Settings) -> None:
+    def __init__(self, folder: Path, settings: Settings, written: str | None) -> None:
         self.folder, self.settings = folder, settings
         self._undone: list[_Edit] = []
         self._before: list[_Edit] = []
-        self._written = self._stamp_of_file()
+        self._written = written
         self._seen = self._stamps()
 
     def path(self, name: str, parameter: str | None = None) -> Path:
@@ -259,11 +172,12 @@ class Project:
 
     def reload(self) -> None:
         """Take the settings from the file as it is now; edits before are no longer undone."""
+        written = _hash_of_file(self.folder)
         settings = read_yaml(self.folder / PROJECT_FILE, Settings)
         with refusals_at(str(self.folder / PROJECT_FILE)):
             _check_paths(self, settings)
         self.settings, self._before, self._undone = settings, [], []
-        self._written = self._stamp_of_file()
+        self._written = written
         self.look()
 
     def look(self, *names: str) -> None:
@@ -294,8 +208,8 @@ class Project:
         found = [name for name in self._stamps() if not suffixes or name.lower().endswith(suffixes)]
         return sorted(name for name in found if name != PROJECT_FILE and name.rpartition("/")[2] != MANIFEST)
 
-    def take_in(self, name: str, content: bytes) -> str:
-        """Write an uploaded file into the folder and return its name there.
+    def take_in(self, name: str, came: Path) -> str:
+        """Move a file that has come into the folder to its name there, and return that; it replaces none.
 
         Raises
         ------
@@ -307,14 +221,16 @@ class Project:
         if plain.name != name or name.startswith(".") or name in (PROJECT_FILE, MANIFEST):
             raise InputError("a file cannot be taken in under this name", came=name, cure="Rename it.")
         path = self.path(name)
-        refuse_beyond("file_size", len(content), where=name)
-        if exists(path) and read_bytes(path) != content:
-            raise InputError(
-                "another file of this name stands in the project, and is not overwritten",
-                where=name,
-                cure="Rename the one or the other.",
-            )
-        write_files(path.parent, {path.name: content})
+        refuse_beyond("upload", came.stat().st_size, where=name)
+        if exists(path):
+            if not path.is_file() or not cmp(path, came, shallow=False):
+                raise InputError(
+                    "another file of this name stands in the project, and is not overwritten",
+                    where=name,
+                    cure="Rename the one or the other.",
+                )
+        else:
+            put_in_place(came, path)
         self.look(name)
         return name
 
@@ -351,19 +267,10 @@ class Project:
 
     def _write(self, settings: Settings) -> None:
         """Write the file, unless it is not as this project has left it."""
-        if self._stamp_of_file() != self._written:
-            raise InputError(
-                "another program has changed this file, and it is not overwritten",
-                where=PROJECT_FILE,
-                cure="Reload the project, and make the edit again.",
-            )
-        write_text(self.folder / PROJECT_FILE, settings.text())
-        self._written = self._stamp_of_file()
+        text = settings.text()
+        write_text_over(self.folder / PROJECT_FILE, text, self._written)
+        self._written = hash_of(text.encode())
         self.look(PROJECT_FILE)
-
-    def _stamp_of_file(self) -> str | None:
-        path = self.folder / PROJECT_FILE
-        return hash_of(path.read_bytes()) if path.is_file() else None
 
     def _stamps(self) -> dict[str, tuple[int, int]]:
         """Return size and time of the last change of every file that is no hidden one, three folders deep."""
@@ -403,14 +310,26 @@ def open_project(folder: object, first: Mapping[str, Any] | None = None) -> Proj
             path.mkdir(parents=True, exist_ok=True)
         path = path.resolve()
         put_back_old(path)
+        clear_uploads(path)
         if not exists(path / PROJECT_FILE):
             settings = validated(dict(first or {"truearm": "truearm-studio/1"}), Settings, PROJECT_FILE)
-            write_text(path / PROJECT_FILE, settings.text())
-        settings = read_yaml(path / PROJECT_FILE, Settings)
-        project = Project(path, settings)
+            try:
+                write_text_over(path / PROJECT_FILE, settings.text(), None)
+            except InputError:
+                if not exists(path / PROJECT_FILE):  # another studio has just made it
+                    raise
+        written = _hash_of_file(path)
+        project = Project(path, read_yaml(path / PROJECT_FILE, Settings), written)
+        settings = project.settings
         with refusals_at(str(path / PROJECT_FILE)):
             _check_paths(project, settings)
         return project
+
+
+def _hash_of_file(folder: Path) -> str | None:
+    """Return the hash of a project's file; None if there is none."""
+    path = folder / PROJECT_FILE
+    return hash_of(path.read_bytes()) if path.is_file() else None
 
 
 def refuse_no_project(path: Path) -> bool:
@@ -437,6 +356,14 @@ def _check_paths(project: Project, settings: Settings) -> None:
 
     for name in _PATHS:
         value = getattr(settings, name)
+        if value is not None:
+            project.path(value, name)
+    for name in ("candidates_from", "accurate_at", "out"):
+        value = getattr(settings.plan, name)
+        if value is not None:
+            project.path(value, name)
+    for name in ("plan", "truth", "watch", "mapping", "about", "out"):
+        value = getattr(settings.measure, name)
         if value is not None:
             project.path(value, name)
     for name in _TESTED:

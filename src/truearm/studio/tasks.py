@@ -65,8 +65,11 @@ def calibrate_command(robot: str, data: str, options: dict[str, Any]) -> str:
 
 
 def option_words(options: Mapping[str, Any]) -> list[str]:
-    """Return parameters of a job as the words of its command."""
-    return [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
+    """Return parameters of a job as the words of its command; what is true is a flag."""
+    words: list[str] = []
+    for name, value in options.items():
+        words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
+    return words
 
 
 def compensate_command(

@@ -27,6 +27,11 @@ def plain(text: object) -> str:
     return escape(with_short_words(printable(str(text))), quote=True)
 
 
+def one_line(text: object) -> str:
+    """Return a text for a label, which is no HTML: what cannot be printed is written out."""
+    return printable(str(text))
+
+
 def paragraph(text: object) -> str:
     """Return a paragraph."""
     return f'<p style="{_STYLE}">{plain(text)}</p>'

@@ -160,12 +160,14 @@ def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]
                 if taken is None and meant is None and factor == 1.0:
                     continue
                 alike = taken is not None and meant is not None and _is_proper(taken) == _is_proper(meant)
-                left = readings.left(
-                    *(_rotations(numbers * factor, meant) for numbers in (ways[:1] if alike else ways))
-                )
-                if left <= _EXPLAINED_WITHIN and left * _LEAST_IMPROVEMENT <= given:
-                    rare = (taken is not None and f"{taken} moving" not in _COMMON, meant not in _COMMON)
-                    tried.append((left, sum(rare), _in_words(taken, meant, factor != 1.0)))
+                for read in _as_read(taken, meant):
+                    columns = slice(None, None, -1) if read is not None and read.endswith("fixed") else slice(None)
+                    left = readings.left(
+                        *(_rotations(numbers[:, columns] * factor, meant) for numbers in (ways[:1] if alike else ways))
+                    )
+                    if left <= _EXPLAINED_WITHIN and left * _LEAST_IMPROVEMENT <= given:
+                        rare = (read not in _COMMON, meant not in _COMMON)
+                        tried.append((left, sum(rare), _in_words(read, meant, factor != 1.0)))
     least = min((left for left, *_ in tried), default=0.0)
     told = [
         words
@@ -184,6 +186,17 @@ def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]
             "error",
         )
     ]
+
+
+def _as_read(taken: str | None, meant: str | None) -> list[str | None]:
+    """Return the ways in which numbers may have been read that are angles about moving axes in an order.
+
+    Turns about fixed axes are those about moving ones in the opposite order, with the columns in that order. As what
+    angles were meant, both ways to have read them tell the same; a rotation vector's numbers stand in their own order.
+    """
+    if taken is None:
+        return [None]
+    return [f"{taken} moving", *([f"{taken[::-1]} fixed"] if meant is None else [])]
 
 
 def _rotations(numbers: Array, meant: str | None) -> Array:
@@ -228,23 +241,21 @@ def _moving_angles(R: Array, order: str) -> list[Array]:
     return [np.column_stack([first, middle, last]), (second + np.pi) % (2.0 * np.pi) - np.pi]
 
 
-def _in_words(taken: str | None, meant: str | None, degrees: bool) -> str:
+def _in_words(read: str | None, meant: str | None, degrees: bool) -> str:
     """Say as what numbers were read, and as what they agree, by the entries of a mapping.
 
     Turns about moving axes are those about fixed ones in the opposite order, with the columns in that order.
     """
     unit = ", and as radians that were called degrees" if degrees else ""
-    if taken is None:
-        return f"not a rotation vector but {_way(meant)}{unit}"
-    if meant == f"{taken} moving":
+    if read is None or meant is None:
+        return f"not {_way(read)} but {_way(meant)}{unit}"
+    if meant == read:
         return f"{_way(meant)}, but in radians that were called degrees"
-    other = ""
-    if meant is not None:
-        order, _, axes = meant.partition(" ")
-        opposite = {"moving": "fixed", "fixed": "moving"}[axes]
-        other = f" (of the columns from right to left: not {_way(f'{taken[::-1]} fixed')} but "
-        other += f"{_way(f'{order[::-1]} {opposite}')})"
-    return f"not {_way(f'{taken} moving')} but {_way(meant)}{other}{unit}"
+    order, _, axes = meant.partition(" ")
+    opposite = {"moving": "fixed", "fixed": "moving"}[axes]
+    other = f" (of the columns from right to left: not {_way(f'{read[2::-1]} fixed')} but "
+    other += f"{_way(f'{order[::-1]} {opposite}')})"
+    return f"not {_way(read)} but {_way(meant)}{other}{unit}"
 
 
 def _way(way: str | None) -> str:

@@ -79,6 +79,8 @@ class MeasurementPlan:
         Where fixtures stand in the base frame [m], ``(3,)`` each; of a plane the foot of its distance from the origin.
     drawn
         How the candidates were drawn; None if they were given, or are a device's.
+    among
+        The usable candidates [rad or m], ``(usable, joints)``.
     """
 
     robot: Robot
@@ -98,6 +100,7 @@ class MeasurementPlan:
     reads: tuple[str, ...] = ()
     fixtures: Mapping[str, Array] = field(default_factory=dict)
     drawn: Drawn | None = None
+    among: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def with_targets(robot: Robot, data: Dataset | None = None) -> Robot:
@@ -312,6 +315,7 @@ def plan_measurements(
         drawn=drawn,
         reads=() if readings is None else _in_words(readings.of_configurations(chosen)),
         fixtures=at_fixtures,
+        among=candidates.joints[usable],
         robot=seen,
         model=model,
         objective=objective,

@@ -151,6 +151,16 @@ def exists(path: Path) -> bool:
         return False
 
 
+def wide_encoding(content: bytes) -> str | None:
+    """Return the encoding of which zero bytes all over a text speak, ``utf-16-le`` or ``utf-16-be``; None if none."""
+    looked = content[:4096]
+    for name, of_high_bytes in (("utf-16-le", looked[1::2]), ("utf-16-be", looked[0::2])):
+        # Western text: nearly every second byte is zero, and hardly any other.
+        if 2 * of_high_bytes.count(0) > len(of_high_bytes) and looked.count(0) < 1.1 * of_high_bytes.count(0):
+            return name
+    return None
+
+
 def read_text(path: Path, most: str = "file_size") -> str:
     """Return the text of a UTF-8 file without its byte order mark; `most` as for :func:`read_bytes`."""
     content = read_bytes(path, most)
@@ -162,6 +172,13 @@ def read_text(path: Path, most: str = "file_size") -> str:
         ) from error
     if not text.strip():
         raise InputError("the file is empty", where=str(path))
+    if "\0" in text and (wide := wide_encoding(content)) is not None:
+        raise InputError(
+            "the file is not UTF-8 text: its zero bytes are those of UTF-16",
+            where=str(path),
+            came=wide,
+            cure="Save it as UTF-8.",
+        )
     return text
 
 

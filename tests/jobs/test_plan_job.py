@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -41,6 +42,36 @@ def test_the_record_tells_what_constraints_cost() -> None:
     assert f"  moment_2: broken by {cost} of 60" in planned.lines()
     assert planned.lines()[-3:] == list(planned.answer)
     assert planned.summary()["rejected"] == {"limits": 0, "moment_2": cost}
+
+
+def test_limits_in_another_unit_are_warned_of(tmp_path: Path) -> None:
+    """With a box whose name would be markup on the page."""
+    rules = Constraints.model_validate(
+        {
+            **RULES,
+            "moments": {},
+            "limits": {1: [-1.57, 1.57], 2: [-1, 1], 3: [-1, 1]},
+            "keep_out": {"<script>alert(1)</script>": {"x": [-900, -700]}},
+        }
+    )
+    planned = truearm.plan(
+        "irb120", poses=10, candidates=60, constraints=rules, model="offsets", out=tmp_path / "p.csv"
+    )
+    (notice,) = planned.warnings
+    assert (notice.code, notice.level) == ("limits-tiny", "warning")
+    assert "joint 1 from -1.57 to 1.57 deg, joint 2 from -1 to 1 deg, joint 3" in notice.message
+    prediction = planned.made.prediction
+    assert prediction.tells_little
+    assert prediction.nominal == pytest.approx(1.5e-3, rel=0.2)
+    assert any("Before a calibration the robot misses them by about 1." in line for line in planned.answer)
+    assert not any("More poses than were looked at" in line for line in planned.answer)
+    page = (tmp_path / "p.html").read_text()
+    assert "&lt;script&gt;alert(1)" in page
+    assert "<script>alert" not in page
+    drawn = planned.made.drawn
+    assert drawn is not None
+    assert f"{drawn.tried} were drawn within the limits, 60 of those that keep clear were taken." in page
+    assert replace(drawn, lost={"floor": 2, "links": 0, "keep_out a": 30}).words == "keep_out a 30, floor 2"
 
 
 def test_a_device_and_given_candidates_do_not_go_together() -> None:

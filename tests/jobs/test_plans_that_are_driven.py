@@ -256,6 +256,10 @@ def test_what_cannot_be_driven_is_refused(given: dict[str, object], parameter: s
         ({"keep_out": {"cage": {"x": [-900, 900], "y": [-900, 900], "z": [-100, 1500]}}}, "holds the base"),
         ({"keep_out": {"block": {"x": [250, 500], "y": [-200, 200], "z": [500, 900]}}}, "is not clear.*box 'block'"),
         ({"keep_out": {str(k): {"x": [900, 950 + k]} for k in range(21)}}, "too many boxes.*'21 boxes'.*20 boxes or"),
+        (
+            {"limits": {k: [0, 0] for k in range(1, 7)}},
+            "configurations that were chosen coincide.*1 different ones of 12",
+        ),
         ({"limits": {2: [200, 300]}}, "the limits of joint 2 leave nothing.*'200 to 300 deg'.*-110 to 110"),
         ({"limits": {2: [100, 110], 3: [60, 70]}}, "no configuration was found|is not clear|not where the plan"),
     ],
@@ -264,6 +268,14 @@ def test_cells_without_room_are_refused(entries: dict[str, object], words: str) 
     rules = Constraints.model_validate({**HEAD, **entries})
     with pytest.raises(InputError, match=words):
         truearm.plan("irb120", poses=12, candidates=60, constraints=rules, home=[0.0] * 6)
+
+
+def test_walls_that_leave_hardly_any_configurations_are_counted() -> None:
+    walls = {"a": {"x": [200, 201]}, "b": {"x": [-201, -200]}, "c": {"y": [200, 201]}, "d": {"y": [-201, -200]}}
+    rules = Constraints.model_validate({**HEAD, "keep_out": walls})
+    words = "[0-9]+ of [0-9]+ usable.*of 2400 drawn, too near to keep_out [ab] .*floor .*smaller boxes"
+    with pytest.raises(InputError, match=words):
+        truearm.plan("irb120", poses=12, candidates=60, constraints=rules)
 
 
 def test_all_stops_are_written(tmp_path: Path) -> None:

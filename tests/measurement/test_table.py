@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from truearm.errors import InputError
+from truearm.files import read_text
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.matrices import read_matrices
@@ -116,6 +117,18 @@ def test_decimal_commas_title_lines_units_line_comments_and_encoding(tmp_path: P
     data = read_table(tmp_path / "table.txt", tmp_path / "map.yaml")
     assert data.targets == ("ä",)
     assert data.position.tolist() == [[-0.0125, 0.002, 0.003]]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_zero_bytes_all_over_are_said_to_be_of_another_encoding(tmp_path: Path, encoding: str) -> None:
+    (tmp_path / "table.txt").write_bytes(LONG.encode(encoding))
+    (tmp_path / "map.yaml").write_text(MAP, encoding="utf-8")
+    with pytest.raises(InputError, match=rf"zero bytes are those of UTF-16.*layout.encoding.*: {encoding}"):
+        read_table(tmp_path / "table.txt", tmp_path / "map.yaml")
+    (tmp_path / "map.yaml").write_text(f"{MAP}layout: {{encoding: {encoding}}}\n", encoding="utf-8")
+    assert read_table(tmp_path / "table.txt", tmp_path / "map.yaml").labels == ("a", "b")
+    with pytest.raises(InputError, match=r"UTF-16.*Save it as UTF-8"):
+        read_text(tmp_path / "table.txt")
 
 
 def test_a_header_in_a_comment_line_and_a_byte_order_mark(tmp_path: Path) -> None:

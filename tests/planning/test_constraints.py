@@ -13,7 +13,7 @@ from truearm.library import load_robot
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.clearance import smallest_clearance
-from truearm.planning.constraints.constraints import Constraints, allowed, read_constraints
+from truearm.planning.constraints.constraints import Constraints, allowed, read_constraints, refuse_clearance_of
 from truearm.simulation.truths import STATION, truth_twin
 
 HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
@@ -104,6 +104,35 @@ def test_clearance_of_a_folded_arm() -> None:
     assert folded == pytest.approx(0.39225 * np.sin(np.deg2rad(5)))
 
 
+@pytest.mark.parametrize(
+    ("name", "clearance", "words"),
+    [
+        ("irb120", 1e9, "links that can meet would count as neighbours.*up to 340 mm for irb120"),
+        ("irb120", 345, "up to 340 mm"),
+        ("irb120", 0.06, "1 mm or more.*Check its unit"),
+    ],
+)
+def test_a_clearance_that_says_nothing_is_refused(name: str, clearance: float, words: str) -> None:
+    with pytest.raises(InputError, match=words) as refusal:
+        refuse_clearance_of(load_robot(name), Constraints.model_validate(HEAD | {"clearance": clearance}), "rules.yaml")
+    assert refusal.value.where == "rules.yaml, clearance"
+
+
+def test_a_clearance_of_links_that_are_all_neighbours_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "pendulum.yaml"
+    file.write_text("""\
+truearm: truearm-robot/1
+name: pendulum
+units: {length: mm, angle: deg}
+convention: standard-dh
+joints:
+  - {name: a, theta_offset: 0, d: 100, a: 0, alpha: 90}
+  - {name: b, theta_offset: 0, d: 0, a: 400, alpha: 0}
+""")
+    with pytest.raises(InputError, match="no two links between which a clearance could be kept"):
+        refuse_clearance_of(load_robot(file), Constraints.model_validate(HEAD | {"clearance": 60}), "rules.yaml")
+
+
 def test_distances_of_links_by_brute_force(arm: Robot) -> None:
     from truearm.planning.constraints.segments import segment_distance
 
@@ -157,6 +186,8 @@ def test_moments_need_masses(postures: Postures) -> None:
         ("visibility: {within: 30, targets: {'1': [0, 0, 0]}}", "direction cannot be zero"),
         ("clearance: -1", "clearance"),
         ("limits: {2: [0, .nan]}", "limits"),
+        ("keep_out: {'': {x: [0, 1]}}", "keep_out.*a name belongs here"),
+        ('keep_out: {"a\\nMoveAbsJ": {x: [0, 1]}}', "keep_out.*without control characters"),
     ],
 )
 def test_entries_that_are_not_known_are_refused(tmp_path: Path, text: str, words: str) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import flag_argument, length_argument, numbers_argument
 from truearm.modeling.robot import Robot
+from truearm.planning.constraints.clearance import LEAST_CLEARANCE
 from truearm.planning.constraints.constraints import Constraints, keep_out, read_constraints
 from truearm.planning.driving.cell import (
     CLEARANCE,
@@ -26,9 +25,6 @@ from truearm.planning.driving.home import checked_home, safe_configuration
 from truearm.planning.driving.joint_window import joint_window
 from truearm.planning.driving.ways import WayFinder
 from truearm.units import sized_si
-
-#: What is less, and not zero, is meant in another unit [m].
-_LEAST_CLEARANCE: Final = 1e-3
 
 
 def constraints_argument(constraints: object) -> Constraints | None:
@@ -91,12 +87,12 @@ def cell_argument(
         if constraints is not None and constraints.floor is not None:
             height = min(0.0, sized_si(constraints.floor, constraints.units.length, f"{where}, floor"))
     room = CLEARANCE if clearance is None else length_argument(clearance, "clearance", 0.0)
-    if 0.0 < room < _LEAST_CLEARANCE:
+    if 0.0 < room < LEAST_CLEARANCE:
         raise InputError(
             "so little room is kept by no arm whose thickness is estimated",
             parameter="clearance",
             came=f"{room * 1e3:g} mm",
-            allowed=f"0 mm, or {_LEAST_CLEARANCE * 1e3:g} mm and more",
+            allowed=f"0 mm, or {LEAST_CLEARANCE * 1e3:g} mm and more",
             cure="Check its unit.",
         )
     boxes = boxes_of({} if constraints is None else keep_out(constraints, where))

@@ -14,7 +14,7 @@ from truearm.jobs.driving import cell_argument
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.planning.constraints.constraints import Constraints, allowed, limits_of
+from truearm.planning.constraints.constraints import Constraints, allowed, limits_of, refuse_clearance_of
 from truearm.planning.driving.cell import Cell
 from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.driving.joint_window import joint_window
@@ -88,7 +88,7 @@ class StatedCell:
             for what, room in nearest_on(self.check, joints).items():
                 distances[what] = min(room, distances.get(what, math.inf))
         nearest_first = dict(sorted(distances.items(), key=lambda item: item[1]))
-        near = distance_words(nearest_first, self.cell.floor, self.cell.surface)
+        near = distance_words(nearest_first, self.cell.floor, self.cell.surface, self.check.connected)
         return f"On all {counted(len(ways), 'way')} the arm stays {near}." if near else ""
 
     def _near(self, number: int, room: float) -> str:
@@ -116,6 +116,7 @@ def stated_cell(robot: Robot, rules: Constraints | None, where: str, clearance: 
         return None
     cell = cell_argument(robot, rules, where, None, False, clearance)
     joint_window(robot, rules, where)  # refuses limits that leave nothing
+    refuse_clearance_of(robot, rules, where)
     low, high = limits_of(robot, rules, where)
     joints = tuple(
         joint if not np.isfinite([a, b]).all() else replace(joint, limits=(float(a), float(b)))

@@ -229,7 +229,7 @@ def plan(
     driven = driven or any(given is not None for given in (floor, clearance, home))
     if table is not None and not driven:
         refuse_ways_of_another(ways_beside(table))
-    labels, readings, own, finder = None, None, bool(carrying.targets), None
+    labels, readings, own, finder, drawn = None, None, bool(carrying.targets), None, None
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
         own = True
@@ -247,7 +247,7 @@ def plan(
         if candidates_from is not None:
             choice = replace(choice, joints=on_principal_turn(seen, choice.joints))
         elif instrument is None:
-            choice = driven_candidates(seen, number, rng, finder)
+            choice, drawn = driven_candidates(seen, number, rng, finder)
     progress("looking where the robot shall be accurate")
     goal = accuracy_goal(seen, accurate_at, region, tools, frames, np.random.default_rng(seed))
     left = np.arange(len(choice))
@@ -269,6 +269,7 @@ def plan(
             readings=None if readings is None else readings.of_configurations(left),
             finder=finder,
             without_way=len(choice) - len(left),
+            drawn=drawn,
         )
         if finder is None:
             tour = None

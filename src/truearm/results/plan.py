@@ -128,6 +128,13 @@ class Plan(Record):
             f"That assumes that a coordinate of a reading is off by {significant(self.noise * 1e3, 3)} mm about the "
             "model, by the instrument and by what the model cannot follow; give `noise` where you know better."
         )
+        if prediction.sufficient_number is None and prediction.tells_little:
+            little = (
+                f"Before a calibration the robot misses them by about {significant(prediction.nominal * 1e3, 3)} mm, "
+                "by the priors of its parameters: these configurations tell little of it. Take more, or widen the "
+                "limits that keep them together."
+            )
+            return first, little, assumed
         if prediction.sufficient_number is None:
             return first, "More poses than were looked at are needed to come within 10 % of that.", assumed
         enough = f"{prediction.sufficient_number} well-chosen poses are enough to come within 10 % of that."
@@ -154,6 +161,7 @@ class Plan(Record):
                 "floor_mm": prediction.floor * 1e3,
                 "planned_mm": prediction.planned * 1e3,
                 "enough": prediction.sufficient_number,
+                "nominal_mm": prediction.nominal * 1e3,
                 **({} if prediction.there is None else {"there": self._there_summary(prediction.there)}),
                 "by_number": [
                     {"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean, nearest_names
-from truearm.files import exists, read_bytes, read_yaml
+from truearm.files import exists, read_bytes, read_yaml, wide_encoding
 from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.canonical_rows import visits_of
@@ -320,6 +320,12 @@ def _read(path: Path, entry: LayoutEntry, where: str) -> Cells:
             where=f"{path}{_place_of_byte(content, error, entry.layout.delimiter)}",
             cure="Name its encoding in the mapping (layout.encoding), such as cp1252 or utf-16.",
         ) from error
+    if "\0" in text and (wide := wide_encoding(content)) is not None:
+        raise InputError(
+            f"the file is not {entry.encoding} text: its zero bytes are those of UTF-16",
+            where=str(path),
+            cure=f"Name its encoding in the mapping (layout.encoding): {wide}.",
+        )
     if not text.strip():
         raise InputError("the file is empty", where=str(path), cure="Check that it was exported whole.")
     return read_cells(text, str(path), entry.layout)

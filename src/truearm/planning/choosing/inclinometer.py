@@ -156,7 +156,7 @@ def _candidates(
         joints = robot.random_configurations(count, rng)
     else:
         low, high = finder.low, finder.high
-        joints = drawn_clear(finder, count, np.zeros(len(low)), rng)
+        joints = drawn_clear(finder, count, np.zeros(len(low)), rng).joints
     moved = np.clip(joints + move * rng.uniform(-1.0, 1.0, joints.shape), low, high)
     if finder is not None and move:
         clear = finder.check.ways(joints, moved).clear

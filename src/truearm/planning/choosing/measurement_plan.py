@@ -24,8 +24,8 @@ from truearm.planning.choosing.observability import INDICES, OfPredictions, obse
 from truearm.planning.choosing.ordering import short_order
 from truearm.planning.choosing.prediction import Prediction, There, model_error, predict
 from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
-from truearm.planning.constraints.constraints import Constraints, allowed
-from truearm.planning.driving.drawing import drawn_clear
+from truearm.planning.constraints.constraints import Constraints, allowed, refuse_clearance_of
+from truearm.planning.driving.drawing import Drawn, drawn_clear
 from truearm.planning.driving.joint_window import joint_window, on_principal_turn
 from truearm.planning.driving.ways import WayFinder
 from truearm.simulation.devices import Device, in_view_of
@@ -77,6 +77,8 @@ class MeasurementPlan:
         What the device reads at each configuration, in words; nothing if no device was named.
     fixtures
         Where fixtures stand in the base frame [m], ``(3,)`` each; of a plane the foot of its distance from the origin.
+    drawn
+        How the candidates were drawn; None if they were given, or are a device's.
     among
         The usable candidates [rad or m], ``(usable, joints)``.
     """
@@ -97,6 +99,7 @@ class MeasurementPlan:
     prediction: Prediction
     reads: tuple[str, ...] = ()
     fixtures: Mapping[str, Array] = field(default_factory=dict)
+    drawn: Drawn | None = None
     among: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 
@@ -116,8 +119,8 @@ def random_candidates(robot: Robot, count: int, rng: np.random.Generator) -> Pos
     return _forward(robot.random_configurations(count, rng))
 
 
-def driven_candidates(robot: Robot, count: int, rng: np.random.Generator, finder: WayFinder) -> Postures:
-    """Return configurations drawn where the arm keeps clear, each joint coming to it moving forward.
+def driven_candidates(robot: Robot, count: int, rng: np.random.Generator, finder: WayFinder) -> tuple[Postures, Drawn]:
+    """Return configurations drawn where the arm keeps clear, each joint coming to it moving forward; what that cost.
 
     There are fewer than `count` if the cell leaves little room.
 
@@ -133,7 +136,8 @@ def driven_candidates(robot: Robot, count: int, rng: np.random.Generator, finder
     InputError
         If there is none.
     """
-    return _forward(drawn_clear(finder, count, _approach(robot), rng))
+    drawn = drawn_clear(finder, count, _approach(robot), rng)
+    return _forward(drawn.joints), drawn
 
 
 def _forward(joints: Array) -> Postures:
@@ -192,6 +196,7 @@ def plan_measurements(
     readings: Dataset | None = None,
     finder: WayFinder | None = None,
     without_way: int = 0,
+    drawn: Drawn | None = None,
 ) -> MeasurementPlan:
     """Choose configurations to measure.
 
@@ -226,15 +231,18 @@ def plan_measurements(
         What the arm keeps clear of, at the candidates and where its accuracy is predicted; None for nothing.
     without_way
         How many candidates were left out because no way to them was found.
+    drawn
+        How the candidates were drawn, see :func:`driven_candidates`.
 
     Raises
     ------
     InputError
         If the objective is not known or does not decide on a number, too few candidates keep the constraints, or
-        there are fewer rows than parameters.
+        there are fewer rows than parameters, or candidates that were drawn are all alike.
     """
     _check_objective(objective, poses, accurate_at)
     seen = model.prepared(robot)
+    refuse_clearance_of(seen, constraints, where)
     kept = dict(allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin))
     if finder is not None:
         kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}
@@ -244,7 +252,7 @@ def plan_measurements(
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
     given = "candidates" if labels is None else "candidates_from"
     count = FIRST if poses is None else poses
-    _refuse_too_few(count, len(usable), total, rejected, given)
+    _refuse_too_few(count, len(usable), total, rejected, given, drawn)
     if readings is None:
         free = model.free(seen)
         gauge: tuple[str, ...] = ()
@@ -284,6 +292,13 @@ def plan_measurements(
     order = order[short_order(candidates.joints[usable[order]])]
     chosen = usable[order]
     joints = candidates.joints[chosen]
+    if drawn is not None and len(np.unique(joints, axis=0)) < len(joints):
+        raise InputError(
+            "configurations that were chosen coincide, as the joints have hardly any range",
+            parameter="constraints",
+            came=f"{len(np.unique(joints, axis=0))} different ones of {len(joints)}",
+            cure="Widen the limits of the joints; check their unit.",
+        )
     chosen_rows = rows[order].reshape(-1, len(among))
     there = None
     if wanted is not None and accurate_at is not None:
@@ -297,6 +312,7 @@ def plan_measurements(
         place = seen.fixture_kinematics(fixture.name).position[:, 0]
         at_fixtures[fixture.name] = (place - np.array(seen.base.translation)) @ seen.base.rotation
     return MeasurementPlan(
+        drawn=drawn,
         reads=() if readings is None else _in_words(readings.of_configurations(chosen)),
         fixtures=at_fixtures,
         among=candidates.joints[usable],
@@ -380,15 +396,22 @@ def _elsewhere(robot: Robot, finder: WayFinder | None, rng: np.random.Generator)
     return _forward((clear if len(clear) >= _FEWEST_ELSEWHERE else some)[:_PREDICTED_CONFIGURATIONS])
 
 
-def _refuse_too_few(needed: int, usable: int, candidates: int, rejected: Mapping[str, int], given: str) -> None:
+def _refuse_too_few(
+    needed: int, usable: int, candidates: int, rejected: Mapping[str, int], given: str, drawn: Drawn | None
+) -> None:
     if needed < 1:
         raise InputError("at least one pose is needed", parameter="poses", came=needed, allowed="1 or more, or auto")
     if usable < needed:
         cost = ", ".join(f"{name} {count}" for name, count in rejected.items() if count)
+        came = f"{usable} of {candidates} usable" + (f"; rejected by {cost}" if cost else "")
+        cure = "Widen the constraint that costs most, or give more candidates." if cost else "Give more candidates."
+        if drawn is not None and len(drawn.joints) < drawn.wanted:
+            came += f"; of {drawn.tried} drawn, too near to {drawn.words}"
+            cure = "Make room where most was lost: smaller boxes, wider limits, a lower `floor`, less `clearance`."
         raise InputError(
             "too few configurations are left to choose from",
             parameter=given,
-            came=f"{usable} of {candidates} usable" + (f"; rejected by {cost}" if cost else ""),
+            came=came,
             allowed=f"{needed} or more",
-            cure="Widen the constraint that costs most, or give more candidates." if cost else "Give more candidates.",
+            cure=cure,
         )

@@ -26,6 +26,10 @@ from truearm.planning.choosing.sensitivity import Sensitivity
 NUMBERS: Final = (8, 10, 12, 15, 18, 20, 25, 30, 35, 40, 50, 60, 80, 100, 150, 200)
 #: More poses are said to be of little use where the error is within this of what no number of poses goes below.
 NEAR: Final = 1.1
+#: A plan that leaves an error of more than one part in this of what the robot has without it tells little.
+_LITTLE: Final = 2.0
+#: What is wherever the instrument and the targets were set up, by groups of parameters.
+_PLACED: Final = ("base", "target", "fixture")
 _POOL: Final = 500
 #: Share of a reading's variance that all targets of a pose have in common (irb120-faro, docs/guide/planning.md).
 _COMMON_SHARE: Final = 0.75
@@ -73,6 +77,9 @@ class Prediction:
         Mean error of the targets there, of the model alone, without the noise of a reading, ``(k,)``.
     there
         The same where the robot is wanted to be accurate; None if nothing was said of that.
+    nominal
+        Mean error of the robot that is not calibrated, by the priors of what the model identifies of its joints, seen
+        from where base and targets are known [m].
     """
 
     floor: float
@@ -83,12 +90,18 @@ class Prediction:
     places: Array
     error: Array
     there: There | None = None
+    nominal: float = 0.0
 
     @property
     def sufficient_number(self) -> int | None:
         """The smallest of the numbers with an error at most 10 % above the floor; None if all are too small."""
         near = self.numbers[self.chosen <= NEAR * self.floor]
         return int(near[0]) if len(near) else None
+
+    @property
+    def tells_little(self) -> bool:
+        """Whether the model is left with more than half of the error that the robot has without a calibration."""
+        return 0.0 < self.nominal < _LITTLE * float(self.error.mean())
 
 
 def variances(candidates: Sensitivity, measured: NDArray[np.intp], elsewhere: Sensitivity) -> Array:
@@ -116,6 +129,13 @@ def variances(candidates: Sensitivity, measured: NDArray[np.intp], elsewhere: Se
 def model_error(candidates: Sensitivity, measured: NDArray[np.intp], elsewhere: Sensitivity, noise: float) -> Array:
     """Return the mean error of a position at each configuration elsewhere [m], of the model alone, ``(k,)``."""
     return np.asarray(_MEAN_LENGTH * noise * np.sqrt(variances(candidates, measured, elsewhere)))
+
+
+def nominal_error(elsewhere: Sensitivity, noise: float) -> float:
+    """Return the mean error of positions elsewhere before anything is measured, base and targets being known [m]."""
+    own = np.array([p.group not in _PLACED for p in elsewhere.free.parameters], dtype=bool)
+    moved = elsewhere.rows[..., own] * (elsewhere.free.prior / elsewhere.size)[own]
+    return float(_MEAN_LENGTH * noise * np.mean(np.sqrt(np.mean(np.sum(moved**2, axis=2), axis=1))))
 
 
 def predict(
@@ -162,4 +182,5 @@ def predict(
         random=np.array(by_chance),
         places=robot.world_poses(q)[0],
         error=model_error(candidates, chosen, elsewhere, noise),
+        nominal=nominal_error(elsewhere, noise),
     )

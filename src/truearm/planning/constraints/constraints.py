@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from truearm.errors import InputError, refusals_at
 from truearm.files import read_yaml
@@ -18,7 +18,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.loads import joint_loads
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.planning.constraints.clearance import smallest_clearance
+from truearm.planning.constraints.clearance import refuse_clearance, smallest_clearance
+from truearm.printable import is_one_line
 from truearm.units import sized_si
 
 Allowed = NDArray[np.bool_]
@@ -28,6 +29,15 @@ _Range = tuple[_Number, _Number]
 _Vector = tuple[_Number, _Number, _Number]
 _JointNumber = Annotated[int, Field(strict=True, ge=1)]
 _CLOSED: Final = ConfigDict(extra="forbid", frozen=True)
+
+
+def _one_line(name: str) -> str:
+    if not is_one_line(name):
+        raise InputError("a name belongs here", came=name, allowed="one line of text without control characters")
+    return name
+
+
+_Name = Annotated[str, Field(strict=True), AfterValidator(_one_line)]
 
 
 class _Units(BaseModel):
@@ -125,7 +135,7 @@ class Constraints(BaseModel):
     floor: _Number | None = None
     visibility: Visibility | None = None
     clearance: _Positive | None = None
-    keep_out: dict[str, KeptOut] = {}
+    keep_out: dict[_Name, KeptOut] = {}
 
 
 def read_constraints(path: Path) -> Constraints:
@@ -193,6 +203,17 @@ def allowed(
         least = sized_si(constraints.clearance, length, f"{where}, clearance")
         kept["clearance"] = smallest_clearance(robot, postures, least) >= least
     return kept
+
+
+def refuse_clearance_of(robot: Robot, constraints: Constraints | None, where: str) -> None:
+    """Refuse a clearance of the constraints that would say nothing of links that can meet.
+
+    See :func:`~.clearance.refuse_clearance`; `robot` has its targets, `where` names the constraints file.
+    """
+    if constraints is not None and constraints.clearance is not None:
+        place = f"{where}, clearance"
+        least = sized_si(constraints.clearance, constraints.units.length, place)
+        refuse_clearance(at_the_origin(robot), least, *limits_of(robot, constraints, where), place)
 
 
 def limits_of(robot: Robot, constraints: Constraints | None, where: str) -> tuple[Array, Array]:

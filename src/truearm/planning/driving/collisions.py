@@ -70,6 +70,8 @@ class CollisionCheck:
     ----------
     left_out
         What no posture keeps apart, in words.
+    connected
+        How much of the arm is left out where two links are connected, of the two of which it is most [m].
 
     Raises
     ------
@@ -82,6 +84,7 @@ class CollisionCheck:
         self.need = cell.clearance + MARGIN
         self._refuse_held()
         self._stubs: dict[str, None] = {}
+        self.connected = 0.0
         rooms = [*self._to_the_floor(), *self._to_the_boxes()]
         between = self._between_links()
         ever = set(np.flatnonzero((Measure(between, cell)(self.arm.sampled) >= self.need).any(axis=1)).tolist())
@@ -274,8 +277,10 @@ class CollisionCheck:
         for i, one in enumerate(links):
             for other in (*links[i + 1 :], *self.arm.tools):
                 between = self.arm.along[self.arm.flange if other.tool else other.start] - self.arm.along[one.end]
-                surplus = APART * (one.radius + other.radius + self.need) - float(between)
-                pieces = self._without_connection(one, other, max(surplus, 0.0))
+                apart = APART * (one.radius + other.radius + self.need)
+                if apart > between:
+                    self.connected = max(self.connected, apart)
+                pieces = self._without_connection(one, other, max(apart - float(between), 0.0))
                 if pieces is not None:
                     words = f"{self._name(one)} and {self._name(other)}{_NEAR}"
                     rooms.append(Room(LINKS, words, *pieces))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -13,10 +15,43 @@ from truearm.planning.driving.ways import WayFinder
 #: So many times as many as are wanted are drawn at most, but no more than this where twice as many are enough.
 _TIMES: Final = 40
 _MOST: Final = 200_000
+#: A message names no more of what configurations were lost to.
+_MOST_NAMED: Final = 5
 
 
-def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.Generator) -> Array:
-    """Return configurations that keep clear, and from which the arm comes straight to the safe one, ``(n, joints)``.
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Configurations that were drawn and are clear.
+
+    Attributes
+    ----------
+    joints
+        ``(n, joints)`` [rad or m].
+    tried
+        How many were drawn.
+    wanted
+        How many should be clear.
+    lost
+        How many came near the floor, a box (``keep_out`` and its name), the arm's own links, or where the arm stops
+        right before them to one of these (``approach``); each is lost to one thing alone, the floor first.
+    """
+
+    joints: Array
+    tried: int
+    wanted: int
+    lost: Mapping[str, int]
+
+    @property
+    def words(self) -> str:
+        """What most were lost to, and how many; nothing if none was."""
+        most_first = [item for item in sorted(self.lost.items(), key=lambda item: -item[1]) if item[1]]
+        named = [f"{name} {number}" for name, number in most_first[:_MOST_NAMED]]
+        others = sum(number for _, number in most_first[_MOST_NAMED:])
+        return ", ".join([*named, f"others {others}"] if others else named)
+
+
+def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.Generator) -> Drawn:
+    """Draw configurations that keep clear, and from which the arm comes straight to the safe one.
 
     They are drawn evenly. Where fewer than half of those that are clear have a straight way, all that are clear count.
 
@@ -45,16 +80,19 @@ def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.G
         q, cost = finder.check.sifted(q)
         for name, number in cost.items():
             lost[name] = lost.get(name, 0) + number
-        q = q[finder.check.ways(np.maximum(q - approach, low), q).clear]
+        entered = finder.check.ways(np.maximum(q - approach, low), q).clear
+        lost["approach"] = lost.get("approach", 0) + int(np.sum(~entered))
+        q = q[entered]
         home = np.broadcast_to(finder.home, q.shape)
         ways = finder.check.ways(q, home).clear
         straight, clear = np.concatenate([straight, q[ways]]), np.concatenate([clear, q])
+    found = straight if 2 * len(straight) >= len(clear) else clear
+    made = Drawn(found[:count], drawn, count, lost)
     if not len(clear):
-        told = ", ".join(f"{name} {number}" for name, number in lost.items() if number)
         raise InputError(
             "there is no configuration in which the arm keeps clear",
             parameter="clearance",
-            came=f"{drawn} drawn; rejected by {told}",
+            came=f"{drawn} drawn; rejected by {made.words}",
             cure="Lower `clearance`, or see that the limits, the floor and boxes to keep out of leave the arm room.",
         )
-    return straight[:count] if 2 * len(straight) >= len(clear) else clear[:count]
+    return made

@@ -1,17 +1,22 @@
-"""What is to be known of what a plan keeps clear of: links beside their lines, what is left out, odd boxes."""
+"""What is to be known of what a plan keeps clear of: links beside their lines, what is left out, odd boxes, limits."""
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
 
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.driving.links_beside import beside_notices
 
 #: A box whose sides are all shorter is meant in another unit [m].
 _TINY: Final = 0.01
+#: A joint of less range may have its limits in another unit: once around is 6.3 rad, and a rail 2 m long [rad; m].
+_NARROW: Final = {"revolute": math.radians(7.0), "prismatic": 5e-3}
 
 
 def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
@@ -27,6 +32,19 @@ def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
             )
         )
     return tuple(notices)
+
+
+def limits_notices(robot: Robot, low: Array, high: Array) -> tuple[Notice, ...]:
+    """Return a warning of joints with hardly any range between `low` and `high`, ``(joints,)`` [rad or m]."""
+    narrow = []
+    for k, joint in enumerate(robot.joints):
+        if high[k] - low[k] < _NARROW[joint.kind]:
+            unit, size = ("deg", math.degrees(1.0)) if joint.kind == "revolute" else ("mm", 1e3)
+            narrow.append(f"joint {k + 1} from {size * low[k]:.4g} to {size * high[k]:.4g} {unit}")
+    if not narrow:
+        return ()
+    told = "Hardly any range is left to a joint" if len(narrow) == 1 else "Hardly any range is left to joints"
+    return (Notice("limits-tiny", f"{told}: {', '.join(narrow)}. Check the unit of the limits, rad or deg, m or mm."),)
 
 
 def _box_notices(check: CollisionCheck) -> list[Notice]:

@@ -58,6 +58,8 @@ class Tour:
         of a box, ``links`` for its own.
     notices
         What is to be known of what was kept clear.
+    connected
+        How much of the arm is left out of the distance of its links where two are connected, at most [m].
     """
 
     stops: tuple[Stop, ...]
@@ -67,6 +69,7 @@ class Tour:
     surface: str = FLOOR
     distances: Mapping[str, float] = field(default_factory=dict)
     notices: tuple[Notice, ...] = ()
+    connected: float = 0.0
 
     @property
     def joints(self) -> Array:

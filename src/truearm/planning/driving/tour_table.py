@@ -43,7 +43,7 @@ def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list
     vias = sum(stop.kind == "via" for stop in tour.stops)
     over = f", {counted(vias, 'via point')} among them" if vias else ""
     text = [f"Driven from home ({home}) and back in {counted(len(tour.stops) - 1, 'move')}{over}."]
-    near = distance_words(tour.distances, tour.floor, tour.surface)
+    near = distance_words(tour.distances, tour.floor, tour.surface, tour.connected)
     if near:
         text.append(f"All the way the arm stays {near}.")
     if not stands(robot):
@@ -52,7 +52,7 @@ def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list
     return text
 
 
-def distance_words(distances: Mapping[str, float], floor: float | None, surface: str) -> str:
+def distance_words(distances: Mapping[str, float], floor: float | None, surface: str, connected: float) -> str:
     """Return how near an arm comes to each thing, as :func:`~.nearest.nearest_on` has it; nothing if to none.
 
     Parameters
@@ -61,16 +61,22 @@ def distance_words(distances: Mapping[str, float], floor: float | None, surface:
         Its height [m]; None if none is kept clear.
     surface
         What it is called.
+    connected
+        How much of the arm is left out where two links are connected, at most [m].
     """
     # Down to a tenth of a millimetre: never more than there is.
-    near = [(f"{math.floor(room * 1e4) / 10:g} mm", _thing(what, floor, surface)) for what, room in distances.items()]
+    near = [
+        (f"{math.floor(room * 1e4) / 10:g} mm", _thing(what, floor, surface, connected))
+        for what, room in distances.items()
+    ]
     return ", ".join(f"{room}{'' if k else ' or more'} from {thing}" for k, (room, thing) in enumerate(near))
 
 
-def _thing(what: str, floor: float | None, surface: str) -> str:
+def _thing(what: str, floor: float | None, surface: str, connected: float) -> str:
     """Return what the arm comes near in words."""
     if what == LINKS:
-        return "its own links"
+        stretch = math.ceil(connected * 100.0) * 10
+        return f"its own links (but for up to {stretch} mm of the arm where two are connected)"
     if what == FLOOR and floor is not None:
         return f"the {surface} at {floor * 1e3:g} mm"
     return f"the box '{what.removeprefix(KEPT_OUT)}'"

@@ -10,7 +10,7 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.planning.driving.nearest import nearest_on
-from truearm.planning.driving.said_of_cells import cell_notices
+from truearm.planning.driving.said_of_cells import cell_notices, limits_notices
 from truearm.planning.driving.tour import HOME, Stop, Tour
 from truearm.planning.driving.ways import Way, WayFinder
 
@@ -65,8 +65,11 @@ def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Arr
     cell = finder.check.cell
     distances = nearest_on(finder.check, np.array([stop.joints for stop in stops]))
     room = min(distances.values(), default=math.inf)
-    notices = cell_notices(finder.check)
-    tour = Tour(tuple(stops), cell.floor, cell.clearance, room, cell.surface, distances, notices)
+    limits = limits_notices(finder.check.robot, finder.low, finder.high)
+    notices = (*limits, *cell_notices(finder.check))
+    tour = Tour(
+        tuple(stops), cell.floor, cell.clearance, room, cell.surface, distances, notices, finder.check.connected
+    )
     _refuse_winding(finder, tour)
     return tour
 

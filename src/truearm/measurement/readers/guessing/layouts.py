@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from truearm.errors import InputError
-from truearm.files import read_bytes
+from truearm.files import read_bytes, wide_encoding
 from truearm.limits import refuse_beyond
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, split_line
 from truearm.measurement.readers.sheets import Workbook, is_workbook, open_workbook, sheet_cells, texts_of
@@ -170,6 +170,8 @@ def _decoded(path: Path) -> tuple[str, str]:
     content = read_bytes(path)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         ways = ["utf-16"]
+    elif (wide := wide_encoding(content)) is not None:
+        ways = [wide]
     else:
         ways = ["utf-8-sig", "cp1252", "latin-1"]
     for way in ways:

@@ -25,6 +25,7 @@ from truearm.identification.judging.narrow_data import (
 )
 from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
 from truearm.identification.judging.off_configurations import Off, off_configurations
+from truearm.identification.judging.orientations_off import ORIENTATION_OUTLIERS
 from truearm.identification.judging.step_words import about_change, measured_again, other_model
 from truearm.identification.judging.unmodelled import (
     GEOMETRY,
@@ -70,6 +71,7 @@ _CURED_FIRST: Final = (
     "targets-swapped",
     "target-mistaken",
     "joints-mistaken",
+    ORIENTATION_OUTLIERS,
     "outliers",
     "joints-not-settled",
     "joints-rounded",

@@ -313,7 +313,10 @@ def test_messages_count_in_words() -> None:
     assert far.startswith("1 reading is far from where it must be (configuration/target): 2/2 (")
     assert far.endswith("Measure it again or leave it out; `loss=cauchy` lets it count little.")
     (wrong,) = told(moved_readings(data, np.array([4]), np.array([0.3, 0.0, 0.0])))
-    assert wrong.startswith("1 reading was taken from another point than it names (configuration/target): 2/2 (")
+    assert wrong.startswith("1 reading is far from where it must be (configuration/target): 2/2 (")
+    elsewhere = data.position[5] - data.position[4]
+    (wrong,) = told(moved_readings(data, np.array([4]), elsewhere))
+    assert wrong.startswith("1 reading was taken from another point than it names (configuration/target): 2/2 (is")
     again = np.append(np.arange(30), 4)
     copied = replace(
         data,

@@ -43,14 +43,16 @@ def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list
     Parameters
     ----------
     suspects
-        Readings that are doubted for another reason as well, reported together with those found here.
+        Readings that a robot doubts. At their configurations it tells which reading is wrong better than distances do.
     """
     found = [*_misnamed(data), *_missing(data), *check_duplicates(data)]
     pairs = repeated_joints(data)
     known = {label for pair in pairs for label in pair}
     doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
     found += repeated_joints_notices(data, pairs)
-    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *doubted])
+    told = {suspect.configuration for suspect in doubted}
+    rigid = [suspect for suspect in rigid_suspects(data) if suspect.configuration not in told]
+    found += suspect_notices([*rigid, *reference_suspects(data), *doubted])
     return found + _moved(data) + _temperatures(data)
 
 

@@ -15,6 +15,7 @@ from truearm.identification.judging.slip_trials import angle_slips, as_noted
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.places import Places, places_of
+from truearm.measurement.repeats import repeated_joints
 from truearm.measurement.rigid_tool import Suspect, Suspicion, fixed_points, suspect
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
@@ -54,12 +55,12 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
     predicted = np.stack([fit.robot.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
     mistaken = _joints_of_others(data, predicted, doubted, allowed)
     angled, slips = _in_another_unit(fit, data, doubted, allowed, [*mistaken])
-    points = places_of(data)
-    known = fixed_points(data)
+    points, known = places_of(data), fixed_points(data)
+    repeated = {label for pair in repeated_joints(data) for label in pair}
     suspects: list[Suspect] = []
     unlike: dict[int, float] = {}
     for c in dict.fromkeys(data.configuration[doubted].tolist()):
-        if c in mistaken or c in angled:
+        if c in mistaken or c in angled or data.labels[c] in repeated:
             continue
         mine = [r for r in doubted.tolist() if data.configuration[r] == c]
         of_this = [_doubted(data, r, predicted[c], points, known, float(off[r]), allowed) for r in mine]

@@ -77,12 +77,14 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
         size = np.linalg.norm(errors.orientation_errors[rows], axis=1).tolist()
         joint = [_as_if_turned(fit, data, r, errors.orientation_errors[r]) for r in rows.tolist()]
         others = [f"{where[i]} ({degrees(size[i])} deg{joint[i]})" for i in np.flatnonzero(~mended).tolist()]
-        what, them = ("orientation is", "it") if len(others) == 1 else ("orientations are", "them")
+        one = len(others) == 1
+        what, them = ("orientation is", "it") if one else ("orientations are", "them")
+        quaternions = "its quaternion" if one else "their quaternions"
         found.append(
             Notice(
                 ORIENTATION_OUTLIERS,
                 f"{len(others)} {what} far off, and the positions are not (configuration/target): {listed(others)}. "
-                f"Measure {them} again, or leave these quaternions empty; `loss=cauchy` lets {them} count little.",
+                f"Measure {them} again, or leave {quaternions} empty; `loss=cauchy` lets {them} count little.",
             )
         )
     return found

@@ -32,6 +32,8 @@ _FEWEST_OFTEN: Final = 4
 _OFTEN_SHARE: Final = 0.05
 #: Configurations whose joint positions are looked for among the others'.
 _MOST_LOOKED_AT: Final = 50
+#: Another unit explains readings that it brings so many times nearer: a target on the axis of a joint hardly moves.
+_LEAST_IMPROVEMENT: Final = 10.0
 #: Nothing is doubted with fewer numbers for each free parameter.
 _LEAST_NUMBERS: Final = 1.5
 #: Distances tell that readings hang together where some are so many times as long as a reading may be off.
@@ -54,7 +56,7 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
         return [], []
     predicted = np.stack([fit.robot.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
     mistaken = _joints_of_others(data, predicted, doubted, allowed)
-    angled, slips = _in_another_unit(fit, data, doubted, allowed, [*mistaken])
+    angled, slips = _in_another_unit(fit, data, off, doubted, allowed, [*mistaken])
     points, known = places_of(data), fixed_points(data)
     repeated = {label for pair in repeated_joints(data) for label in pair}
     suspects: list[Suspect] = []
@@ -118,12 +120,14 @@ def _hang_together(
 
 
 def _in_another_unit(
-    fit: Fit, data: Dataset, doubted: IntArray, allowed: float, left_out: list[int]
+    fit: Fit, data: Dataset, off: Array, doubted: IntArray, allowed: float, left_out: list[int]
 ) -> tuple[set[int], list[Notice]]:
     """Return the configurations whose readings fit their joint positions in the other unit of angle, and say so.
 
     Parameters
     ----------
+    off
+        How far off each reading is [m], ``(readings,)``.
     doubted
         The readings that are far off.
     left_out
@@ -135,6 +139,7 @@ def _in_another_unit(
     if not len(some):
         return set(), []
     part = data.of_configurations(some)
+    off_most = {c: float(np.nanmax(off[data.configuration == c])) for c in some.tolist()}
     found: dict[str, list[int]] = {}
     explained: set[int] = set()
     for slip in as_noted(fit.robot, part, angle_slips):
@@ -142,7 +147,7 @@ def _in_another_unit(
         gaps = np.linalg.norm(np.stack(places, axis=1)[part.configuration, part.target] - part.position, axis=1)
         for index, c in enumerate(some.tolist()):
             gap = float(gaps[(part.configuration == index) & part.has_position].max())
-            if c not in explained and gap <= allowed:
+            if c not in explained and gap <= min(allowed, off_most[c] / _LEAST_IMPROVEMENT):
                 explained.add(c)
                 found.setdefault(slip.words.partition(".")[0], []).append(c)
     return explained, [

@@ -89,8 +89,8 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
         if slips:
             return Comparison([*slips, *found])
         fit = identify(robot, data, named_model("geometric"), loss="cauchy")
-        unlike, suspects = _far_from_fixtures(fit, data)
-        return Comparison([*check_robot(fit, data), *unlike, *found], suspects, fit, data)
+        unlike, off_fixtures = _far_from_fixtures(fit, data)
+        return Comparison([*check_robot(fit, data), *unlike, *found], off_fixtures, fit, data)
     if not data.has_position.any():
         return Comparison(found)
     slips = slips_in_positions(robot, data)

@@ -20,6 +20,7 @@ from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.next_steps import Judged, steps_after_fit, what_moved
 from truearm.identification.judging.off_configurations import off_configurations
 from truearm.identification.judging.one_sided import check_one_sided
+from truearm.identification.judging.orientation_slips import ORIENTATION_SLIPS
 from truearm.identification.judging.orientations_off import ORIENTATION_OUTLIERS
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.separate_visits import check_separate_visits
@@ -33,8 +34,8 @@ from truearm.measurement.statistics import Errors
 from truearm.notices import Notice, has_error
 from truearm.shown import counted
 
-#: Codes of wrong readings that pull a fit away, of losses by which readings far off count.
-_PULLING: Final = frozenset({ORIENTATION_OUTLIERS, "joints-mistaken"})
+#: Codes of wrong readings that pull a fit away, and losses that let them.
+_PULLING: Final = frozenset({ORIENTATION_OUTLIERS, *ORIENTATION_SLIPS, "joints-mistaken", "unit-angle"})
 _PULLED: Final = frozenset({"linear", "huber"})
 
 

@@ -1,48 +1,31 @@
 """Jogging in the studio: from the event that a window sends to the pose that comes back, over its own connection.
 
-``python benchmarks/studio_jog.py [--moves N]`` serves a project of a rigid, of an elastic and of a redundant elastic
-arm, opens a window without a browser beside it, and drags sliders and the handle. It prints the time from sending the
-event to having the flange's new pose, in ms, the browser's share left out. The window may gather messages for a
-sixtieth of a second; that is in the times.
+``python benchmarks/studio_jog.py [--moves N] [--out FILE]`` starts ``truearm studio`` in a process of its own with a
+rigid, an elastic and a redundant elastic arm, opens a window without a browser beside it, and drags sliders and the
+handle. It prints the time from sending the event to having the flange's new pose, in ms, the browser's share left out,
+and how much comes with each move.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
-import viser
-import zstandard
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Subprotocol
+from studio_line import Line, Message, moved, studio
 
 import truearm
 from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation
-from truearm.studio.pages.jog import JogPage
-from truearm.studio.serving import Studio, serve
-
-CAMERA: dict[str, Any] = {
-    "type": "ViewerCameraMessage",
-    "wxyz": [1.0, 0.0, 0.0, 0.0],
-    "position": [3.0, 3.0, 3.0],
-    "fov": 1.3,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 600,
-    "image_width": 800,
-    "look_at": [0.0, 0.0, 0.0],
-    "up_direction": [0.0, 0.0, 1.0],
-}
+from truearm.studio.jogging import Jogging
 
 
 def elastic(name: str) -> Robot:
@@ -51,102 +34,61 @@ def elastic(name: str) -> Robot:
     return robot.with_values({name: 3e-5 for name in robot.parameters if name.startswith("compliance")})
 
 
-def opened(studio: Studio) -> ClientConnection:
-    place = f"127.0.0.1:{studio.access.port}"
-    return connect(
-        f"ws://{place}/",
-        origin=f"http://{place}",  # type: ignore[arg-type]
-        subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
-        max_size=None,
-        compression=None,
-        proxy=None,
-    )
-
-
-def answered(line: ClientConnection, seconds: float = 5.0) -> bool:
-    """Wait until the flange has been moved."""
-    end = time.perf_counter() + seconds
-    while (left := end - time.perf_counter()) > 0.0:
-        try:
-            content = line.recv(timeout=left)
-        except TimeoutError:
-            return False
-        assert isinstance(content, bytes)
-        unpacked = zstandard.ZstdDecompressor().decompressobj().decompress(content[16:])
-        if b"SetPositionMessage" in unpacked and b"/nominal/flange" in unpacked:
-            return True
-    return False
-
-
-def quiet(line: ClientConnection) -> None:
-    """Read on until nothing comes any more."""
+def slid(line: Line, arm: Jogging, rng: np.random.Generator) -> Iterator[Message]:
+    """Yield messages of sliders, one joint after the other."""
+    sliders = [line.elements[f"{joint.name} [{unit}]"] for joint, unit in zip(arm.robot.joints, arm.units, strict=True)]
     while True:
-        try:
-            line.recv(timeout=0.15)
-        except TimeoutError:
-            return
+        for slider, (low, high) in zip(sliders, arm.ranges(), strict=True):
+            value = low + (high - low) * float(rng.uniform(0.3, 0.7))
+            yield {"type": "GuiUpdateMessage", "uuid": slider["uuid"], "updates": {"value": value}}
 
 
-def timed(line: ClientConnection, messages: Iterator[dict[str, Any]], moves: int) -> list[float]:
-    taken = []
+def dragged(arm: Jogging) -> Iterator[Message]:
+    """Yield messages of the handle on a way that the arm can follow, from where it is."""
+    for k in range(10**6):
+        joints = arm.joints + 0.05 * np.sin(0.3 * k + np.arange(len(arm.joints)))
+        p, R = arm.robot.forward(joints, frame="world")
+        pose = {"wxyz": quaternion_from_rotation(R[0]).tolist(), "position": p[0].tolist()}
+        yield {"type": "TransformControlsUpdateMessage", "name": "/handle", "owner": "", **pose}
+
+
+def timed(line: Line, messages: Iterator[Message], moves: int) -> dict[str, Any]:
+    taken, before = [], (line.bytes, line.messages)
     for _ in range(moves):
-        message = msgspec.msgpack.encode(next(messages))
-        quiet(line)
+        message = next(messages)
+        line.quiet()
         began = time.perf_counter()
-        line.send(message)
-        if answered(line):
+        line.send(**message)
+        if line.until(moved, 5.0):
             taken.append((time.perf_counter() - began) * 1e3)
-    return taken
+    line.quiet()
+    return {
+        "moves": len(taken),
+        "median_ms": round(float(np.median(taken)), 1),
+        "p95_ms": round(float(np.percentile(taken, 95)), 1),
+        "max_ms": round(float(np.max(taken)), 1),
+        "bytes": round((line.bytes - before[0]) / moves),
+        "messages": round((line.messages - before[1]) / moves, 1),
+    }
 
 
 def measure(robot: Robot, moves: int) -> dict[str, Any]:
+    rng = np.random.default_rng(0)
     with tempfile.TemporaryDirectory() as folder:
         project = Path(folder) / "project"
         project.mkdir()
         (project / "truearm-studio.yaml").write_text("truearm: truearm-studio/1\nrobot: arm.yaml\n")
         (project / "arm.yaml").write_text(robot_text(robot))
-        studio = serve(project, port=0)
-        try:
-            page = next(page for page in studio.window.pages if isinstance(page, JogPage))
-            with opened(studio) as line:
-                line.send(msgspec.msgpack.encode(CAMERA))
-                quiet(line)
-                rng = np.random.default_rng(0)
-                arm = page.jogging
-                assert arm is not None
-                start = robot.random_configurations(1, rng)[0] * 0.3 + arm.joints * 0.7
-
-                def slid() -> Iterator[dict[str, Any]]:
-                    for k in range(10**6):
-                        slider = page._sliders[k % len(page._sliders)]
-                        value = slider.min + (slider.max - slider.min) * float(rng.uniform(0.3, 0.7))
-                        yield {"type": "GuiUpdateMessage", "uuid": slider._impl.uuid, "updates": {"value": value}}
-
-                def dragged() -> Iterator[dict[str, Any]]:
-                    arm.go(start)
-                    for k in range(10**6):
-                        p, R = robot.forward(start + 0.05 * np.sin(0.3 * k + np.arange(len(start))), frame="world")
-                        q = quaternion_from_rotation(R[0])
-                        yield {
-                            "type": "TransformControlsUpdateMessage",
-                            "name": "/handle",
-                            "wxyz": q.tolist(),
-                            "position": p[0].tolist(),
-                            "owner": "",
-                        }
-
-                found: dict[str, Any] = {}
-                for name, messages in (("joint", slid()), ("handle", dragged())):
-                    taken = timed(line, messages, moves)
-                    found[name] = {
-                        "moves": len(taken),
-                        "median_ms": round(float(np.median(taken)), 1),
-                        "p95_ms": round(float(np.percentile(taken, 95)), 1),
-                        "max_ms": round(float(np.max(taken)), 1),
-                    }
-                return found
-        finally:
-            studio.stop()
+        with studio(project) as (_, address):
+            line, arm = Line(address), Jogging(robot)
+            line.quiet(1.0)
+            found = {"joint": timed(line, slid(line, arm, rng), moves)}
+            # From the middle of what the sliders have been led through the handle is dragged.
+            arm.joints = robot.random_configurations(1, rng)[0] * 0.3 + arm.joints * 0.7
+            for slider, value in zip(slid(line, arm, rng), arm.numbers, strict=False):
+                line.send(**{**slider, "updates": {"value": value}})
+                line.quiet()
+            return {**found, "handle": timed(line, dragged(arm), moves)}
 
 
 def main() -> None:
@@ -155,13 +97,15 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
     arms = {"irb120": load_robot("irb120"), "irb120 elastic": elastic("irb120"), "fr3 elastic": elastic("fr3")}
-    found = {name: measure(robot, given.moves) for name, robot in arms.items()}
-    for name, kinds in found.items():
-        for kind, figures in kinds.items():
-            print(f"{name:16} {kind:8} {figures}")  # noqa: T201
+    found = {}
+    for name, robot in arms.items():
+        busy = os.getloadavg()[0]
+        found[name] = {**measure(robot, given.moves), "load_before": round(busy, 1)}
+        for kind in ("joint", "handle"):
+            print(f"{name:16} {kind:8} {found[name][kind]}", flush=True)  # noqa: T201
     if given.out:
-        content = {"truearm": truearm.__version__, "arms": found}
-        given.out.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        content = {"truearm": truearm.__version__, "processors": os.cpu_count(), "arms": found}
+        given.out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -28,19 +28,27 @@ def measured_data() -> Path:
     return folder
 
 
+#: Files that copy their process hundreds of times, which takes ten times as long once it has grown: begun first of all.
+COPYING = "tests/test_killed_runs.py"
 #: Files whose tests, or what they share, take seconds each: begun first, no process is left alone with them at the end.
 SLOW = ("tests/test_documents.py", "tests/test_measured.py", "tests/simulation/devices/", "tests/studies/")
 
 
+def pytest_configure() -> None:
+    """Collect no garbage while tests are collected: nearly all that is made then stays, and is looked at in vain."""
+    gc.disable()
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the slow files first; the order within a file stays, as what its tests share is made once."""
-    items.sort(key=lambda item: not item.nodeid.startswith(SLOW))
+    items.sort(key=lambda item: (not item.nodeid.startswith(COPYING), not item.nodeid.startswith(SLOW)))
 
 
 def pytest_collection_finish() -> None:
     """Keep what is loaded now, and stays, out of every later garbage collection."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -9,16 +9,14 @@ job must be done in it afterwards, and leave nothing but its files. Jobs can be 
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import tempfile
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tests.jobs.examples import EXAMPLES
-from tests.killing import before_each, contents, done, found, leftovers
+from tests.killing import contents, done, found, killed_copies, leftovers
 
 import truearm
 from truearm.compensation.program_files import program_files
@@ -118,28 +116,6 @@ def arguments(job: str, folder: Path, out: Path) -> Arguments:
     return given | {name: out / place for name, place in PLACES[job].items()}
 
 
-def copies(work: Callable[[], object], out: Path, kept: Path) -> int:
-    """Do some work in a copy of this process, and keep what stands in a folder before every operation in it."""
-
-    def copying() -> None:
-        number = [0]
-        busy = [False]
-
-        def hook(_: object) -> None:
-            if busy[0]:
-                return
-            busy[0] = True
-            shutil.copytree(out, kept / f"{number[0]:04}", symlinks=True) if out.exists() else None
-            number[0] += 1
-            busy[0] = False
-
-        before_each(out, hook)
-        work()
-
-    assert done(copying)
-    return len([*kept.iterdir()])
-
-
 def state(folder: Path) -> object:
     """Return what stands in a folder, without the names that are drawn."""
     return sorted(
@@ -163,19 +139,18 @@ def tried(job: str, folder: Path, *, earlier: bool) -> str:
     """Kill a job everywhere, and return the figures in a line."""
     inputs, out, kept = folder / "inputs", folder / "out", folder / "kept"
     inputs.mkdir()
-    kept.mkdir()
     call = getattr(truearm, ALSO.get(job, (job, {}))[0])
     given = arguments(job, inputs, out)
     if earlier:
         call(**given | EARLIER[job])
     old = contents(out) if out.exists() else {}
-    number = copies(lambda: call(**given), out, kept)
+    copies = killed_copies(lambda: call(**given), out, kept)
     written = together(out)
     new = contents(out)
     names = {*new}
     seen: dict[str, int] = {}
     healed: list[object] = []
-    for copy in sorted(kept.iterdir()):
+    for copy in copies:
         word = found(copy, old, new, written)
         seen[word] = seen.get(word, 0) + 1
         if job == "compensate" and (copy / "plate.mod").exists():
@@ -195,7 +170,7 @@ def tried(job: str, folder: Path, *, earlier: bool) -> str:
         assert {*contents(copy)} == names, f"other files than before after {copy.name}: {[*contents(copy)]}"
         assert leftovers(copy) == [], f"left after {copy.name}: {leftovers(copy)}"
     words = ", ".join(f"{count} {word}" for word, count in sorted(seen.items()))
-    return f"{number:4} kills, {len(healed):3} states ({words})"
+    return f"{len(copies):4} kills, {len(healed):3} states ({words})"
 
 
 def main(jobs: list[str]) -> None:

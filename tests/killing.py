@@ -11,6 +11,7 @@ from __future__ import annotations
 import fcntl
 import io
 import os
+import shutil
 import signal
 import sys
 import warnings
@@ -64,6 +65,42 @@ def killed(work: Callable[[], object], folder: Path, number: int) -> None:
 
     status = _in_a_copy(until)
     assert status == -signal.SIGKILL, f"the work ended with {status} before operation {number}"
+
+
+def killed_copies(work: Callable[[], object], folder: Path, kept: Path) -> list[Path]:
+    """Do some work in a copy of this process, and return copies of a folder as a kill before each operation leaves it.
+
+    A killed process leaves what is on disk at that moment, of a text that is being written a half. So one run shows
+    what :func:`killed` needs a process for each operation for.
+
+    Parameters
+    ----------
+    kept
+        The folder for the copies, which is made; outside `folder`.
+    """
+    kept.mkdir()
+
+    def copying() -> None:
+        number = [0]
+        busy = [False]
+
+        def hook(half: Callable[[], object] | None) -> None:
+            if busy[0]:
+                return
+            busy[0] = True
+            if half is not None:
+                half()
+            if folder.exists():
+                shutil.copytree(folder, kept / f"{number[0]:04}", symlinks=True)
+            number[0] += 1
+            busy[0] = False
+
+        before_each(folder, hook)
+        work()
+
+    status = _in_a_copy(copying)
+    assert status == 0, f"the work ended with {status}"
+    return sorted(kept.iterdir())
 
 
 def between(one: Callable[[], object], other: Callable[[], object], folder: Path, number: int) -> None:
@@ -205,7 +242,11 @@ def before_each(folder: Path, hook: Callable[[Callable[[], object] | None], None
 
     class Stream(io.FileIO):
         def write(self, content: Any) -> int:
+            place = self.tell()
             hook(lambda: io.FileIO.write(self, bytes(content)[: len(content) // 2]))
+            if self.tell() != place:  # the half was looked at
+                self.seek(place)
+                self.truncate()
             return super().write(content)
 
     def open_counted(file: Any, mode: str = "r", *words: Any, **named: Any) -> Any:

@@ -54,7 +54,7 @@ SEEDS_OF = {"measured": SEEDS, "ur5": (0,), "kr5": (1,), "lrmate200ic": (2,)}
 def clean(request: pytest.FixtureRequest) -> tuple[str, Dataset]:
     if request.param == "measured":
         data: Dataset = request.getfixturevalue("measured")
-        return "irb120", data.of_configurations(range(0, data.configurations, 3))
+        return "irb120", data.of_configurations(range(0, data.configurations, 6))
     return request.param, campaign(request.param, 40, 0.05e-3, 17)[1]
 
 

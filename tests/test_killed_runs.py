@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from tests.jobs.examples import EXAMPLES
-from tests.killing import between, contents, found, killed, leftovers, operations
+from tests.killing import between, contents, found, killed, killed_copies, leftovers, operations
 
 import truearm
 from truearm.compensation.program_files import program_files, restored, write_programs
@@ -63,15 +63,13 @@ def test_several_files_are_old_or_new_or_refused(tmp_path: Path, old: dict[str, 
         write_files(folder, NEW, "truearm again")
 
     fresh(folder, old)
-    for number in range(operations(work, tmp_path)):
-        fresh(folder, old)
-        killed(work, tmp_path, number)
-        seen.add(found(folder, before, as_new, [set(NEW)]))
-        work()
-        assert contents(folder) == as_new
-        assert leftovers(folder) == []
+    for copy in killed_copies(work, folder, tmp_path / "kept"):
+        seen.add(found(copy, before, as_new, [set(NEW)]))
+        write_files(copy, NEW, "truearm again")
+        assert contents(copy) == as_new
+        assert leftovers(copy) == []
+        assert [set(one.files) for one in sets_in(copy)] == [set(NEW)]
     assert seen == {"old", "refused", "new"}
-    assert [set(one.files) for one in sets_in(folder)] == [set(NEW)]
 
 
 def test_a_single_file_is_old_or_new(tmp_path: Path) -> None:
@@ -87,14 +85,11 @@ def test_a_run_that_heals_may_be_killed_too(tmp_path: Path, unfinished: Path) ->
     folder = tmp_path / "out"
     before, as_new = in_bytes(OLD), in_bytes(NEW)
     shutil.copytree(unfinished, folder)
-    for number in range(operations(lambda: write_files(folder, NEW), folder)):
-        shutil.rmtree(folder)
-        shutil.copytree(unfinished, folder)
-        killed(lambda: write_files(folder, NEW), folder, number)
-        found(folder, before, as_new, [set(NEW)])
-        write_files(folder, NEW)
-        assert contents(folder) == as_new
-        assert leftovers(folder) == []
+    for copy in killed_copies(lambda: write_files(folder, NEW), folder, tmp_path / "kept"):
+        found(copy, before, as_new, [set(NEW)])
+        write_files(copy, NEW)
+        assert contents(copy) == as_new
+        assert leftovers(copy) == []
 
 
 # -- programs: never corrected twice
@@ -120,35 +115,28 @@ def test_a_program_is_never_corrected_twice(
     original = first.files[0].file.original
     out = tmp_path / "out"
 
-    def prepare() -> dict[str, bytes]:
-        shutil.rmtree(out, ignore_errors=True)
-        if earlier:
-            shutil.copytree(tmp_path / "first", out)
-        return contents(out) if earlier else {}
-
-    def work() -> None:
+    def work(out: Path) -> None:
         write_programs(output_folder(out), [], texts, "truearm again")
 
-    first.save(tmp_path / "first")
-    before = prepare()
+    if earlier:
+        first.save(out)
+    before = contents(out) if earlier else {}
     texts = written_by(second)
     assert before.get("plate.mod") != texts["plate.mod"]
-    for number in range(operations(work, out)):
-        prepare()
-        killed(work, tmp_path, number)
-        found(out, before, texts, [set(texts)])
-        if (out / "plate.mod").exists():
+    for copy in killed_copies(lambda: work(out), out, tmp_path / "kept"):
+        found(copy, before, texts, [set(texts)])
+        if (copy / "plate.mod").exists():
             with pytest.raises(InputError, match=r"corrected already|has not finished"):
-                program_files([out / "plate.mod"])
-            if leftovers(out).count(UNFINISHED):
+                program_files([copy / "plate.mod"])
+            if leftovers(copy).count(UNFINISHED):
                 with pytest.raises(InputError, match=r"has not finished.* so run that command again: truearm again$"):
-                    restored([out / "plate.mod"])
+                    restored([copy / "plate.mod"])
             else:
-                assert program_files([out / "plate.mod"], again=True)[0].original == original
-                assert restored([out / "plate.mod"])[0].original == original
-        work()
-        assert contents(out) == texts
-        assert leftovers(out) == []
+                assert program_files([copy / "plate.mod"], again=True)[0].original == original
+                assert restored([copy / "plate.mod"])[0].original == original
+        work(copy)
+        assert contents(copy) == texts
+        assert leftovers(copy) == []
 
 
 def written_by(correction: ProgramCorrection) -> dict[str, bytes]:

@@ -28,12 +28,15 @@ def unpacked_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_wheel_calibrates_outside_the_clone(unpacked_wheel: Path, tmp_path: Path) -> None:
-    start = f"import sys; sys.path.insert(0, {str(unpacked_wheel)!r}); from truearm.cli import main; "
-    for words in (["robots"], ["demo", "--out", "demo"], ["new-robot", "mine.yaml"], ["show", "mine.yaml"]):
-        script = (
-            f"{start}import truearm; assert {str(unpacked_wheel)!r} in truearm.__file__; sys.argv[1:] = {words}; main()"
-        )
-        subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True)
+    script = (
+        f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nimport truearm\nfrom truearm.cli import main\n"
+        f"assert {str(unpacked_wheel)!r} in truearm.__file__\n"
+        "for words in ('robots', 'demo --out demo', 'new-robot mine.yaml', 'show mine.yaml'):\n"
+        "    sys.argv[1:] = words.split()\n"
+        "    try:\n        main()\n    except SystemExit as end:\n        assert not end.code\n"
+    )
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "mine.yaml").exists()
     assert (tmp_path / "demo" / "report.html").stat().st_size > 1_000_000
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from truearm.errors import InputError
-from truearm.manifest import MANIFEST, UNFINISHED
-from truearm.writing import output_folder, write_files, write_text
+from truearm.files import read_bytes
+from truearm.manifest import MANIFEST, UNFINISHED, hash_of, sets_in
+from truearm.writing import output_folder, put_in_place, write_files, write_text, write_text_over
 
 
 def test_what_is_no_plain_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,3 +99,70 @@ def test_an_interrupt_behind_the_mark_puts_back_the_old_files(tmp_path: Path, mo
     with pytest.raises(KeyboardInterrupt):
         write_files(tmp_path, {"a": "new", "b": "new"})
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "old"}
+
+
+def test_a_file_is_written_over_the_one_that_is_known_and_over_no_other(tmp_path: Path) -> None:
+    file = tmp_path / "a"
+    write_text_over(file, "one", None)
+    write_text_over(file, "two", hash_of(b"one"))
+    for known in (None, hash_of(b"one")):
+        with pytest.raises(InputError, match="another program has changed this file, and it is not overwritten"):
+            write_text_over(file, "three", known)
+    file.unlink()
+    with pytest.raises(InputError, match="another program has changed this file"):
+        write_text_over(file, "three", hash_of(b"two"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_of_several_files_none_is_written_where_one_is_another_than_is_known(tmp_path: Path) -> None:
+    write_files(tmp_path, {"a": "old a", "b": "old b"})
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(InputError, match="another program has changed this file"):
+        write_files(tmp_path, {"a": "new", "b": "new"}, standing={"b": None})
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_is_put_in_its_place_and_in_the_place_of_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError
+
+    if not links:
+        monkeypatch.setattr(os, "link", refused)
+    source = tmp_path / ".new"
+    source.write_text("one")
+    put_in_place(source, tmp_path / "a")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "one"}
+    source.write_text("two")
+    with pytest.raises(InputError, match="exists already and is not overwritten"):
+        put_in_place(source, tmp_path / "a")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "one", ".new": "two"}
+
+
+def test_a_file_that_appears_while_another_is_put_in_its_place_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target, link = tmp_path / ".new", tmp_path / "a", os.link
+    source.write_text("one")
+
+    def late(*names: Path, **how: bool) -> None:
+        target.write_text("another's")
+        link(names[0], names[1], follow_symlinks=how["follow_symlinks"])
+
+    monkeypatch.setattr(os, "link", late)
+    with pytest.raises(InputError, match="exists already and is not overwritten"):
+        put_in_place(source, target)
+    assert target.read_text() == "another's"
+
+
+def test_a_file_in_the_place_of_one_of_a_set_that_was_removed_is_the_sets_no_more(tmp_path: Path) -> None:
+    write_files(tmp_path, {"a": "1", "b": "2"})
+    (tmp_path / "a").unlink()
+    source = tmp_path / ".new"
+    source.write_text("mine")
+    put_in_place(source, tmp_path / "a")
+    assert read_bytes(tmp_path / "a") == b"mine"
+    assert [name for one in sets_in(tmp_path) for name in one.files] == ["b"]
+    assert not source.exists()

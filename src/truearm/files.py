@@ -198,7 +198,7 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     return validated(content, schema, str(path))
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=128)
 def _loaded(text: str) -> Any:
     """Return what a YAML text holds; files that are read again and again are not parsed again, which is slow."""
     from ruamel.yaml import YAML

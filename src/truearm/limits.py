@@ -97,6 +97,8 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "robots": Limit(1_000_000, "there are too many robots", "robots"),
     "workers": Limit(1000, "the number is out of range", "workers"),
     "upload": Limit(50_000_000, "the file is too large to be taken in", "bytes", "Copy it into the folder yourself."),
+    "mesh_size": Limit(30_000_000, "the mesh is too large", "bytes", "Save it with fewer triangles."),
+    "triangles": Limit(500_000, "there are too many triangles to draw", "triangles", "Save meshes with fewer of them."),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal
 
 #: ``note``: good to know. ``warning``: a figure may not hold. ``error``: the result should not be used as it is.
@@ -23,11 +23,15 @@ class Notice:
         What was noticed and what to do about it.
     level
         How bad it is.
+    at
+        The readings that it is about, where it is about single ones: label of the configuration and name of the
+        target, which is empty for all that were read there.
     """
 
     code: str
     message: str
     level: Level = "warning"
+    at: tuple[tuple[str, str], ...] = field(default=(), compare=False, repr=False)
 
     def summary(self) -> dict[str, str]:
         """Return it as JSON holds it."""

@@ -3,35 +3,26 @@
 from __future__ import annotations
 
 import os
-import re
-import secrets
-import shutil
-import sys
 import tempfile
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import broken_link, exists, path_argument, reason_of
-from truearm.manifest import (
-    MANIFEST,
-    UNFINISHED,
-    FileSet,
-    Unfinished,
-    hash_of,
-    manifest_text,
-    not_ours,
-    sets_in,
-    unfinished_above,
-    unfinished_in,
-    unfinished_text,
+from truearm.manifest import MANIFEST, UNFINISHED, FileSet, manifest_text, sets_in, unfinished_above
+from truearm.replacing import (
+    alone_in,
+    clear_temporary,
+    file_set,
+    is_the_known,
+    replace_all,
+    synchronise,
+    undo_unfinished,
+    write_through,
+    writing_refused_at,
 )
-
-#: Names of files that are there only while others are written.
-_TEMPORARY: Final = re.compile(r"\.truearm\.[0-9a-z_]{8,16}")
 
 
 def output_folder(
@@ -91,7 +82,7 @@ def _refuse_not_ours(path: Path, name: str, sets: Sequence[FileSet]) -> None:
             where=str(path),
             cure="Choose another `out`, or move the file.",
         )
-    if not any(_is(path, hashed) for hashed in known):
+    if not any(is_the_known(path, hashed) for hashed in known):
         raise InputError(
             "this was written here by truearm and has been changed since, and is not overwritten",
             where=str(path),
@@ -102,6 +93,46 @@ def _refuse_not_ours(path: Path, name: str, sets: Sequence[FileSet]) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write a whole file or nothing: a reader never sees half of it, and a failure leaves the old one."""
     write_files(path.parent, {path.name: text})
+
+
+def write_text_over(path: Path, text: str, known: str | None) -> None:
+    """Write a whole file in place of the one that is known, and refuse to where another stands there by now.
+
+    Parameters
+    ----------
+    known
+        Hash of the file that is replaced (:func:`truearm.manifest.hash_of`); None if there shall be none.
+    """
+    write_files(path.parent, {path.name: text}, standing={path.name: known})
+
+
+def put_in_place(source: Path, target: Path) -> None:
+    """Give a file beside its place its name there, once it is on disk; nothing is overwritten.
+
+    Raises
+    ------
+    InputError
+        If something of that name stands there, or it cannot be moved.
+    """
+    new_file(target)
+    put_back_old(target.parent)
+    if any(target.name in one.files for one in sets_in(target.parent)):  # it was removed, and comes again
+        write_files(target.parent, {target.name: source.read_bytes()}, standing={target.name: None})
+        source.unlink()
+        return
+    with writing_refused_at(target), alone_in([target.parent]):
+        write_through(source)
+        try:
+            os.link(source, target, follow_symlinks=False)
+        except FileExistsError:
+            new_file(target)
+            raise
+        except OSError:  # where files cannot have two names
+            new_file(target)
+            source.replace(target)
+        else:
+            source.unlink()
+        synchronise([target])
 
 
 def write_new_text(path: Path, text: str) -> None:
@@ -179,7 +210,12 @@ def refuse_overwriting(out: Path, inputs: Iterable[Path]) -> None:
             )
 
 
-def write_files(folder: Path, files: Mapping[str, str | bytes], command: str | None = None) -> None:
+def write_files(
+    folder: Path,
+    files: Mapping[str, str | bytes],
+    command: str | None = None,
+    standing: Mapping[str, str | None] | None = None,
+) -> None:
     """Write several files into a folder, all of them or none, with a manifest of them.
 
     They are put in place only once all of them are on disk, each in one step, while no other run writes there. Whatever
@@ -196,11 +232,13 @@ def write_files(folder: Path, files: Mapping[str, str | bytes], command: str | N
         folder, or be whole paths.
     command
         How to write them again, for the manifest.
+    standing
+        Hashes of files that must stand there as they are known, by name; None for one that must not be there.
 
     Raises
     ------
     InputError
-        If one of them cannot be written.
+        If one of them cannot be written, or another stands there than is known.
     """
     contents: dict[Path, bytes] = {}
     for name, text in files.items():
@@ -215,15 +253,16 @@ def write_files(folder: Path, files: Mapping[str, str | bytes], command: str | N
     made: list[Path] = []
     try:
         for place in folders:
-            with _refusals_at(place):
+            with writing_refused_at(place):
                 _make_folders(place, made)
             put_back_old(place)
-        with _alone_in(folders):
+        with alone_in(folders):
             for place in folders:
-                with _refusals_at(place):
-                    _undo(place)
-                    _clear(place)
-            _replace(folder, _with_manifest(folder, contents, command), command)
+                with writing_refused_at(place):
+                    undo_unfinished(place)
+                    clear_temporary(place)
+            known = {folder / name: value for name, value in (standing or {}).items()}
+            replace_all(folder, _with_manifest(folder, contents, command), command, known)
         made.clear()
     finally:
         for new in reversed(made):
@@ -235,59 +274,15 @@ def put_back_old(folder: Path) -> None:
     """Put back the old files where a run that wrote into a folder was killed between two steps."""
     for place, run in unfinished_above(folder.absolute() / "any"):
         folders = {place, *((place / name).parent for name in run.new.files)}
-        with _refusals_at(place), _alone_in(each for each in folders if each.is_dir()):
-            _undo(place)
+        with writing_refused_at(place), alone_in(each for each in folders if each.is_dir()):
+            undo_unfinished(place)
             for each in folders:
-                _clear(each)
-
-
-@contextmanager
-def _refusals_at(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"the file cannot be written ({reason_of(error)})", where=str(path)) from error
-
-
-@contextmanager
-def _alone_in(folders: Iterable[Path]) -> Iterator[None]:
-    """Let other runs wait that write into the same folders; always in one order, so that no two wait for each other."""
-    with ExitStack() as held:
-        for folder in sorted({folder.resolve() for folder in folders}):
-            held.enter_context(_locked(folder))
-        yield
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Lock a folder; the lock ends with the process, however that ends."""
-    if sys.platform == "win32":  # folders cannot be opened there
-        yield
-        return
-    import fcntl
-
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-        with suppress(OSError):  # by itself, as a copy of this process would hold on to it
-            fcntl.flock(handle, fcntl.LOCK_UN)
-    finally:
-        os.close(handle)
-
-
-def _clear(folder: Path) -> None:
-    """Remove what killed runs have left in a folder in which no other run writes now."""
-    with suppress(OSError):
-        for path in folder.iterdir():
-            if _TEMPORARY.fullmatch(path.name):
-                path.unlink(missing_ok=True)
+                clear_temporary(each)
 
 
 def _with_manifest(folder: Path, contents: Mapping[Path, bytes], command: str | None) -> dict[Path, bytes]:
     """Return contents with the folder's manifest behind them, where they belong into one."""
-    new = _file_set(folder, contents, command)
+    new = file_set(folder, contents, command)
     before = sets_in(folder)
     if len(contents) == 1 and not any(name in one.files for one in before for name in new.files):
         return {**contents}
@@ -301,125 +296,8 @@ def _with_manifest(folder: Path, contents: Mapping[Path, bytes], command: str | 
     return {**contents, folder / MANIFEST: manifest_text(sets).encode()}
 
 
-def _file_set(folder: Path, contents: Mapping[Path, bytes], command: str | None) -> FileSet:
-    return FileSet({_name(target, folder): hash_of(content) for target, content in contents.items()}, command)
-
-
-def _name(target: Path, folder: Path) -> str:
-    """Return the name of a file in a folder, its whole path if it is elsewhere."""
-    return str(target.relative_to(folder)) if target.is_relative_to(folder) else str(target.absolute())
-
-
-def _replace(folder: Path, contents: Mapping[Path, bytes], command: str | None) -> None:
-    """Put new files in place of old ones, all or none."""
-    mark = folder / UNFINISHED
-    staged: dict[Path, Path] = {}
-    kept: dict[Path, Path] = {}
-    made: dict[Path, Path] = {}
-    try:
-        for target, content in contents.items():
-            with _refusals_at(target):
-                staged[target] = _temporary(target)
-                _write(staged[target], content)
-        if len(contents) > 1:
-            for target in contents:
-                with _refusals_at(target):
-                    if os.path.lexists(target):
-                        kept[target] = _temporary(target)
-                        _keep(target, kept[target])
-                    else:
-                        made[target] = _temporary(target)
-                        made[target].touch(exist_ok=False)
-            names = [{_name(target, folder): path.name for target, path in beside.items()} for beside in (kept, made)]
-            with _refusals_at(mark):
-                staged[mark] = _temporary(mark)
-                _write(staged[mark], unfinished_text(Unfinished(_file_set(folder, contents, command), *names)).encode())
-                _synchronise(contents)
-        try:
-            if mark in staged:
-                with _refusals_at(mark):
-                    staged[mark].replace(mark)
-                    del staged[mark]
-                    _synchronise([mark])
-            for target, temporary in staged.items():
-                with _refusals_at(target):
-                    temporary.replace(target)
-            _synchronise(contents)
-            with _refusals_at(mark):
-                mark.unlink(missing_ok=True)
-        except BaseException:
-            with suppress(OSError):  # an old file that cannot be put back keeps its other name, and the mark
-                _undo(folder)
-            raise
-    finally:
-        beside = () if os.path.lexists(mark) else (*kept.values(), *made.values())
-        for temporary in (*staged.values(), *beside):
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
-
-
-def _undo(folder: Path) -> None:
-    """Put back the old files of a run that has not finished, and remove its mark; again and again if need be."""
-    run = unfinished_in(folder)
-    if run is None:
-        return
-    # not replaced yet, put back already, or changed since: such files stay
-    targets = {name: folder / name for name, known in run.new.files.items() if _is(folder / name, known)}
-    if not all(_stands_beside(targets[name], run.made[name]) for name in targets if name in run.made):
-        raise not_ours(folder / UNFINISHED)
-    for name, target in targets.items():
-        if name in run.made:
-            target.unlink()
-        elif _stands_beside(target, run.kept[name]):
-            old = target.with_name(run.kept[name])
-            old.replace(target)
-            old.unlink(missing_ok=True)  # where both were one file under two names
-    _synchronise(folder / name for name in run.new.files)
-    (folder / UNFINISHED).unlink()
-
-
-def _is(target: Path, known: str) -> bool:
-    return target.is_file() and hash_of(target.read_bytes()) == known
-
-
-def _stands_beside(target: Path, name: str) -> bool:
-    """Return whether a file stands beside another that only a run has put there."""
-    return bool(_TEMPORARY.fullmatch(name)) and os.path.lexists(target.with_name(name))
-
-
-def _temporary(target: Path) -> Path:
-    """Return a new name beside a file, by which :func:`_clear` knows what a killed run has left."""
-    return target.with_name(f".truearm.{secrets.token_hex(8)}")
-
-
-def _write(path: Path, content: bytes) -> None:
-    with path.open("xb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-
-
-def _synchronise(paths: Iterable[Path]) -> None:
-    """Let what was done to the names of files be on disk before anything that follows."""
-    for folder in {path.parent for path in paths}:
-        with suppress(OSError):  # folders cannot be opened everywhere, and not every file system can do it
-            handle = os.open(folder, os.O_RDONLY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
-
-
 def _make_folders(folder: Path, made: list[Path]) -> None:
     """Make a folder with those above it, and note which are new."""
     for missing in reversed([parent for parent in (folder, *folder.parents) if not parent.exists()]):
         made.append(missing)
         missing.mkdir(exist_ok=True)
-
-
-def _keep(file: Path, name: Path) -> None:
-    """Give a file a second name, or copy it where files cannot have two."""
-    try:
-        os.link(file, name, follow_symlinks=False)
-    except OSError:
-        shutil.copy2(file, name, follow_symlinks=False)

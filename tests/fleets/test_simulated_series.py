@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm import writing
+from truearm import replacing
 from truearm.errors import InputError
 from truearm.fleets import recorded
 from truearm.fleets.experiment import experiment
@@ -142,7 +142,7 @@ def test_a_full_disk_is_named_and_what_was_written_before_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file, out = manifest(tmp_path), tmp_path / "out"
-    write = writing._write
+    write = replacing._write
 
     def full(path: Path, content: bytes) -> None:
         if len([*out.rglob("*.jsonl")]) == 1:
@@ -151,7 +151,7 @@ def test_a_full_disk_is_named_and_what_was_written_before_is_kept(
         write(path, content)
 
     with monkeypatch.context() as patch:
-        patch.setattr(writing, "_write", full)
+        patch.setattr(replacing, "_write", full)
         with pytest.raises(InputError, match="No space left on device"):
             truearm.fleet(file, out=out, workers=1)
     assert [path.name for path in out.rglob("*") if path.is_file()] == ["record.json", "0000001.jsonl"]

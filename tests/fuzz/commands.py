@@ -29,6 +29,7 @@ COMMANDS: Final[tuple[str, ...]] = (
     "calibrate arm.urdf data.csv --out out --bounds bounds.yaml --effect compliance --payload 1kg,0mm,0mm,50mm",
     "calibrate irb120 data.csv --out out --model offsets --hold base --frames cell.yaml --loss l1-components",
     "calibrate irb120.yaml data.csv --out out --model frames --train all --gravity 0,0,-9.81",
+    "calibrate irb120 data.csv --out out --model offsets --exclude excluded.csv",
     "calibrate irb120 data.csv --out out --model offsets --zones zones.yaml --monte-carlo 100",
     "validate calibrated.yaml data.csv",
     "validate calibrated.yaml data.csv --out out",

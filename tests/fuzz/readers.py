@@ -20,6 +20,7 @@ from truearm.jobs.import_ur_kinematics import import_ur_kinematics
 from truearm.jobs.load_robot import load_robot
 from truearm.library import load_robot as of_library
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.excluded import read_exclusions
 from truearm.measurement.hexapod.sheet_reading import read_sheet
 from truearm.measurement.hexapod.sheets_together import together
 from truearm.measurement.hexapod.touches import read_touches
@@ -220,6 +221,7 @@ READERS: Final[Mapping[str, Reader]] = {
         lambda folder: _dataset(read_robodk(folder / "robodk.csv", "deg", "model").data, folder),
     ),
     "poses": Reader({"poses.csv": "poses.csv"}, lambda folder: read_poses(folder / "poses.csv")),
+    "excluded": Reader({"excluded.csv": "excluded.csv"}, lambda folder: read_exclusions(folder / "excluded.csv")),
     "drawn-circle": Reader(
         {"page.csv": "page.csv", "page.png": "page.png"},
         lambda folder: _dataset(

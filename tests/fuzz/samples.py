@@ -214,6 +214,7 @@ def folder() -> Path:
         "robots.csv": ROBOTS,
         "experiment.yaml": EXPERIMENT,
         "zones.yaml": ZONES,
+        "excluded.csv": "configuration,target,reason\n1,1,beam broken\n2,2,touched\n",
         "constraints.yaml": CONSTRAINTS,
         "cube.yaml": CUBE,
         "sheet.csv": _sheet(),

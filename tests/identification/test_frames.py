@@ -9,7 +9,7 @@ from tests.simulated import campaign
 
 from truearm.errors import InputError
 from truearm.identification.solving.fit import place
-from truearm.identification.start_values.frames import initial_frames, placed_errors
+from truearm.identification.start_values.frames import errors_of_placed, initial_frames, placed_errors
 from truearm.library import load_robot
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.transform import Transform, quaternion_from_rotation
@@ -102,3 +102,10 @@ def test_data_that_are_tried_together_are_placed_as_each_alone() -> None:
         off = np.linalg.norm(at[data.target, data.configuration] - data.position, axis=1)
         np.testing.assert_allclose(errors, off, atol=1e-9)
     assert placed_errors(robot, []) == []
+
+
+def test_robots_that_are_placed_together_are_placed_as_each_alone() -> None:
+    robots = [load_robot(name).with_frames(Transform(), {}) for name in ("irb120", "ur5", "puma560")]
+    data = campaign("irb120", 12, 1e-4, 0)[1]
+    for robot, errors in zip(robots, errors_of_placed(robots, data), strict=True):
+        np.testing.assert_allclose(errors, placed_errors(robot, [data])[0], rtol=1e-9, atol=1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from truearm.jobs.calibrate import calibrate
 from truearm.jobs.check import check
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.mapping_entries import AnglesEntry
+from truearm.measurement.readers.orientation_columns import quaternions_of_angles
 from truearm.modeling.orientations import turned_about
 from truearm.modeling.transform import (
     quaternion_from_rotation,
@@ -87,6 +90,20 @@ def test_the_convention_that_was_meant_is_named(way: str, code: str, words: str)
     (notice,) = orientation_slips(load_robot(ROBOT), read_otherwise(way))
     assert (notice.code, notice.level) == (code, "error")
     assert words in notice.message
+
+
+@pytest.mark.parametrize(
+    ("robot", "order", "axes"), [("ur10e", "xyz", "fixed"), ("gp7", "zyx", "fixed"), ("ur10e", "zyz", "moving")]
+)
+def test_a_rotation_vector_that_was_read_as_angles_is_named(
+    robot: str, order: str, axes: Literal["fixed", "moving"]
+) -> None:
+    data = with_orientations(robot, 8, 3)
+    vectors = rotation_vector(rotation_from_quaternion(np.asarray(data.quaternion)))
+    entry = AnglesEntry(columns=["A", "B", "C"], about=order, axes=axes, unit="rad")
+    (notice,) = orientation_slips(load_robot(robot), replace(data, quaternion=quaternions_of_angles(vectors, entry)))
+    assert notice.code == "orientation-order"
+    assert f"not angles about {order} of {axes} axes but a rotation vector" in notice.message
 
 
 def test_a_quaternion_read_from_the_wrong_end() -> None:

@@ -349,3 +349,13 @@ def test_readings_that_the_model_cannot_follow_do_not_overrule_the_priors(device
     )
     sigma = named_device(device).sigma
     assert fit.excess == pytest.approx(np.sqrt(np.nanmean(off**2)) / sigma, rel=0.4)
+
+
+@pytest.mark.parametrize(("name", "offered"), [("cupp_1", True), ("cup_12", False), ("cup_x", False)])
+def test_fixtures_that_were_meant_to_be_two_are_no_slips_of_the_pen(name: str, offered: bool) -> None:
+    _, data = read_by("ballbar")
+    few = data.against.copy()
+    few[0] = len(data.fixtures)
+    with pytest.raises(InputError, match="measured too few times") as refusal:
+        start_from_readings(NOMINAL, replace(data, fixture=few, fixtures=(*data.fixtures, name)))
+    assert ("Did you mean cup_1?" in str(refusal.value)) == offered

@@ -91,6 +91,7 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "calibrate": lambda folder: {
         "robot": _robot(folder),
         "bounds": _written(folder / "bounds.yaml", f"truearm: truearm-bounds/1\n{_UNITS}within: {{d_1: 5}}\n"),
+        "exclude": _written(folder / "excluded.csv", "configuration,target,reason\n1,1,beam broken\n"),
     },
     "tilting": lambda folder: {
         "robot": _written(folder / "katana.yaml", robot_text(truearm.load_robot("katana450"))),

@@ -91,6 +91,7 @@ def test_a_name_in_a_folder_that_exists_is_a_file(tmp_path: Path) -> None:
         ({"text": "kr5"}, ["kr5"]),
         ({"maker": "stäubli", "text": "60"}, ["tx2_60", "tx2_60l"]),
         ({"maker": "Universal", "axes": 6, "text": "5"}, ["ur5", "ur5e"]),
+        ({"maker": "UR", "text": "10"}, ["ur10", "ur10e"]),
         ({"axes": 3}, ["li3"]),
     ],
 )

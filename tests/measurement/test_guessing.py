@@ -183,7 +183,7 @@ def test_an_import_with_it_is_tried(tmp_path: Path) -> None:
     assert made.guessed.refusal is not None
     assert "a.csv, line 4, column J1: a number belongs here; got 'n/a'" in made.lines()[1]
     (tmp_path / "a.csv").write_text("p,X,Y,Z\na,800,2,3\nb,801,2,3\n")
-    assert "in no column of it: name the file" in truearm.import_guess(tmp_path / "a.csv").lines()[1]
+    assert "No columns are called like joint positions: name" in truearm.import_guess(tmp_path / "a.csv").lines()[1]
 
 
 @pytest.mark.parametrize(

@@ -99,8 +99,11 @@ def test_semicolons_and_decimal_commas(tmp_path: Path) -> None:
     assert np.array_equal(tabs.joints, plain.joints)
     with pytest.raises(InputError, match="commas cannot stand between columns and in numbers"):
         truearm.import_robodk(other, decimal="comma")
-    with pytest.raises(InputError, match="or name what the file has by `delimiter`"):
+    with pytest.raises(InputError, match="or name what the file has by `delimiter` and `decimal`"):
         truearm.import_robodk(other)
+    with pytest.raises(InputError, match=r"line 2, column X.*has a decimal comma.*`decimal=comma`") as refusal:
+        truearm.import_robodk(written(tmp_path, POINTS.replace(",", ";").replace(".", ",")), delimiter="semicolon")
+    assert refusal.value.parameter == "decimal"
     with pytest.raises(InputError, match=r"line 2, column X: the number has a point.*name the other decimal sign"):
         truearm.import_robodk(written(tmp_path, POINTS.replace(",", ";")), delimiter="semicolon", decimal="comma")
 

@@ -12,8 +12,8 @@ from tests.ros_bags import NAMES, STOPS, Message, joint_messages, recorded, targ
 import truearm
 from truearm.errors import InputError
 from truearm.library import load_robot
-from truearm.measurement.bags.standstills import seen_at
-from truearm.measurement.bags.streams import TargetStream
+from truearm.measurement.bags.standstills import find_standstills, lost_messages, missed_pauses, seen_at
+from truearm.measurement.bags.streams import JointStream, TargetStream
 
 TIMES, JOINTS, SEEN, POSITIONS, TURNS = recorded()
 OF_JOINTS = joint_messages(TIMES, JOINTS)
@@ -157,6 +157,57 @@ def test_pauses_that_are_no_standstills_are_said(tmp_path: Path) -> None:
     crept = JOINTS + np.where(TIMES[:, None] < 10.0, slow, slow[1000])
     bag = write_ros2(tmp_path / "most", [*joint_messages(TIMES, crept), *OF_TARGET])
     assert refused(bag, "most pauses of the robot are no standstills").parameter == "hold"
+
+
+def with_lost(share: float, stand: float, rate: float = 100.0, seed: int = 3) -> JointStream:
+    times, joints, *_ = recorded(stand=stand, joint_rate=rate, seed=seed)
+    kept = np.random.default_rng(seed).random(len(times)) >= share
+    return JointStream("/joint_states", NAMES, times[kept] - times[kept][0], joints[kept], 0)
+
+
+@pytest.mark.parametrize(("share", "stand", "rate"), [(0.3, 6.0, 100.0), (0.6, 3.0, 100.0), (0.3, 4.0, 20.0)])
+def test_lost_messages_do_not_tear_a_standstill(share: float, stand: float, rate: float) -> None:
+    for seed in range(5):
+        stream = with_lost(share, stand, rate, seed)
+        stills = find_standstills(stream, 3.5e-4, 1.0)
+        assert len(stills) == 5
+        assert not missed_pauses(stream, stills)
+        np.testing.assert_allclose([s.end - s.start for s in stills], stand, atol=0.5)
+        whole = 1 + round((stream.times[-1] - stream.times[0]) * rate)
+        assert lost_messages(stream) == whole - len(stream.times)
+
+
+def test_times_that_are_uneven_tell_nothing_of_lost_messages() -> None:
+    times, joints, *_ = recorded()
+    rng = np.random.default_rng(1)
+    for uneven in (
+        np.sort(rng.uniform(0.0, 14.0, len(times))),
+        np.sort(np.concatenate([times[::2], times[::2] + 1e-4])),
+    ):
+        stream = JointStream("/joint_states", NAMES, uneven - uneven[0], joints[: len(uneven)], 0)
+        assert lost_messages(stream) == 0
+    jittered = np.sort(times + rng.normal(0.0, 1e-3, len(times)))
+    assert lost_messages(JointStream("/joint_states", NAMES, jittered - jittered[0], joints, 0)) < 0.01 * len(times)
+
+
+def test_a_stop_that_the_arm_may_have_left_between_messages_is_two() -> None:
+    """In a gap of a second the arm may have gone and come back; in one of 0.2 s nobody drives it away and back."""
+    for gap, stills in ((0.2, 1), (1.0, 2)):
+        times = np.concatenate([np.arange(0.0, 3.0, 0.01), np.arange(3.0 + gap, 6.0, 0.01)])
+        stream = JointStream("/joint_states", NAMES, times, np.zeros((len(times), 6)), 0)
+        assert len(find_standstills(stream, 3.5e-4, 1.0)) == stills
+    nudged = np.zeros((len(times), 6))
+    nudged[200:206, 0] = np.radians(0.5)
+    assert len(find_standstills(JointStream("/joint_states", NAMES, times, nudged, 0), 3.5e-4, 0.5)) == 3
+
+
+def test_missing_messages_are_told(tmp_path: Path) -> None:
+    kept = np.random.default_rng(0).random(len(TIMES)) >= 0.3
+    read = truearm.import_ros(write_ros2(tmp_path / "cell", [*joint_messages(TIMES[kept], JOINTS[kept]), *OF_TARGET]))
+    assert read.data.configurations == 5
+    assert [(notice.code, notice.level) for notice in read.warnings] == [("messages-missing", "warning")]
+    assert f"of {len(TIMES)} messages of the joints are missing" in str(read.lines())
+    assert read.summary()["warnings"][0]["code"] == "messages-missing"
 
 
 def test_clocks_that_differ_are_told(tmp_path: Path) -> None:

@@ -81,6 +81,33 @@ def test_deviations_that_are_far_apart_are_told(tmp_path: Path) -> None:
     assert not import_table(tmp_path / "table.txt", tmp_path / "map.yaml").warnings
 
 
+@pytest.mark.parametrize(
+    ("entry", "numbers", "told"),
+    [
+        ("angles: {columns: [a, b, c], about: zyx, axes: moving, unit: rad}", "10,-35,170", "orientations (a, b, c)"),
+        ("rotation_vector: {columns: [a, b, c], unit: rad}", "0.1,,-6.4", "orientations (a, b, c)"),
+        ("rotation_vector: {columns: [a, b, c], unit: rad}", "0.1,0.2,-6.2", ""),
+        ("angles: {columns: [a, b, c], about: zyx, axes: moving, unit: deg}", "10,-35,170", ""),
+    ],
+)
+def test_degrees_that_are_read_as_radians_are_told(tmp_path: Path, entry: str, numbers: str, told: str) -> None:
+    read(tmp_path, ROWS.format("0,1,0") + f"p,1,2,u,1,2,3,{numbers}\n", MAP.replace("z: Z", f"z: Z, {entry}"))
+    notices = import_table(tmp_path / "table.txt", tmp_path / "map.yaml").warnings
+    assert [(notice.code, notice.level) for notice in notices] == [("radians-unlikely", "warning")] * bool(told)
+    assert all(told in notice.message and "in 1 of 2 rows" in notice.message for notice in notices)
+
+
+def test_joints_in_degrees_that_are_read_as_radians_are_told(tmp_path: Path) -> None:
+    """A joint may turn on: one row of three beyond a full turn says nothing."""
+    table = "pose,q1,q2,ball,X,Y,Z\n1,{},2,t,1,2,3\n2,{},1,t,1,2,3\n3,1,-1,t,1,2,3\n"
+    mapping = MAP.replace("unit: deg", "unit: rad")
+    for first, second, told in ((30, -110, True), (30, 6, False)):
+        read(tmp_path, table.format(first, second), mapping)
+        notices = import_table(tmp_path / "table.txt", tmp_path / "map.yaml").warnings
+        assert [notice.code for notice in notices] == ["radians-unlikely"] * told
+        assert all("joints (q1, q2)" in n.message and "up to 110" in n.message for n in notices)
+
+
 def test_deviations_of_each_target_of_a_wide_table(tmp_path: Path) -> None:
     mapping = MAP.replace(
         "- {target_column: ball, x: X, y: Y, z: Z}",
@@ -233,6 +260,8 @@ def test_joints_come_from_a_file_with_the_columns_of_the_canonical_csv(tmp_path:
         read(tmp_path, LONG, mapping, joints.replace("configuration", "pose"))
     with pytest.raises(InputError, match=r"the configuration has no joints in .*column configuration"):
         read(tmp_path, LONG, mapping, joints.replace("\nb,", "\nc,"))
+    with pytest.raises(InputError, match=r"got 'P001'.*Did you mean 1\? A pattern .* reads the number alone"):
+        read(tmp_path, LONG.replace("a", "P001"), mapping, joints.replace("\na,", "\n1,"))
     (tmp_path / "map.yaml").write_text(MAP)
     with pytest.raises(InputError, match="takes the joint positions from the table itself") as refusal:
         read_table(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)

@@ -31,8 +31,8 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
 
 
 @pytest.fixture(scope="session")
-def chromium() -> Iterator[Any]:
-    """A browser without a screen, its WebGL by SwiftShader; without one the tests in it are skipped, and say so."""
+def launch() -> Iterator[Callable[..., Any]]:
+    """Start Chromium without a screen, with options; without one the tests in it are skipped, and say so."""
     place = os.environ.get("CHROME") or next(
         (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
     )
@@ -40,9 +40,20 @@ def chromium() -> Iterator[Any]:
         pytest.skip("no Chromium on PATH, and none named in CHROME: the studio was not tried in a browser")
     playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(
-            executable_path=place,
-            args=["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"],
-        )
-        yield browser
-        browser.close()
+        yield lambda *words: driver.chromium.launch(executable_path=place, args=["--no-sandbox", *words])
+
+
+@pytest.fixture(scope="session")
+def chromium(launch: Callable[..., Any]) -> Iterator[Any]:
+    """A browser whose WebGL is SwiftShader's."""
+    browser = launch("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="session")
+def blind(launch: Callable[..., Any]) -> Iterator[Any]:
+    """A browser in which WebGL is switched off: it shows everything but the scene, and quickly."""
+    browser = launch("--disable-gpu", "--disable-webgl", "--disable-webgl2", "--disable-3d-apis")
+    yield browser
+    browser.close()

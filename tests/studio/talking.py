@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import msgspec
 import viser
+import zstandard
+from viser._messages import GuiHtmlMessage, GuiUpdateMessage
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 from websockets.typing import Subprotocol
 
 from truearm.studio.serving import Studio
 
+#: Headers of a browser that asks for a connection.
+UPGRADE = {
+    "Upgrade": "websocket",
+    "Connection": "Upgrade",
+    "Sec_WebSocket_Key": "dGhlIHNhbXBsZSBub25jZQ==",
+    "Sec_WebSocket_Version": "13",
+}
 #: What a window sends first: where it looks from.
 CAMERA: dict[str, Any] = {
     "type": "ViewerCameraMessage",
@@ -71,3 +82,74 @@ def window(
 def send(line: Connection, **message: Any) -> None:
     """Send a message as the page does."""
     line.send(msgspec.msgpack.encode(message))
+
+
+def own(studio: Studio) -> str:
+    return f"127.0.0.1:{studio.access.port}"
+
+
+def alive(studio: Studio) -> bool:
+    """Return whether the page is still served and a window still works."""
+    cookie = {} if studio.access.token is None else {"Cookie": f"{studio.access.cookie}={studio.access.token}"}
+    status, _, body = get(studio, **cookie)
+    with window(studio, headers=cookie) as line:
+        send(line, **CAMERA)
+        return status == 200 and b"<html" in body and len(line.recv(30)) > 100
+
+
+def eventually(condition: Callable[[], bool], seconds: float = 30.0) -> bool:
+    """Return whether a condition holds, now or soon."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def is_closed(line: Any) -> bool:
+    """Return whether the other end closes a connection."""
+    try:
+        while True:
+            line.recv(30)
+    except ConnectionClosed:
+        return True
+    except TimeoutError:
+        return False
+
+
+def working(studio: Studio, line: Any) -> None:
+    """Let a window be the one that works."""
+    send(line, **CAMERA)
+    assert eventually(lambda: studio.window.gate.has_worker)
+
+
+def shown(studio: Studio) -> str:
+    """Return the HTML that a window shows which comes now."""
+    found = ""
+    for message in list(studio.window.server._websock_server._broadcast_buffer.message_from_id.values()):
+        if isinstance(message, GuiHtmlMessage):
+            found += message.props.content
+        elif isinstance(message, GuiUpdateMessage):
+            found += str(message.updates.get("content", ""))
+    return found
+
+
+def element(studio: Studio, label: str) -> str:
+    """Return the name by which messages call an element."""
+    handles = studio.window.gui._gui_input_handle_from_uuid
+    return next(name for name, handle in handles.items() if getattr(handle, "label", None) == label)
+
+
+def messages_of(line: Connection, kind: str, until: Callable[[dict[str, Any]], bool]) -> list[dict[str, Any]]:
+    """Return the messages of a kind that a window is sent, up to one that fulfils a condition."""
+    found: list[dict[str, Any]] = []
+    while True:
+        content = line.recv(30)
+        assert isinstance(content, bytes)
+        unpacked = zstandard.ZstdDecompressor().decompressobj().decompress(content[16:])
+        for message in msgspec.msgpack.decode(unpacked)["messages"]:
+            if message["type"] == kind:
+                found.append(message)
+                if until(message):
+                    return found

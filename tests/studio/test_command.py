@@ -12,7 +12,7 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.cli.conftest import truearm as truearm
 
-from truearm.studio.gate import listening_socket
+from truearm.studio.access import listening_socket
 from truearm.studio.project import PROJECT_FILE
 
 

@@ -269,7 +269,7 @@ def test_another_robot_is_drawn_anew_and_fixtures_beside_it(studio: Studio, page
     assert len(page._sliders) == 5
     assert len(page.scene._parts["fixtures"]) == 6
     page.scene.show_boxes({"table": (np.array([-np.inf, 0.1, -0.2]), np.array([np.inf, 0.5, 0.0]))})
-    assert len(page.scene._parts["boxes"]) == 1
+    assert len(page.scene._parts["boxes"]) == 2  # and its name
     studio.window.edit(dark=True)
     assert page.scene.solid is not None
     assert page.scene.solid.robot.name == "katana450"
@@ -350,7 +350,7 @@ def test_errors_of_a_result_are_drawn_from_before_to_after(studio: Studio, page:
 def test_a_plan_is_the_commands_and_drawn_in_space(studio: Studio, page: JogPage, tmp_path: Path) -> None:
     window = studio.window
     planning = next(page for page in window.pages if isinstance(page, PlanPage))
-    planning._poses._impl.value, planning._candidates._impl.value = "30", 60
+    window.edit(plan={"poses": "30", "candidates": 60})
     act(planning._run)
     assert window.wait(60.0)
     assert eventually(lambda: bool(page.scene._parts.get("chosen")))
@@ -363,9 +363,10 @@ def test_a_plan_is_the_commands_and_drawn_in_space(studio: Studio, page: JogPage
     assert made.answer[0].split(".")[0] in planning._said.content
     act(planning._cloud, False)
     assert page.scene._parts["chosen"] == page.scene._parts["predicted"] == []
-    planning._poses._impl.value = "many"
+    window.edit(plan={"poses": "many"})
     act(planning._run)
-    assert "a number of poses belongs here" in _notices(studio)
+    assert window.wait(60.0)
+    assert eventually(lambda: "a number of poses belongs here" in _notices(studio))
     # What it wrote is a list of configurations that can be played.
     page._list._impl.value = "plan.csv"
     page._show_recorded()

@@ -123,11 +123,6 @@ def test_all_branches_lead_to_the_pose(arm: Jogging) -> None:
         assert turned == pytest.approx(R, abs=1e-9)
 
 
-def test_branches_without_names_are_refused_in_words() -> None:
-    with pytest.raises(InputError, match="branches have no names"):
-        Jogging(load_robot("fr3")).branches()
-
-
 @pytest.mark.parametrize("name", ["irb120", "katana450", "li3", "fr3"])
 def test_the_singular_value_is_that_of_inverse_kinematics(name: str) -> None:
     robot = load_robot(name)
@@ -187,3 +182,7 @@ def test_a_pose_that_is_dragged_to_is_met_without_a_leap(name: str, elastic: boo
     with pytest.raises(InputError, match="cannot go to this pose"):
         arm.drag_to(far, R[0])
     assert arm.pose("world")[0] == pytest.approx(p[0], abs=1e-8)
+
+
+def test_an_arm_without_any_length_is_singular_everywhere() -> None:
+    assert Jogging(POINT).singular_value() == 0.0

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.killing import killed, leftovers, operations
 
 from truearm.errors import InputError
 from truearm.files import confined_reads, read_bytes, read_yaml
-from truearm.studio.project import PROJECT_FILE, Project, Settings, open_project
+from truearm.studio.project import PROJECT_FILE, Project, open_project
+from truearm.studio.settings import Settings
 
 
 @pytest.fixture
@@ -80,6 +84,26 @@ def test_edits_are_on_disk_at_once_and_undone_and_done_again(project: Project) -
     assert not project.redoable
 
 
+def test_small_files_of_an_edit_are_undone_with_it(project: Project) -> None:
+    file = project.folder / "excluded.csv"
+    assert project.edit({"excluded.csv": "one\n"}, exclude="excluded.csv")
+    assert not project.edit({"excluded.csv": "one\n"}, exclude="excluded.csv")
+    assert project.edit({"excluded.csv": "two\n"})
+    project.undo()
+    assert (file.read_text(), project.settings.exclude) == ("one\n", "excluded.csv")
+    project.undo()
+    assert (file.exists(), project.settings.exclude) == (False, None)
+    project.redo()
+    assert (file.read_text(), project.settings.exclude) == ("one\n", "excluded.csv")
+    assert project.changes() == ()
+    (project.folder / PROJECT_FILE).write_text("truearm: truearm-studio/1\n")
+    with pytest.raises(InputError, match="another program has changed this file"):
+        project.edit({"excluded.csv": "three\n"}, exclude=None)
+    assert file.read_text() == "one\n"
+    with pytest.raises(InputError, match="no place in the project"):
+        project.edit({"../excluded.csv": "three\n"})
+
+
 @pytest.mark.parametrize(
     "changes",
     [
@@ -88,6 +112,9 @@ def test_edits_are_on_disk_at_once_and_undone_and_done_again(project: Project) -
         {"result": "a/../../b"},
         {"cell": "..\\..\\b"},
         {"corrected": "C:\\x"},
+        {"exclude": "../a.csv"},
+        {"performance": {"plan": "/a.yaml"}},
+        {"performance": {"noise_mm": 0}},
         {"robot": "a\x1bb.yaml"},
         {"train": 0},
         {"seed": "x"},
@@ -95,7 +122,7 @@ def test_edits_are_on_disk_at_once_and_undone_and_done_again(project: Project) -
         {"model": ""},
     ],
 )
-def test_settings_that_cannot_be_are_refused_and_change_nothing(project: Project, changes: dict[str, object]) -> None:
+def test_settings_that_cannot_be_are_refused_and_change_nothing(project: Project, changes: dict[str, Any]) -> None:
     before = (project.folder / PROJECT_FILE).read_bytes()
     with pytest.raises(InputError):
         project.edit(**changes)
@@ -147,7 +174,7 @@ def test_another_programs_edit_is_told_never_overwritten_and_taken_by_reloading(
 def test_the_studios_own_writing_hides_no_change_of_another_program(project: Project) -> None:
     (project.folder / "a.csv").write_text("1")
     project.edit(robot="kr5")
-    project.take_in("b.csv", b"2")
+    project.take_in("b.csv", sent(project, b"2"))
     (project.folder / "result").mkdir()
     (project.folder / "result" / "c.yaml").write_text("3")
     project.look("result")
@@ -156,11 +183,18 @@ def test_the_studios_own_writing_hides_no_change_of_another_program(project: Pro
     assert project.changes() == ()
 
 
+def sent(project: Project, content: bytes) -> Path:
+    """Return a file that has come into a project's folder, and has no name yet."""
+    path = project.folder / ".truearm-upload.0123456789abcdef"
+    path.write_bytes(content)
+    return path
+
+
 def test_files_taken_in_replace_nothing(project: Project) -> None:
-    assert project.take_in("a b.csv", b"1") == "a b.csv"
-    assert project.take_in("a b.csv", b"1") == "a b.csv"
+    assert project.take_in("a b.csv", sent(project, b"1")) == "a b.csv"
+    assert project.take_in("a b.csv", sent(project, b"1")) == "a b.csv"
     with pytest.raises(InputError, match="stands in the project, and is not overwritten"):
-        project.take_in("a b.csv", b"2")
+        project.take_in("a b.csv", sent(project, b"2"))
     for name in (
         "../a.csv",
         "x/a.csv",
@@ -174,8 +208,32 @@ def test_files_taken_in_replace_nothing(project: Project) -> None:
         "x\\y",
     ):
         with pytest.raises(InputError):
-            project.take_in(name, b"1")
-    assert sorted(path.name for path in project.folder.iterdir()) == ["a b.csv", PROJECT_FILE]
+            project.take_in(name, sent(project, b"1"))
+    assert sorted(project.names()) == ["a b.csv"]
+    assert (project.folder / "a b.csv").read_bytes() == b"1"
+
+
+def test_a_file_too_large_is_not_taken_in(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TRUEARM_LIMITS", "upload=3")
+    with pytest.raises(InputError, match="the file is too large to be taken in"):
+        project.take_in("a.csv", sent(project, b"1234"))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such locks there")
+def test_of_two_that_edit_at_the_same_time_one_is_told_and_none_is_overwritten(project: Project) -> None:
+    """Each edit counts on from what it has read: were one overwritten, a number would be missing in the end."""
+    script = (
+        "import sys\nfrom truearm.errors import InputError\nfrom truearm.studio.project import open_project\n"
+        "project, done = open_project(sys.argv[1]), 0\n"
+        "while done < 20:\n"
+        "    try:\n        done += project.edit(seed=project.settings.seed + 1)\n"
+        "    except InputError as error:\n"
+        "        assert 'another program has changed this file' in str(error), error\n        project.reload()\n"
+    )
+    others = [subprocess.Popen([sys.executable, "-c", script, str(project.folder)]) for _ in range(2)]
+    assert [other.wait(60) for other in others] == [0, 0]
+    project.reload()
+    assert project.settings.seed == 40
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="a process cannot copy itself here")

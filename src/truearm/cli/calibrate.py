@@ -83,6 +83,10 @@ def calibrate(
             "--without", metavar="LABEL,...", help="Configurations to leave out; repeatable.", show_default=False
         ),
     ] = None,
+    exclude: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Readings to exclude: configuration, target and reason.", show_default=False),
+    ] = None,
     monte_carlo: Annotated[
         int | None,
         typer.Option(
@@ -123,6 +127,7 @@ def calibrate(
             gravity=read_gravity(gravity),
             base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
             without=[name.strip() for text in without or () for name in text.split(",")],
+            exclude=exclude,
             monte_carlo=monte_carlo,
             zones=_number_or(zones),
             notes=read_notes(notes),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -22,6 +23,10 @@ def check(
         str | None,
         typer.Option(metavar="NAME", help="The instrument, of 'truearm devices': its range.", show_default=False),
     ] = None,
+    exclude: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Readings to exclude: configuration, target and reason.", show_default=False),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Say what is wrong with measurements before they are believed.
@@ -32,7 +37,7 @@ def check(
 
     with progress() as say:
         say("checking")
-        checked = run(robot, data, device=device)
+        checked = run(robot, data, device=device, exclude=exclude)
     if json:
         print_json(checked.summary())
     else:

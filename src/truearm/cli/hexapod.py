@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truearm.cli.loading import JointsText, read_lengths, read_numbers
+from truearm.cli.loading import JointsText
 from truearm.cli.options import Commands
 from truearm.cli.output import Json, print_json, print_line, print_record
+from truearm.jobs.texts import read_lengths, read_numbers
 
 if TYPE_CHECKING:
     from truearm.results.hexapod import (

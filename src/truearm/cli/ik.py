@@ -14,10 +14,10 @@ from truearm.cli.loading import (
     WrenchFrameText,
     WrenchText,
     read_gravity,
-    read_joints,
 )
 from truearm.cli.output import Json, print_json, print_line, print_record
 from truearm.errors import InputError
+from truearm.jobs.texts import read_seed
 
 
 def ik(
@@ -91,18 +91,3 @@ def ik(
         print_line(f"Written to {out}")
     if not found.complete:
         raise typer.Exit(3)
-
-
-def read_seed(robot: str, text: str | None, joints: str | None, parameter: str = "seed") -> list[float] | None:
-    """Return the model's joint positions [rad or m] that a text in deg or mm names, of the kind that is written."""
-    if text is None:
-        return None
-    import numpy as np
-
-    from truearm.jobs.arguments import joints_argument, robot_argument
-
-    loaded = robot_argument(robot)
-    given = np.array([read_joints(text, loaded, parameter)])
-    if joints_argument(joints, loaded) == "controller":
-        given = loaded.controller.to_model(given)
-    return [float(value) for value in given[0]]

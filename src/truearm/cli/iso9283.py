@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from truearm.cli.cubes import Ahead, Floor, Nearest, TargetName, TipText
-from truearm.cli.loading import read_lengths, read_numbers
 from truearm.cli.options import Commands, command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
+from truearm.jobs.texts import read_lengths, read_numbers
 
 _PERCENT = "percent, as 100,50,10"
 

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import read_joints
 from truearm.cli.output import Json, print_json, print_record
+from truearm.jobs.texts import read_joints
 
 
 def robots(

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import JointsText, read_lengths
+from truearm.cli.loading import JointsText
 from truearm.cli.output import Json, print_json, print_line, print_record
+from truearm.jobs.texts import read_lengths
 
 
 def lines(

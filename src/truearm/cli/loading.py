@@ -1,15 +1,12 @@
-"""Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), notes, and lengths."""
+"""Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), and notes."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from truearm.errors import InputError
-
-if TYPE_CHECKING:
-    from truearm.modeling.robot import Robot
 
 PayloadText = Annotated[
     str | None,
@@ -105,43 +102,3 @@ def read_gravity(text: str | None) -> tuple[float, float, float] | None:
         )
     x, y, z = (float(number) for number in numbers if number is not None)
     return x, y, z
-
-
-def read_joints(text: str, robot: Robot, parameter: str) -> list[float]:
-    """Return joint positions [rad or m] of a text in deg or mm, in the units of the robot's joints."""
-    from truearm.units import to_si
-
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(
-            "numbers separated by commas belong here", parameter=parameter, came=text, allowed="0,-30,45, .."
-        ) from None
-    if len(numbers) != len(robot.joints):
-        raise InputError(
-            "there are not as many numbers as joints",
-            parameter=parameter,
-            came=f"{len(numbers)} number{'' if len(numbers) == 1 else 's'}",
-            allowed=f"{len(robot.joints)}, one for each joint of {robot.name}",
-        )
-    units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
-    return [to_si(value, unit) for value, unit in zip(numbers, units, strict=True)]
-
-
-def read_lengths(text: str, parameter: str) -> float | list[float]:
-    """Return lengths [m] of a text in mm, a single one as a number."""
-    from truearm.units import sized_si
-
-    found = [sized_si(number, "mm", parameter=parameter) for number in read_numbers(text, parameter, "numbers in mm")]
-    return found[0] if len(found) == 1 else found
-
-
-def read_numbers(text: str, parameter: str, allowed: str) -> list[float]:
-    """Return the numbers of a text in which commas separate them."""
-    from truearm.units import as_number
-
-    numbers = [as_number(part.strip()) for part in text.split(",")]
-    known = [number for number in numbers if number is not None]
-    if len(known) < len(numbers):
-        raise InputError("numbers separated by commas belong here", parameter=parameter, came=text, allowed=allowed)
-    return known

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.ik import read_seed
 from truearm.cli.loading import GravityText, JointsText, PayloadText, WrenchFrameText, WrenchText, read_gravity
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record
+from truearm.jobs.texts import read_seed
 
 
 def path(

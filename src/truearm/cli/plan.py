@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from truearm.cli.ik import read_seed
 from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_beside, refuse_pull
-from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity, read_numbers
+from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
+from truearm.jobs.texts import read_region, read_seed, read_speed
 
 
 def plan(
@@ -193,7 +193,7 @@ def plan(
             candidates_from=candidates_from,
             objective=objective,
             accurate_at=accurate_at,
-            region=_region(region),
+            region=read_region(region),
             tools=tools,
             frames=frames,
             model=model,
@@ -211,7 +211,7 @@ def plan(
             home=read_seed(robot, home, joints, "home"),
             program=program,
             approach=approach,
-            speed=_speed(speed),
+            speed=read_speed(speed),
             dwell=dwell,
             wait=wait,
             command=command_line(),
@@ -228,37 +228,9 @@ def plan(
         print_line(f"Written to {out}: {', '.join(planned.contents())}")
 
 
-def _speed(text: str | None) -> list[float] | None:
-    """Return speed [m/s] and share of a text in mm/s and percent."""
-    from truearm.units import sized_si
-
-    if text is None:
-        return None
-    speed, *shares = read_numbers(text, "speed", "mm/s, and percent of the joints' speed: 250,10")
-    return [sized_si(speed, "mm", parameter="speed"), *(share / 100.0 for share in shares)]
-
-
 def _poses(text: str) -> Any:
     """Return a number where the text is one; the job refuses what is neither that nor auto."""
     try:
         return int(text)
     except ValueError:
         return text
-
-
-def _region(text: str | None) -> list[list[float]] | None:
-    """Return lowest and highest x, y and z [m] of a text in mm."""
-    from truearm.errors import InputError
-    from truearm.units import as_number, sized_si
-
-    if text is None:
-        return None
-    ranges = [[as_number(end.strip()) for end in part.split("..")] for part in text.split(",")]
-    if len(ranges) != 3 or any(len(one) != 2 or None in one for one in ranges):
-        raise InputError(
-            "three ranges in mm belong here",
-            parameter="region",
-            came=text,
-            allowed="LOW..HIGH for x, y and z: 300..600,-200..200,100..400",
-        )
-    return [[sized_si(end, "mm", parameter="region") for end in one if end is not None] for one in ranges]

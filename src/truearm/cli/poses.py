@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from truearm.cli.cubes import Ahead, Floor, Nearest, TargetName, TipText
-from truearm.cli.loading import JointsText, read_lengths, read_numbers
+from truearm.cli.loading import JointsText
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record
+from truearm.jobs.texts import read_lengths, read_numbers
 
 
 def poses(

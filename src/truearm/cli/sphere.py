@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import GravityText, PayloadText, read_gravity, read_lengths
+from truearm.cli.loading import GravityText, PayloadText, read_gravity
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record
+from truearm.jobs.texts import read_lengths
 
 
 def sphere(

@@ -16,6 +16,27 @@ from truearm.compensation.programs.program import Edit, Program, Skipped
 from truearm.modeling.chain import Array
 
 
+def way_through(program: Program, tips: Array, most: int) -> Array:
+    """Return tips ``(m, 3)`` in the order of the moves, with a row of NaN between routines.
+
+    Parameters
+    ----------
+    tips
+        Of the targets, ``(n, 4, 4)`` or ``(n, 3)`` [m].
+    most
+        So many moves at most.
+    """
+    points = tips if tips.ndim == 2 else tips[:, :3, 3]
+    parts: list[Array] = []
+    routine = None
+    for move in program.moves[:most]:
+        if routine not in (None, move.routine):
+            parts.append(np.full(3, np.nan))
+        routine = move.routine
+        parts += [points[row] for row in (move.via, move.target) if row is not None]
+    return np.array(parts).reshape(-1, 3)
+
+
 @dataclass(frozen=True, eq=False)
 class Correction:
     """One program corrected.

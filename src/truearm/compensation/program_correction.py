@@ -22,7 +22,7 @@ from truearm.compensation.fake_targets import nominal_robot
 from truearm.compensation.gauge import base_is_held, base_shift, best_agreement, flange_is_held
 from truearm.compensation.program_places import Provenance, provenance
 from truearm.compensation.programs.program import Program
-from truearm.compensation.resolved_program import Between, ResolvedProgram
+from truearm.compensation.resolved_program import Between, RealTips, ResolvedProgram
 from truearm.compensation.target_wrenches import wrenches_of_targets
 from truearm.compensation.tool_loads import arms_of_tools, loads_of_tools
 from truearm.errors import InputError
@@ -77,6 +77,8 @@ class CorrectedPrograms:
         Where the posture of a first pose was guessed, in words; empty if nowhere.
     between
         One a program: how poses between its targets are corrected.
+    real_tips
+        One a program: where tips shall be, and where the real robot takes them.
     choice
         What was said of the targets.
     loads
@@ -91,6 +93,7 @@ class CorrectedPrograms:
     frames: Frames
     guessed: tuple[str, ...]
     between: tuple[Between, ...]
+    real_tips: tuple[RealTips, ...]
     choice: Choice
     loads: Mapping[str, Payload | None]
     tools_apart: Mapping[str, float]
@@ -192,6 +195,7 @@ def corrected_programs(
         Frames(tools, frames, bases, flange),
         tuple(one.guess for one in resolved if one.guess),
         tuple(partial(one.between, bases, flange) for one in resolved),
+        tuple(partial(one.real_tips, bases, flange) for one in resolved),
         choice,
         loads,
         {name: apart for one in resolved for name, apart in one.tools_apart(agreed).items()},
@@ -206,6 +210,15 @@ def commanded(robot: Robot, program: Program, cell: Cell = EMPTY_CELL) -> Array:
     program does not define.
     """
     return ResolvedProgram(robot, nominal_robot(robot), program, cell).joints
+
+
+def commanded_tips(nominal: Robot, program: Program) -> tuple[Array, Array]:
+    """Return these joint positions for a nominal robot, and where its controller takes the tips to be with them.
+
+    The tips ``(n, 4, 4)`` are in the base frame of that robot [m]; tools and frames are those of the program.
+    """
+    resolved = ResolvedProgram(nominal, nominal, program, EMPTY_CELL)
+    return resolved.joints, resolved.tips
 
 
 def _base_of(programs: Sequence[ResolvedProgram], frames: Sequence[str], start: Array, flange: Array) -> Array:

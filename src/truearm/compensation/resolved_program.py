@@ -46,6 +46,9 @@ _ROUNDING: Final = float(np.radians(0.01))
 #: For targets ``(m,)``, poses ``(m, 4, 4)`` of their tools in their frames and joints ``(m, joints)`` near the answer:
 #: fake targets ``(m, 4, 4)``, and whether each was found ``(m,)``.
 Between = Callable[[NDArray[np.intp], Array, Array], tuple[Array, NDArray[np.bool_]]]
+#: For joint positions that are commanded, ``(n, joints)``, or None for those of the program as it is: see
+#: :meth:`ResolvedProgram.real_tips`.
+RealTips = Callable[[Array | None], tuple[Array, Array]]
 
 
 def _straight(program: Program) -> frozenset[int]:
@@ -221,6 +224,29 @@ class ResolvedProgram:
         after = found.flange @ self._tool.nominal[rows]
         return TipsFound(rows[good], found.joints[good], tips[good], after[good])
 
+    @property
+    def tips(self) -> Array:
+        """Tips of the targets in the base frame of the nominal robot, ``(n, 4, 4)`` [m]."""
+        return np.asarray(self._base.nominal @ self._poses)
+
+    def real_tips(self, base: Shift, flange: Array, joints: Array | None = None) -> tuple[Array, Array]:
+        """Return where tips shall be and where the real robot takes them, in its base frame, ``(n, 3)`` [m] each.
+
+        Parameters
+        ----------
+        joints
+            Joint positions that the controller commands ``(n, joints)`` [rad or m]; None for those of the program as
+            it is. Where they are NaN, so is the tip.
+        """
+        rows = np.arange(len(self._program.targets))
+        at = self._resolved.joints if joints is None else joints
+        there, tools = np.full((len(rows), 3), np.nan), self._tool.real(rows, flange)
+        for number, arm in enumerate(self._arms):
+            mine = np.flatnonzero((self._arm == number) & np.isfinite(at).all(axis=1))
+            position, rotation = arm.forward(at[mine])
+            there[mine] = position + np.einsum("nij,nj->ni", rotation, tools[mine, :3, 3])
+        return (self._base.real(rows, base) @ self._meant(base, flange))[:, :3, 3], there
+
     def correction(self, base: Shift, flange: Array) -> Correction:
         """Return the corrected program, with what was taken for the real base and flange."""
         program, count = self._program, len(self._program.targets)
@@ -252,7 +278,7 @@ class ResolvedProgram:
             skipped=tuple(sorted((*program.skipped, *left), key=lambda s: (s.source, s.line))),
             before=self._poses,
             after=after,
-            tips=self._base.nominal @ self._poses,
+            tips=self.tips,
             joints=joints,
             on_edge=on_edge,
             kept=self._kept,

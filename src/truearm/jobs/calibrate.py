@@ -46,6 +46,8 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
+from truearm.jobs.excluding import check_excluded, in_parts, without_excluded
+from truearm.jobs.following import followed
 from truearm.jobs.holding import held_argument
 from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
 from truearm.jobs.split import (
@@ -100,6 +102,7 @@ def calibrate(
     gravity: Sequence[float] | None = None,
     base_changes: Sequence[str] = (),
     without: Sequence[str] = (),
+    exclude: str | Path | None = None,
     monte_carlo: int | None = None,
     zones: int | str | Path | None = None,
     notes: Mapping[str, str] | None = None,
@@ -154,6 +157,9 @@ def calibrate(
         taken out of the readings; no deviation contains what is not known of it.
     without
         Configurations that are left out, by their labels: neither part of the split knows them.
+    exclude
+        File of readings that are excluded, each with its reason: they count as missing, and the split stays. See
+        :mod:`truearm.measurement.excluded`.
     monte_carlo
         How many calibrations of the robot that is found are simulated (100 or more): their spread gives intervals of
         the parameters and the predictions that need no linearity, beside the linear ones. With the linear loss and
@@ -225,6 +231,7 @@ def calibrate(
         effects=list(effects) or None,
         base_changes=list(base_changes) or None,
         without=list(without) or None,
+        exclude=exclude,
         monte_carlo=trials,
         zones=zones,
         notes=notes or None,
@@ -232,12 +239,12 @@ def calibrate(
         gravity=fall,
     )
     refuse_swapped(robot, data, "calibrate")
-    inputs = files_of(robot, data, bounds, zones, frames)
+    inputs = files_of(robot, data, bounds, zones, frames, exclude)
     folder = (
         None
         if out is None
         else folder_for(
-            (*RESULT_FILES, *zone_file_names(wanted_zones)), out, robot, data, bounds, zones, frames, ours=True
+            (*RESULT_FILES, *zone_file_names(wanted_zones)), out, robot, data, bounds, zones, frames, exclude, ours=True
         )
     )
     progress("reading the robot")
@@ -254,6 +261,7 @@ def calibrate(
     sha256 = None
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+    readings, excluded = without_excluded(readings, exclude)
     readings = left_out(readings, without)
     held = held_argument(hold, frames, nominal_robot, readings)
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
@@ -265,6 +273,7 @@ def calibrate(
         count = train_count(train, n, readings.source)
         order = np.random.default_rng(seed).permutation(n)
         training, held_out = order[:count], order[count:]
+        excluded = in_parts(excluded, readings, held_out)
         if not readings.has_reading.any():
             raise InputError(
                 "there is no reading", parameter="data", where=readings.source, cure="Fill in x, y and z, or distance."
@@ -288,6 +297,7 @@ def calibrate(
         readings = steady
         first = readings.of_configurations(training)
         second = readings.of_configurations(held_out) if len(held_out) else None
+        judges = first if second is None else second
         progress("placing the nominal robot")
         placed = place(nominal_robot, first, loss, held)
         if trials is not None:
@@ -297,25 +307,29 @@ def calibrate(
         if named is None:
             compared = compared_with(nominal_robot, first)
             selection = select(nominal_robot, compared, **how, held=held, seed=seed, progress=progress)
-            selection, fit = identify_chosen(
-                nominal_robot, first, selection, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
-            )
+            with followed(progress, judges, held_out=second is not None):
+                selection, fit = identify_chosen(
+                    nominal_robot, first, selection, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
+                )
             nominal_robot, chosen = selection.prepared(nominal_robot), selection.model
         else:
             chosen, held_effects = without_unseen_balancers(named.also(effects), first)
             progress(f"identifying the {chosen.name} model on {count} configurations")
-            fit = identify(
-                nominal_robot, first, chosen, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
-            )
+            with followed(progress, judges, held_out=second is not None):
+                fit = identify(
+                    nominal_robot, first, chosen, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
+                )
         contradicted = check_held(nominal_robot, fit, first, **how)
     progress("judging it")
-    judges = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(placed, judges)
     train_errors = errors_of(fit.robot, first)
     of_split = (
         *contradicted,
         *check_proof(before, validation),
+        *check_excluded(
+            excluded, fit.robot, None if base_changes else left_out(as_read, without), held_out, validation
+        ),
         *check_copies(readings, training, held_out),
         *check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), without_words(without)),
         *moved,
@@ -342,6 +356,7 @@ def calibrate(
         f"calibrated by truearm {__version__}: model {freed},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
         f"{without_words(without)}"
+        f"{f' {sum(one.readings for one in excluded)} readings excluded,' if excluded else ''}"
         f" redundancy {redundancy}{f', {listed(hold)} held' if hold else ''}"
         f"{f', bootstrap {bootstrap}' if bootstrap else ''}"
         f"{f', another base from {listed(base_changes)} on' if base_changes else ''}"
@@ -364,6 +379,7 @@ def calibrate(
         selection=selection,
         known_before=_known_before(nominal_robot),
         without=without,
+        excluded=excluded,
         notes=notes,
         monte_carlo=simulated,
         zones=chosen_zones,

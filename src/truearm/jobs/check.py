@@ -10,6 +10,7 @@ from truearm.identification.judging.next_steps import steps_after_check
 from truearm.identification.judging.plausibility import check_against
 from truearm.identification.solving.fit import Fit
 from truearm.jobs.arguments import data_argument, device_argument, readings_argument, refuse_swapped, robot_argument
+from truearm.jobs.excluding import excluded_notices, without_excluded
 from truearm.limits import limit
 from truearm.measurement.checks import check_data, check_range
 from truearm.measurement.dataset import Dataset
@@ -23,7 +24,11 @@ from truearm.shown import counted
 
 
 def check(
-    robot: Robot | Dataset | str | Path | None, data: Dataset | str | Path | None = None, *, device: str | None = None
+    robot: Robot | Dataset | str | Path | None,
+    data: Dataset | str | Path | None = None,
+    *,
+    device: str | None = None,
+    exclude: str | Path | None = None,
 ) -> DataCheck:
     """Say what is wrong with measurements before they are believed.
 
@@ -36,6 +41,8 @@ def check(
         Readings, or a canonical CSV file.
     device
         Name of the instrument, of ``truearm.devices()``; with it, readings beyond its range are named.
+    exclude
+        File of readings that are excluded, each with its reason, as for :func:`truearm.calibrate`.
 
     Raises
     ------
@@ -47,12 +54,14 @@ def check(
     refuse_swapped(robot, data, "check")
     against = None if robot is None else robot_argument(robot)
     measured = data_argument(data) if against is None else readings_argument(against, data)
+    measured, excluded = without_excluded(measured, exclude)
     parts = [measured] if measured.references is None else [measured, measured.references]
     if not any(part.has_reading.any() for part in parts):
         raise InputError(
             "there is no reading", parameter="data", where=measured.source, cure="Fill in x, y and z, or distance."
         )
     noticed, fit, part = _compared(measured, against, device)
+    noticed = (*noticed, *excluded_notices(excluded))
     if fit is None or part is None:
         return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None))
     steps = steps_after_check(noticed, LeftOver.of(fit, part), errors_of(fit.robot, part))

@@ -396,7 +396,7 @@ class _Virtual:
 
     def entries(self) -> dict[str, Any]:
         """Return what must be the same when it goes on."""
-        truth = self.truth.name if isinstance(self.truth, Robot) else str(self.truth)
+        truth = self.truth.name if isinstance(self.truth, Robot) else Path(self.truth).name
         return {**self.__dict__, "truth": truth}
 
 

@@ -41,7 +41,7 @@ def _of_maker(robots: list[Robot], maker: object) -> list[Robot]:
     makers = sorted({robot.maker for robot in robots if robot.maker})
     if not isinstance(maker, str):
         raise wrong_kind("a maker belongs here", maker, "maker", ", ".join(makers))
-    found = [robot for robot in robots if letters(maker) and letters(maker) in letters(robot.maker)]
+    found = [robot for robot in robots if letters(maker) and _begins(robot.maker, maker)]
     if not found:
         near = nearest_names(maker, makers)
         raise InputError(
@@ -52,6 +52,12 @@ def _of_maker(robots: list[Robot], maker: object) -> list[Robot]:
             cure=f"Did you mean {' or '.join(near)}?" if near else None,
         )
     return found
+
+
+def _begins(maker: str, text: str) -> bool:
+    """Return whether a maker's name, a word of it, or the initials of its words begin with a text."""
+    words = [letters(word) for word in maker.split()]
+    return any(name.startswith(letters(text)) for name in (letters(maker), *words, "".join(word[:1] for word in words)))
 
 
 def _with_axes(robots: list[Robot], axes: int) -> list[Robot]:

@@ -92,12 +92,14 @@ def check_range(data: Dataset, device: Ranged) -> list[Notice]:
     beyond = np.flatnonzero(device.beyond_range(data)).tolist()
     if not beyond:
         return []
-    words = _listed([f"{data.labels[data.configuration[r]]}/{data.targets[data.target[r]]}" for r in beyond])
+    where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in beyond]
+    words = _listed(["/".join(one) for one in where])
     return [
         Notice(
             "beyond-range",
             f"{counted(len(beyond), 'reading')} {_are(beyond)} beyond what the device {device.name} can read "
             f"(configuration/target): {words}. It is a {device.summary}. Check the units, and that it was this device.",
+            at=tuple(where),
         )
     ]
 
@@ -142,7 +144,7 @@ def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
             what, cure = words[:2] if len(mine) == 1 else words[2:]
             named = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in mine]
             message = f"{len(mine)} {what} (configuration/target): {_listed(named)}. {cure}"
-            notices.append(Notice(code, message))
+            notices.append(Notice(code, message, at=tuple((s.configuration, s.target) for s in mine)))
     return notices
 
 
@@ -212,6 +214,7 @@ def _moved(data: Dataset) -> list[Notice]:
             f"{counted(len(where), 'configuration')}: {_listed([data.labels[c] for c in where])}). The robot's table "
             "or the instrument moved: where three points moved together the motion is removed, elsewhere leave these "
             "configurations out or measure them again.",
+            at=tuple((data.labels[c], data.references.targets[t]) for c, t in np.argwhere(moved).tolist()),
         )
     ]
 

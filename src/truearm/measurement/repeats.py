@@ -22,7 +22,7 @@ _SAME_LENGTH: Final = 1e-5
 
 def check_duplicates(data: Dataset) -> list[Notice]:
     """Say which readings repeat another one to the last digit."""
-    found = []
+    found, where = [], list[tuple[str, str]]()
     for part in [data] if data.references is None else [data, data.references]:
         first: dict[tuple[int, bytes], int] = {}
         for reading in np.flatnonzero(part.has_position).tolist():
@@ -32,6 +32,7 @@ def check_duplicates(data: Dataset) -> list[Notice]:
             # A configuration that was drawn twice for a bootstrap counts twice because it shall.
             if other != reading and (a == b or drawn_from(a) != drawn_from(b)):
                 found.append(f"{part.targets[key[0]]} at {a} and {b}")
+                where += [(a, part.targets[key[0]]), (b, part.targets[key[0]])]
     if not found:
         return []
     return [
@@ -40,6 +41,7 @@ def check_duplicates(data: Dataset) -> list[Notice]:
             f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
             f"(target at configurations): {listed(found)}. Rows were copied, or the instrument stood still: remove "
             f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
+            at=tuple(dict.fromkeys(where)),
         )
     ]
 
@@ -115,5 +117,6 @@ def repeated_joints_notices(data: Dataset, pairs: list[tuple[str, str]]) -> list
             f"positions of another one to the last digit, and readings more than {_LARGEST_CHANGE * 1e3:g} mm from "
             f"its readings: {listed(words)}. The joint positions were copied: mend them, or leave these configurations "
             "out.",
+            at=tuple((label, "") for pair in pairs for label in pair),
         )
     ]

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.correction import Correction
+from truearm.compensation.correction import Correction, way_through
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Joint
 from truearm.notices import worst_first
@@ -94,7 +94,7 @@ def path_figure(corrections: Sequence[Correction]) -> Figure:
         frame = tips @ np.linalg.inv(correction.before[rows])
         step = np.einsum("nij,nj->ni", frame[:, :3, :3], (correction.after - correction.before)[rows, :3, 3])
         start = tips[:, :3, 3] * 1e3
-        way = _way(correction)
+        way = way_through(correction.program, correction.tips, _DRAWN)
         name = html.escape(correction.program.sources[0].path.stem)
         traces.append(_line(view, way * 1e3, f"path of {name}", "#9aa0a6", 2))
         arrows = np.stack([start, start + stretch * 1e3 * step, np.full_like(start, np.nan)], axis=1).reshape(-1, 3)
@@ -290,18 +290,6 @@ def _order(correction: Correction) -> NDArray[np.intp]:
     moves = [row for move in correction.program.moves for row in (move.via, move.target) if row is not None]
     rest = sorted(set(range(len(correction.program.targets))) - set(moves))
     return np.array([*moves, *rest], dtype=int)
-
-
-def _way(correction: Correction) -> Array:
-    """Return the tips ``(m, 3)`` [m] in the order of the moves, with gaps between routines."""
-    parts: list[Array] = []
-    routine = None
-    for move in correction.program.moves[:_DRAWN]:
-        if routine not in (None, move.routine):
-            parts.append(np.full(3, np.nan))
-        routine = move.routine
-        parts += [correction.tips[row, :3, 3] for row in (move.via, move.target) if row is not None]
-    return np.array(parts).reshape(-1, 3)
 
 
 def _line(view: _View, points: Array, name: str, colour: str, width: float) -> Figure:

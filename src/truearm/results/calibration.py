@@ -33,6 +33,7 @@ from truearm.notices import Notice, has_error
 from truearm.results.budgets import budget_lines, budget_summary
 from truearm.results.calibration_proof import proof_of
 from truearm.results.curves import curve_lines, curves_summary
+from truearm.results.excluded import Excluded, excluded_line
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.simulated import simulated_lines, simulated_summary
@@ -92,6 +93,8 @@ class Calibration(Record):
         What was known of the robot from an earlier calibration; None if nothing was.
     without
         Labels of the configurations that were left out; `data` does not have them.
+    excluded
+        Readings that were excluded; `data` have none there.
     notes
         What the user noted, by its name.
     next
@@ -118,6 +121,7 @@ class Calibration(Record):
     inputs: tuple[Path, ...] = ()
     known_before: Proof | None = None
     without: tuple[str, ...] = ()
+    excluded: tuple[Excluded, ...] = ()
     notes: dict[str, str] = field(default_factory=dict)
     next: tuple[NextStep, ...] = ()
     monte_carlo: SimulatedCalibrations | None = None
@@ -178,6 +182,7 @@ class Calibration(Record):
             "expected_mm": expected_summary(self.expected),
             **({"held": list(self.fit.held.words)} if self.fit.held else {}),
             **({"without": list(self.without)} if self.without else {}),
+            **({"excluded": [one.summary() for one in self.excluded]} if self.excluded else {}),
             **({"notes": self.notes} if self.notes else {}),
         }
 
@@ -214,6 +219,8 @@ class Calibration(Record):
             text.append(f"Held at known places: {listed(self.fit.held.words)}")
         if self.without:
             text.append(f"Left out: {counted(len(self.without), 'configuration')} ({listed(self.without)})")
+        if self.excluded:
+            text.append(excluded_line(self.excluded))
         text += expected_lines(self.expected)
         text += curve_lines(self.curves)
         text += noise_lines(self.fit, self.repeatability)

@@ -59,6 +59,6 @@ class GuessedMapping(Record):
             many = counted(self.guessed.configurations, "configuration")
             text.append(f"An import with it would read {many}, targets {listed(self.guessed.targets)}.")
         else:
-            text.append("The joint positions are in no column of it: name the file that holds them.")
+            text.append("No columns are called like joint positions: name them, or the file that holds them.")
         text.append("Nothing is imported before every guess is confirmed: look at each, then write confirmed: yes.")
         return text

@@ -12,12 +12,15 @@ import numpy as np
 from truearm.measurement.bags.recording import Recording
 from truearm.measurement.bags.standstills import Sighting
 from truearm.measurement.dataset import Dataset
-from truearm.results.record import Record, joints_lines
+from truearm.notices import Notice
+from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
 from truearm.shown import counted, listed
 from truearm.writing import output_file, write_files
 
 #: What the page beside the measurements ends with.
 PAGE: Final = ".html"
+#: Fewer messages than this share are lost in ordinary recordings.
+_LOST: Final = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,6 +46,21 @@ class ImportedBag(Record):
         """The measurements."""
         return self.found.data
 
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know about the recording."""
+        lost, kept = self.found.lost, len(self.found.joints.times)
+        if lost < _LOST * (lost + kept):
+            return ()
+        return (
+            Notice(
+                "messages-missing",
+                f"About {lost} of {lost + kept} messages of the joints are missing, by the times of the others. "
+                "Motions shorter than the gaps are not seen. Lighten the load of the network or of the recorder, or "
+                "let the topic be published reliably.",
+            ),
+        )
+
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
         found = self.found
@@ -65,6 +83,7 @@ class ImportedBag(Record):
             ],
             "standstills_s": [[still.start, still.end] for still in found.standstills],
             "missed_pauses_s": list(found.missed),
+            "warnings": notice_summaries(self.warnings),
             "declares_sigma": found.declares_sigma,
         }
 
@@ -94,7 +113,8 @@ class ImportedBag(Record):
             text.append("  the joints were not recorded. Each takes a number: the way to the next one is not known.")
         if not found.declares_sigma:
             text.append("  No deviations are declared: in a standstill all samples are the same.")
-        return [*text, *joints_lines("controller" if self.data.joints_are == "controller" else "model")]
+        text += joints_lines("controller" if self.data.joints_are == "controller" else "model")
+        return text + notice_lines(self.warnings)
 
     def save(self, file: str | Path) -> tuple[Path, Path]:
         """Write the measurements as canonical CSV, and a page with the same name that ends in ``.html``.

@@ -9,6 +9,7 @@ from typing import Final
 
 from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
 from truearm.shown import counted
+from truearm.validation.iso9283.result_file import Entry, ResultFile
 from truearm.validation.iso9283.values import Conditions, Quantity, Value
 
 #: Unit of each kind of number at the edges, and how many of it one SI unit is.
@@ -160,6 +161,46 @@ def conditions_summary(under: Conditions) -> dict[str, float | str]:
     if under.load is not None:
         found["load_percent"] = round(100.0 * under.load, 6)
     return {**found, "robot": under.robot} if under.robot else found
+
+
+def values_of(result: ResultFile) -> tuple[Value, ...]:
+    """Return the values of a result that was read again, in SI units."""
+    return tuple(map(_value, result.criteria))
+
+
+def conditions_of(conditions: Mapping[str, float | str]) -> Conditions:
+    """Return conditions as files have them: the inverse of :func:`conditions_summary`."""
+    velocity, load = (conditions.get(f"{name}_percent") for name in ("velocity", "load"))
+    return Conditions(
+        velocity / 100.0 if isinstance(velocity, float) else None,
+        load / 100.0 if isinstance(load, float) else None,
+        str(conditions.get("robot", "")),
+    )
+
+
+def _value(entry: Entry) -> Value:
+    quantity, per_si = next((name, per) for name, (unit, per) in UNITS.items() if unit == entry.unit)
+
+    def in_si(number: float | None) -> float | None:
+        return None if number is None else number / per_si
+
+    value = in_si(entry.value)
+    ends = entry.interval_95
+    least, largest = (None, None) if entry.range is None else map(in_si, entry.range)
+    return Value(
+        entry.id,
+        entry.component,
+        entry.where,
+        math.nan if value is None else value,
+        quantity,
+        None if ends is None else (ends[0] / per_si, ends[1] / per_si),
+        entry.cycles,
+        conditions_of(entry.conditions),
+        entry.status,
+        least,
+        largest,
+        entry.bandwidth_hz,
+    )
 
 
 def test_name(value: Value) -> str:

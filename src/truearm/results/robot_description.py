@@ -130,7 +130,7 @@ class RobotDescription(Record):
 
 #: What the words of robot files say of a controller's kinematics.
 _KINEMATICS: Final = {
-    "unknown": "not known",
+    "unknown": "not said: the nominal values, or what its maker measured of this arm (every arm of Universal Robots)",
     "nominal": "the nominal values",
     "proprietary": "a calibration of its maker that nobody else can read",
 }

@@ -37,7 +37,7 @@ class Arrows:
     words: str
 
 
-def error_arrows(points: Array, errors: Array, factor: float) -> Arrows:
+def error_arrows(points: Array, errors: Array, factor: float, lightest: float | None = None) -> Arrows:
     """Return arrows of errors, at the points where they were found.
 
     Parameters
@@ -46,6 +46,8 @@ def error_arrows(points: Array, errors: Array, factor: float) -> Arrows:
         ``(n, 3)`` [m]; rows with a NaN are left out.
     factor
         By how much they are magnified, 1 to 2000.
+    lightest
+        Size that has the lightest colour [m]; None for the largest of them.
 
     Raises
     ------
@@ -59,7 +61,7 @@ def error_arrows(points: Array, errors: Array, factor: float) -> Arrows:
     at, by = points[seen], errors[seen]
     size = np.linalg.norm(by, axis=1)
     largest = float(size.max(initial=0.0))
-    colours = coloured(size, 0.0, largest)
+    colours = coloured(size, 0.0, largest if lightest is None else lightest)
     words = f"errors x {times:g}, largest {largest * 1e3:.3g} mm"
     return Arrows(np.stack([at, at + times * by], axis=1), colours, words)
 

@@ -13,6 +13,7 @@ from truearm.jobs.inverse import inverse
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import Controller, JointsOf
 from truearm.modeling.formats.joint_columns import counting
+from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.inverse.candidates import REACHED, Candidates
 from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
 from truearm.modeling.inverse.pose_solver import Orientation, PoseTask
@@ -31,6 +32,9 @@ _FREEDOM: Final[dict[int, Orientation]] = {3: "free", 4: "free", 5: "axis"}
 _ROUNDING: Final = 1e-9
 #: A pose that is dragged to may turn a joint by so much in one step [rad or m]; further away all branches are tried.
 _A_LITTLE: Final = 0.3
+#: Where branches have no names: from so many postures others are looked for, so many are offered, and two differ by so
+#: much in a joint [rad or m].
+_SEEDS, _MOST, _APART = 48, 8, 0.35
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +83,8 @@ class Jogging:
         self.joints: Array = np.clip(joints if fits and joints is not None else _start(robot), self.low, self.high)
         self._angles = np.zeros((1, 3))
         self._bent: Postures | None = None
+        self._pose: tuple[Postures, str | None, Array, Array] | None = None
+        self._reaches: dict[str | None, float] = {}
 
     @property
     def at(self) -> Postures:
@@ -154,8 +160,15 @@ class Jogging:
 
     def pose(self, frame: JogFrame = "base") -> tuple[Array, Array]:
         """Return the tip's position ``(3,)`` [m] and rotation ``(3, 3)`` in the base or the world."""
-        p, R = self.robot.forward(self.at, frame="world" if frame == "world" else "base", target=self.tip)
-        return p[0], R[0]
+        at, known = self.at, self._pose
+        if known is None or known[0] is not at or known[1] != self.tip:
+            p, R = self.robot.forward(at, frame="world", target=self.tip)
+            known = self._pose = (at, self.tip, p[0], R[0])
+        _, _, position, rotation = known
+        if frame == "world":
+            return position, rotation
+        base = self.robot.base
+        return (position - np.array(base.translation)) @ base.rotation, base.rotation.T @ rotation
 
     def pose_numbers(self, frame: JogFrame) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return x, y, z [mm] and turns about the fixed axes x, y and z, one after the other [deg].
@@ -222,7 +235,7 @@ class Jogging:
     def _near(self, position: Array, rotation: Array) -> bool:
         """Go to a pose in the world by steps from where the arm is; return whether that was possible."""
         x, y, z = rotation.T[:, :, None]
-        length = reach(self.robot, self.tip)
+        length = self._reach()
         task = PoseTask(self.robot, self.tip, self.orientation, position[:, None], (x, y, z), length)
         pool = Candidates(task, self.joints[None], None)
         pool.add(np.zeros(1, np.intp), self.robot.variables(self.at, self.robot.values)[: len(self.joints)].T)
@@ -237,19 +250,35 @@ class Jogging:
         return False
 
     def branches(self) -> list[Branch]:
-        """Return all ways to the pose where the tip is now.
+        """Return the ways to the pose where the tip is now.
 
-        Raises
-        ------
-        InputError
-            If the branches of the arm have no names.
+        Of an arm whose branches have names these are all. Of any other arm they are what is found from many postures,
+        the nearest first: some of endlessly many, where the arm has more joints than the pose needs.
         """
         p, R = self.pose()
-        found = inverse(self.robot, p[None], R[None], target=self.tip, branch="all", seed=self.joints).solutions
-        return [
-            Branch(name, joints, status)
-            for name, joints, status in zip(found.branch, found.joints, found.status, strict=True)
-        ]
+        if self.orientation == "full" and branch_rule(self.robot) is not None:
+            found = inverse(self.robot, p[None], R[None], target=self.tip, branch="all", seed=self.joints).solutions
+            return [
+                Branch(name, joints, status)
+                for name, joints, status in zip(found.branch, found.joints, found.status, strict=True)
+            ]
+        seeds = self.robot.random_configurations(_SEEDS, np.random.default_rng(0))
+        count = len(seeds)
+        found = inverse(
+            self.robot,
+            np.repeat(p[None], count, axis=0),
+            None if self.orientation == "free" else np.repeat(R[None], count, axis=0),
+            target=self.tip,
+            seed=seeds,
+            orientation=self.orientation,
+        ).solutions
+        far = np.abs(found.joints - self.joints).max(axis=1)
+        kept: list[int] = []
+        for k in np.argsort(far, kind="stable").tolist():
+            others = [self.joints, *(found.joints[other] for other in kept)]
+            if found.usable[k] and all(np.abs(found.joints[k] - other).max() > _APART for other in others):
+                kept.append(k)
+        return [Branch(f"posture {n}", found.joints[k], found.status[k]) for n, k in enumerate(kept[:_MOST], 1)]
 
     def singular_value(self) -> float:
         """Return how little the tip moves with a joint motion of norm 1, positions in reach lengths.
@@ -257,7 +286,10 @@ class Jogging:
         It is 0 in a singular posture, and as ``ik`` has it for a whole pose.
         """
         jacobian = self.robot.joint_jacobian(self.at, self.tip)[0].copy()
-        jacobian[:3] /= reach(self.robot, self.tip)
+        length = self._reach()
+        if length == 0.0:  # all in one point: nothing moves it
+            return 0.0
+        jacobian[:3] /= length
         if self.orientation == "free":
             jacobian = jacobian[:3]
         elif self.orientation == "axis":
@@ -276,6 +308,11 @@ class Jogging:
         near = ", near a singular posture" if value < NEAR_SINGULAR else ""
         told.append(f"Smallest singular value: {value:.4f}{near}.")
         return told
+
+    def _reach(self) -> float:
+        if self.tip not in self._reaches:
+            self._reaches[self.tip] = reach(self.robot, self.tip)
+        return self._reaches[self.tip]
 
     def _controller(self) -> Controller | None:
         return counting(self.robot, self.whose)

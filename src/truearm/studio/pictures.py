@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+import json
+import re
+from pathlib import Path
+from typing import Any, Final
 
+from truearm.files import exists, read_text
 from truearm.studio.window import Window
+
+#: Where a report has the data of its pictures.
+_FIGURES: Final = re.compile(r'<script type="application/json" id="figures">(.*?)</script>', re.S)
+#: Where more panels than that stand side by side, letters are so small [px].
+_WIDE: Final = 3
+_SMALL: Final = 8
 
 
 class Picture:
@@ -16,8 +26,8 @@ class Picture:
         The folder it stands in.
     """
 
-    def __init__(self, window: Window, title: str) -> None:
-        self._window = window
+    def __init__(self, window: Window, title: str, aspect: float = 1.2) -> None:
+        self._window, self._aspect = window, aspect
         self.place = window.gui.add_folder(title, visible=False)
         self._plot: Any = None
 
@@ -30,13 +40,38 @@ class Picture:
         if self._window.project.settings.dark:
             drawn = _recoloured(drawn, DARK)
         layout = {name: value for name, value in drawn["layout"].items() if name not in ("width", "height")}
+        layout = _narrow(layout)
         figure = go.Figure(data=drawn["data"], layout=layout, skip_invalid=True)
         self.place.visible = True
         if self._plot is None:
             with self.place:
-                self._plot = self._window.gui.add_plotly(figure, aspect=1.2)
+                self._plot = self._window.gui.add_plotly(figure, aspect=self._aspect)
         else:
             self._plot.figure = figure
+
+
+def report_figures(path: Path) -> dict[str, Any]:
+    """Return the pictures of a report by their names; none if it has none."""
+    if not exists(path):
+        return {}
+    found = _FIGURES.search(read_text(path))
+    try:
+        figures = json.loads(found[1]) if found else {}
+    except (json.JSONDecodeError, RecursionError):
+        return {}
+    return figures if isinstance(figures, dict) else {}
+
+
+def _narrow(layout: dict[str, Any]) -> dict[str, Any]:
+    """Return a layout that can be read in the window: many panels side by side have small letters and few titles."""
+    across = {name: axis.get("domain") or (0.0, 1.0) for name, axis in layout.items() if name.startswith("xaxis")}
+    if len({str(domain) for domain in across.values()}) <= _WIDE:
+        return layout
+    made = {**layout, "font": {**layout.get("font", {}), "size": _SMALL}}
+    for name, axis in layout.items():
+        if name.startswith("yaxis") and across.get(name.replace("y", "x", 1), (0.0,))[0] > 0.0:
+            made[name] = {**axis, "title": None}
+    return made
 
 
 def _recoloured(value: Any, colours: dict[str, str]) -> Any:

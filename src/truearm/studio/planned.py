@@ -6,13 +6,17 @@ import os
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from truearm.files import confined_reads
 from truearm.modeling.chain import Array
+from truearm.studio.plan_fields import PlanFields, plan_arguments
 from truearm.studio.tasks import Outcome, Progress, option_words
+
+#: Options that are not called as their parameters.
+_OPTIONS: Final = {"candidates_from": "from", "accurate_at": "for"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +27,9 @@ class Planned:
     ----------
     outcome
         What its command prints, and the files.
-    chosen
-        Where the flange is at the chosen configurations, in the base frame [m], ``(n, 3)``.
+    chosen, candidates
+        Where the flange is at the chosen configurations and at those that it chose from, in the base frame [m],
+        ``(n, 3)`` each.
     places, errors
         Where the accuracy was predicted, in the base frame, ``(m, 3)``, and the error to expect there, ``(m,)`` [m].
     enough
@@ -33,44 +38,61 @@ class Planned:
 
     outcome: Outcome
     chosen: Array
+    candidates: Array
     places: Array
     errors: Array
     enough: dict[str, Any]
 
 
-def planned(folder: Path, robot: str, poses: int | str, out: str, progress: Progress, **options: Any) -> Planned:
+def planned(
+    folder: Path,
+    robot: str,
+    fields: PlanFields,
+    cell: str | None,
+    constraints: str | None,
+    payload: str | None,
+    progress: Progress,
+) -> Planned:
     """Choose configurations and write the plan: :func:`truearm.plan`.
 
     Parameters
     ----------
-    options
-        Of the job, by its names of parameters; None where nothing is said.
+    fields
+        What the page says.
+    cell, constraints, payload
+        Of the project.
     """
     from truearm.jobs.plan import plan
     from truearm.reporting.plan_report import number_figure
 
     os.chdir(folder)
-    given = {name: value for name, value in options.items() if value is not None}
+    said, poses = fields.said(cell, constraints, payload), fields.poses.strip()
     with confined_reads(folder):
         found = plan(
             robot,
-            poses=poses,  # type: ignore[arg-type]
-            out=out,
-            command=plan_command(robot, poses, out, given),
+            poses=int(poses) if poses.isdecimal() else poses,  # type: ignore[arg-type]
+            out=fields.place,
+            command=plan_command(robot, poses, said),
             progress=progress,
-            **given,
+            **plan_arguments(robot, said),
         )
-    made, base, page = found.made, found.made.robot.base, Path(out).with_suffix(".html").name
+    made, base = found.made, found.made.robot.base
+    if found.program is not None:
+        files = tuple(f"{fields.place}/{name}" for name in found.contents())
+    else:
+        stem = fields.place.removesuffix(Path(fields.place).suffix)
+        files = (fields.place, f"{stem}.html", *(() if found.tour is None else (f"{stem}-ways.csv",)))
     return Planned(
-        Outcome(tuple(found.lines()), (), (out, page)),
+        Outcome(tuple(found.lines()), found.warnings, files),
         made.robot.forward(made.joints)[0],
+        made.robot.forward(made.among)[0],
         (made.prediction.places - np.array(base.translation)) @ base.rotation,
         made.prediction.error,
         number_figure(made.prediction, len(made.joints)),
     )
 
 
-def plan_command(robot: str, poses: int | str, out: str, options: dict[str, Any]) -> str:
+def plan_command(robot: str, poses: str, said: dict[str, Any]) -> str:
     """Return the command that does the same in the project's folder, as the page shows it."""
-    said = {**options, **({"noise": f"{options['noise'] * 1e3:.15g}"} if "noise" in options else {})}
-    return shlex.join(["truearm", "plan", robot, "--poses", str(poses), *option_words(said), "--out", out])
+    options = {_OPTIONS.get(name, name): value for name, value in said.items()}
+    return shlex.join(["truearm", "plan", robot, "--poses", poses, *option_words(options), "--out", "PLAN"])

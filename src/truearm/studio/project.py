@@ -5,87 +5,27 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from filecmp import cmp
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, Final, Literal
-
-from pydantic import BaseModel, ConfigDict, Field
+from typing import Any, Final, Literal
 
 from truearm.errors import InputError, refusals_at, refusals_of
-from truearm.files import exists, path_argument, read_bytes, read_yaml
+from truearm.files import exists, path_argument, read_text, read_yaml
 from truearm.limits import refuse_beyond
 from truearm.manifest import MANIFEST, hash_of
 from truearm.printable import is_one_line
 from truearm.schemas import validated
-from truearm.writing import put_back_old, writable_folder, write_files, write_text
+from truearm.studio.settings import Settings
+from truearm.studio.uploads import clear_uploads
+from truearm.writing import put_back_old, put_in_place, writable_folder, write_text, write_text_over
 
 #: What makes a folder a project.
 PROJECT_FILE: Final = "truearm-studio.yaml"
 #: So many edits can be undone.
 _KEPT: Final = 100
-
-_Name = Annotated[str, Field(min_length=1)]
-
-
-class Settings(BaseModel):
-    """Schema ``truearm-studio/1``: what the studio's pages say.
-
-    Attributes
-    ----------
-    robot
-        A library id, or a file of the folder.
-    data
-        File of measurements; None for none yet.
-    payload
-        What the robot carried, as a text such as ``2.7kg,50mm,25mm,100mm``.
-    model, train, loss, seed
-        As for :func:`truearm.calibrate`.
-    result
-        Folder of the calibration's results, in the project's.
-    program
-        File of a robot program.
-    cell
-        File that says where tools and frames are; None for what the program says.
-    taught
-        As for :func:`truearm.compensate`; None if that was not said.
-    controller_kinematics
-        Likewise.
-    corrected
-        Folder of the corrected program.
-    dark
-        Whether the window is dark.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    truearm: Literal["truearm-studio/1"] = "truearm-studio/1"
-    robot: _Name = "irb120"
-    data: _Name | None = None
-    payload: _Name | None = None
-    model: _Name = "geometric"
-    train: Annotated[int, Field(strict=True, ge=1)] | Literal["all"] | None = None
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
-    loss: _Name = "linear"
-    result: _Name = "result"
-    program: _Name | None = None
-    cell: _Name | None = None
-    taught: tuple[_Name, ...] | None = None
-    controller_kinematics: _Name | None = None
-    corrected: _Name = "result/corrected"
-    dark: bool = False
-
-    def text(self) -> str:
-        """Return the file."""
-        from ruamel.yaml import YAML
-        from ruamel.yaml.compat import StringIO
-
-        stream, yaml = StringIO(), YAML()
-        yaml.default_flow_style = False
-        said = {name: list(value) if isinstance(value, tuple) else value for name, value in self if value is not None}
-        yaml.dump(said, stream)
-        return str(stream.getvalue())
-
-
-#: Settings that name a file of the folder, or a folder in it.
-_PATHS: Final = ("data", "result", "program", "cell", "corrected")
+#: Settings that name a file of the folder, or a folder in it; those of the tests.
+_PATHS: Final = ("data", "exclude", "result", "program", "cell", "corrected", "constraints", "path", "meshes")
+_TESTED: Final = ("plan", "poses", "paths", "settling", "forces", "alignment", "compare", "result")
 
 
 @dataclass(frozen=True)
@@ -104,10 +44,29 @@ class ChangedFile:
     how: Literal["changed", "new", "gone"]
 
 
+@dataclass(frozen=True)
+class _Edit:
+    """What an edit changes: settings, and the texts of files by their names, None where there is none."""
+
+    settings_before: Settings
+    settings: Settings
+    files_before: Mapping[str, str | None]
+    files: Mapping[str, str | None]
+
+    def back(self) -> _Edit:
+        """Return the edit that takes it back."""
+        return _Edit(self.settings, self.settings_before, self.files, self.files_before)
+
+
 class Project:
     """A folder with its settings, their history, and what the files were like when they were last looked at.
 
     Not safe for several threads: the studio holds its lock around every call.
+
+    Parameters
+    ----------
+    written
+        Hash of the file as it was before it was read: another program that writes meanwhile is noticed.
 
     Attributes
     ----------
@@ -117,11 +76,11 @@ class Project:
         What holds now; it is what the file says.
     """
 
-    def __init__(self, folder: Path, settings: Settings) -> None:
+    def __init__(self, folder: Path, settings: Settings, written: str | None) -> None:
         self.folder, self.settings = folder, settings
-        self._undone: list[Settings] = []
-        self._before: list[Settings] = []
-        self._written = self._stamp_of_file()
+        self._undone: list[_Edit] = []
+        self._before: list[_Edit] = []
+        self._written = written
         self._seen = self._stamps()
 
     def path(self, name: str, parameter: str | None = None) -> Path:
@@ -164,23 +123,29 @@ class Project:
         name = getattr(self.settings, setting)
         return None if name is None else self.path(name, setting)
 
-    def edit(self, **changes: Any) -> bool:
+    def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> bool:
         """Change settings and write the file; return whether anything changed.
+
+        Parameters
+        ----------
+        files
+            Texts of other small files of the project that are part of the edit, by their names: they are undone too.
 
         Raises
         ------
         InputError
-            For a value that cannot be, or if another program has changed the file: it is not overwritten.
+            For a value that cannot be, or if another program has changed a file: it is not overwritten.
         """
         content = {**self.settings.model_dump(mode="json"), **changes}
         new = validated(content, Settings, PROJECT_FILE)
         _check_paths(self, new)
-        if new == self.settings:
+        before = {name: self._text_of(name) for name in files or {}}
+        edit = _Edit(self.settings, new, before, dict(files or {}))
+        if new == self.settings and edit.files == before:
             return False
-        self._write(new)
-        self._before = [*self._before, self.settings][-_KEPT:]
+        self._make(edit)
+        self._before = [*self._before, edit][-_KEPT:]
         self._undone.clear()
-        self.settings = new
         return True
 
     @property
@@ -196,24 +161,23 @@ class Project:
     def undo(self) -> None:
         """Take back the last edit of the settings; nothing if there is none."""
         if self._before:
-            self._write(self._before[-1])
-            self._undone.append(self.settings)
-            self.settings = self._before.pop()
+            self._make(self._before[-1].back())
+            self._undone.append(self._before.pop())
 
     def redo(self) -> None:
         """Do an undone edit again; nothing if there is none."""
         if self._undone:
-            self._write(self._undone[-1])
-            self._before.append(self.settings)
-            self.settings = self._undone.pop()
+            self._make(self._undone[-1])
+            self._before.append(self._undone.pop())
 
     def reload(self) -> None:
         """Take the settings from the file as it is now; edits before are no longer undone."""
+        written = _hash_of_file(self.folder)
         settings = read_yaml(self.folder / PROJECT_FILE, Settings)
         with refusals_at(str(self.folder / PROJECT_FILE)):
             _check_paths(self, settings)
         self.settings, self._before, self._undone = settings, [], []
-        self._written = self._stamp_of_file()
+        self._written = written
         self.look()
 
     def look(self, *names: str) -> None:
@@ -244,8 +208,8 @@ class Project:
         found = [name for name in self._stamps() if not suffixes or name.lower().endswith(suffixes)]
         return sorted(name for name in found if name != PROJECT_FILE and name.rpartition("/")[2] != MANIFEST)
 
-    def take_in(self, name: str, content: bytes) -> str:
-        """Write an uploaded file into the folder and return its name there.
+    def take_in(self, name: str, came: Path) -> str:
+        """Move a file that has come into the folder to its name there, and return that; it replaces none.
 
         Raises
         ------
@@ -257,32 +221,56 @@ class Project:
         if plain.name != name or name.startswith(".") or name in (PROJECT_FILE, MANIFEST):
             raise InputError("a file cannot be taken in under this name", came=name, cure="Rename it.")
         path = self.path(name)
-        refuse_beyond("file_size", len(content), where=name)
-        if exists(path) and read_bytes(path) != content:
-            raise InputError(
-                "another file of this name stands in the project, and is not overwritten",
-                where=name,
-                cure="Rename the one or the other.",
-            )
-        write_files(path.parent, {path.name: content})
+        refuse_beyond("upload", came.stat().st_size, where=name)
+        if exists(path):
+            if not path.is_file() or not cmp(path, came, shallow=False):
+                raise InputError(
+                    "another file of this name stands in the project, and is not overwritten",
+                    where=name,
+                    cure="Rename the one or the other.",
+                )
+        else:
+            put_in_place(came, path)
         self.look(name)
         return name
 
+    def _make(self, edit: _Edit) -> None:
+        """Write what an edit changes: files first, for the settings may name them."""
+        for name, text in edit.files_before.items():
+            if self._text_of(name) != text:
+                raise InputError(
+                    "another program has changed this file, and it is not overwritten",
+                    where=name,
+                    cure="Reload the project, and make the edit again.",
+                )
+        self._put(edit.files)
+        if edit.settings != self.settings:
+            try:
+                self._write(edit.settings)
+            except InputError:
+                self._put(edit.files_before)
+                raise
+        self.settings = edit.settings
+
+    def _put(self, files: Mapping[str, str | None]) -> None:
+        for name, text in files.items():
+            if text is None:
+                self.path(name).unlink(missing_ok=True)
+            else:
+                write_text(self.path(name), text)
+        if files:
+            self.look(*files)
+
+    def _text_of(self, name: str) -> str | None:
+        path = self.path(name)
+        return read_text(path) if exists(path) else None
+
     def _write(self, settings: Settings) -> None:
         """Write the file, unless it is not as this project has left it."""
-        if self._stamp_of_file() != self._written:
-            raise InputError(
-                "another program has changed this file, and it is not overwritten",
-                where=PROJECT_FILE,
-                cure="Reload the project, and make the edit again.",
-            )
-        write_text(self.folder / PROJECT_FILE, settings.text())
-        self._written = self._stamp_of_file()
+        text = settings.text()
+        write_text_over(self.folder / PROJECT_FILE, text, self._written)
+        self._written = hash_of(text.encode())
         self.look(PROJECT_FILE)
-
-    def _stamp_of_file(self) -> str | None:
-        path = self.folder / PROJECT_FILE
-        return hash_of(path.read_bytes()) if path.is_file() else None
 
     def _stamps(self) -> dict[str, tuple[int, int]]:
         """Return size and time of the last change of every file that is no hidden one, three folders deep."""
@@ -322,14 +310,26 @@ def open_project(folder: object, first: Mapping[str, Any] | None = None) -> Proj
             path.mkdir(parents=True, exist_ok=True)
         path = path.resolve()
         put_back_old(path)
+        clear_uploads(path)
         if not exists(path / PROJECT_FILE):
             settings = validated(dict(first or {"truearm": "truearm-studio/1"}), Settings, PROJECT_FILE)
-            write_text(path / PROJECT_FILE, settings.text())
-        settings = read_yaml(path / PROJECT_FILE, Settings)
-        project = Project(path, settings)
+            try:
+                write_text_over(path / PROJECT_FILE, settings.text(), None)
+            except InputError:
+                if not exists(path / PROJECT_FILE):  # another studio has just made it
+                    raise
+        written = _hash_of_file(path)
+        project = Project(path, read_yaml(path / PROJECT_FILE, Settings), written)
+        settings = project.settings
         with refusals_at(str(path / PROJECT_FILE)):
             _check_paths(project, settings)
         return project
+
+
+def _hash_of_file(folder: Path) -> str | None:
+    """Return the hash of a project's file; None if there is none."""
+    path = folder / PROJECT_FILE
+    return hash_of(path.read_bytes()) if path.is_file() else None
 
 
 def refuse_no_project(path: Path) -> bool:
@@ -358,6 +358,18 @@ def _check_paths(project: Project, settings: Settings) -> None:
         value = getattr(settings, name)
         if value is not None:
             project.path(value, name)
+    for name in ("candidates_from", "accurate_at", "out"):
+        value = getattr(settings.plan, name)
+        if value is not None:
+            project.path(value, name)
+    for name in ("plan", "truth", "watch", "mapping", "about", "out"):
+        value = getattr(settings.measure, name)
+        if value is not None:
+            project.path(value, name)
+    for name in _TESTED:
+        value = getattr(settings.performance, name)
+        if value is not None:
+            project.path(value, f"performance.{name}")
     if settings.robot not in library():
         project.path(settings.robot, "robot")
     if settings.controller_kinematics not in (None, "nominal", "proprietary", "unknown"):

@@ -24,6 +24,8 @@ from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
 #: The columns of labels that lists of configurations have, the better first.
 _LABELS: Final = ("configuration", "pose")
+#: The column that says why an arm stops on the ways of a plan.
+_STOP: Final = "stop"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,8 @@ class Recorded:
 def read_recorded(path: Path, robot: Robot) -> Recorded:
     """Read the configurations of any table of the commands: a plan, measurements, joints of poses, recorded ones.
 
-    Of rows after each other with one label the first counts; other columns are left aside.
+    Of rows after each other with one label the first counts; of the ways of a plan, whose rows are stops, every one.
+    Other columns are left aside.
 
     Raises
     ------
@@ -99,8 +102,13 @@ def read_recorded(path: Path, robot: Robot) -> Recorded:
     if joints_are == "controller":
         values = robot.controller.to_model(values)
     heading = next((name for name in _LABELS if name in cells.names), None)
-    labels = [str(k + 1) for k in range(len(values))] if heading is None else cells.texts(cells.names.index(heading))
-    kept = [k for k in range(len(labels)) if k == 0 or labels[k] != labels[k - 1]]
+    stops = cells.texts(cells.names.index(_STOP)) if _STOP in cells.names else None
+    labels: Sequence[str] = [str(k + 1) for k in range(len(values))]
+    if heading is not None:
+        labels = cells.texts(cells.names.index(heading), missing=stops is not None)
+    if stops is not None:
+        labels = [f"{stop} {label}".strip() for stop, label in zip(stops, labels, strict=True)]
+    kept = [k for k in range(len(labels)) if stops is not None or k == 0 or labels[k] != labels[k - 1]]
     return Recorded(tuple(labels[k] for k in kept), values[kept], joints_are)
 
 
@@ -157,6 +165,12 @@ class Motion:
     def at(self, time: float) -> Array:
         """Return the joint positions ``(joints,)`` at a time [s]; at the ends before and behind it."""
         return np.array([np.interp(time, self.times, column) for column in self.joints.T])
+
+    def on_the_way(self, steps: int = 20) -> Array:
+        """Return configurations along the way, so many from each that is passed to the next, ``(n, joints)``."""
+        places = np.arange(len(self.joints))
+        along = np.linspace(0.0, float(places[-1]), steps * (len(places) - 1) + 1)
+        return np.stack([np.interp(along, places, column) for column in self.joints.T], axis=1)
 
     @property
     def duration(self) -> float:

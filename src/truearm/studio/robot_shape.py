@@ -8,8 +8,8 @@ meshes serve a nominal and a calibrated robot, which differ by less than can be 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -66,16 +66,25 @@ class RobotShape:
     layout: Layout
 
 
-def robot_shape(robot: Robot) -> RobotShape:
+def robot_shape(robot: Robot, meshes: Mapping[str, Mesh] | None = None) -> RobotShape:
     """Return what is drawn of a robot.
 
     Parameters
     ----------
     robot
         Its nominal geometry gives links and joints, its targets the tool.
+    meshes
+        What links look like, by name, in their own frames; None where that is not known. Links that are not named are
+        then not drawn.
     """
     plan = layout(robot)
     count = len(plan.joints)
+    if meshes:
+        names = ["base", *(f"link_{number}" for number in range(1, count + 1)), "flange"]
+        given = [LinkShape(name, meshes.get(name, _NOTHING), _NOTHING) for name in names]
+        tool = [_tool(robot, plan)] if robot.targets else []
+        foot = float(meshes["base"].vertices[:, 2].min()) if "base" in meshes else 0.0
+        return RobotShape((*given, *tool), replace(plan, pedestal=max(0.0, -foot)))
     links = [_base(plan)]
     links += [_link(plan, number) for number in range(1, count + 1)]
     radius = plan.joints[-1].radius

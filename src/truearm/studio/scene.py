@@ -17,9 +17,10 @@ from truearm.modeling.fixtures import Fixture
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, quaternion_from_rotation
+from truearm.printable import printable
 from truearm.studio.arrows import Arrows
 from truearm.studio.robot_shape import link_poses, robot_shape
-from truearm.studio.solids import frame_about
+from truearm.studio.solids import Mesh, frame_about
 
 Colour = tuple[int, int, int]
 #: One colour for all, or one each.
@@ -28,6 +29,10 @@ Colours = NDArray[np.uint8] | Colour
 _SOLID: Final[tuple[Colour, Colour]] = ((222, 225, 230), (84, 96, 114))
 _GHOST: Final[tuple[Colour, Colour]] = ((70, 130, 180), (40, 90, 140))
 _SEE_THROUGH: Final = 0.35
+#: Light from above and from below, and how strong it is.
+_SKY: Final[Colour] = (255, 255, 255)
+_GROUND: Final[Colour] = (150, 155, 165)
+_ALL_ROUND, _SIDEWAYS = 2.1, 0.7
 _BOX: Final[Colour] = (214, 140, 60)
 _FIXTURE: Final[Colour] = (46, 139, 87)
 #: Lines of the floor on white, and on dark grey.
@@ -53,9 +58,17 @@ class DrawnRobot:
         Where it stands in its base frame: 0, or below where its base frame is in its shoulder [m].
     """
 
-    def __init__(self, scene: viser.SceneApi, name: str, robot: Robot, *, ghost: bool = False) -> None:
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        robot: Robot,
+        meshes: Mapping[str, Mesh] | None = None,
+        *,
+        ghost: bool = False,
+    ) -> None:
         self.robot = robot
-        shape = robot_shape(robot)
+        shape = robot_shape(robot, meshes)
         self.length, self.floor = shape.layout.length, -shape.layout.pedestal
         self._root = scene.add_frame(name, show_axes=False)
         self._links: list[Any] = []
@@ -104,6 +117,7 @@ class Scene:
         self._server, self._scene = server, server.scene
         self._scene.set_up_direction("+z")
         self._scene.world_axes.visible = False
+        self._light()
         self.solid: DrawnRobot | None = None
         self.ghost: DrawnRobot | None = None
         self.joints: Array = np.zeros(0)
@@ -111,22 +125,37 @@ class Scene:
         self._parts: dict[str, list[Any]] = {}
         self._dark = False
         self._looked: Array | None = None
+        self._meshes: Mapping[str, Mesh] | None = None
+        self._boxes: dict[str, tuple[Array, Array]] = {}
 
     @property
     def length(self) -> float:
         """Of the arm along its links [m]; 1 m without one."""
         return 1.0 if self.solid is None else self.solid.length
 
-    def show(self, nominal: Robot | None, calibrated: Robot | None, *, dark: bool) -> bool:
+    def show(
+        self,
+        nominal: Robot | None,
+        calibrated: Robot | None,
+        meshes: Mapping[str, Mesh] | None = None,
+        *,
+        dark: bool,
+    ) -> bool:
         """Draw robots; return whether they are others than before.
 
         A calibrated robot stands where the instrument has found it. The nominal one is put there, too, so that they
         can be compared and both stand right to what was measured.
+
+        Parameters
+        ----------
+        meshes
+            What their links look like, as :func:`truearm.studio.robot_shape.robot_shape` takes it.
         """
         if nominal is not None and calibrated is not None:
             nominal = standing_at(nominal, calibrated)
         before = [None if one is None else one.robot for one in (self.solid, self.ghost)]
-        other_arm = before != [nominal, calibrated]
+        other_arm = before != [nominal, calibrated] or meshes is not self._meshes
+        self._meshes = meshes
         if not other_arm and dark == self._dark:
             return False
         self._dark = dark
@@ -135,6 +164,7 @@ class Scene:
                 self._draw_robots(nominal, calibrated)
             if nominal is not None:
                 self._surroundings(nominal if calibrated is None else calibrated)
+                self.show_boxes(self._boxes)
         return other_arm
 
     def move(self, at: Postures, of: Robot) -> None:
@@ -150,6 +180,7 @@ class Scene:
             for robot in (self.solid, self.ghost):
                 if robot is not None:
                     robot.move(at if robot.robot is of else at.joints)
+        self._server.flush()  # it would wait for others
 
     def show_tip(self, position: Array, rotation: Array) -> None:
         """Show the frame of the tip that is moved, in the world [m]."""
@@ -165,24 +196,31 @@ class Scene:
 
     def show_boxes(self, boxes: Mapping[str, tuple[Array, Array]]) -> None:
         """Draw boxes to keep clear of: lowest and highest corners in the base frame [m], by name."""
+        self._boxes = dict(boxes)
         self._clear("boxes")
         if self.solid is None:
             return
         base = self.solid.robot.base
         far = 2.0 * self.length
-        for number, (low, high) in enumerate(boxes.values()):
-            low, high = (np.clip(corner, -far, far) for corner in (low, high))
-            self._parts["boxes"].append(
+        for number, (name, corners) in enumerate(self._boxes.items()):
+            low, high = (np.clip(corner, -far, far) for corner in corners)
+            middle = (low + high) / 2.0
+            self._parts["boxes"] += [
                 self._scene.add_box(
                     f"/boxes/{number}",
                     color=_BOX,
                     dimensions=tuple((high - low).tolist()),
                     opacity=_SEE_THROUGH,
                     cast_shadow=False,
-                    position=base.rotation @ ((low + high) / 2.0) + base.translation,
+                    position=base.rotation @ middle + base.translation,
                     wxyz=base.quaternion,
-                )
-            )
+                ),
+                self._scene.add_label(
+                    f"/boxes/{number}/name",
+                    printable(name),
+                    position=(0.0, 0.0, float(high[2] - middle[2])),
+                ),
+            ]
 
     def show_arrows(self, name: str, arrows: Arrows | None) -> None:
         """Draw arrows in one upload, with the words that say how much they are magnified; None takes them away."""
@@ -203,26 +241,85 @@ class Scene:
         place = (float(middle[0]), float(middle[1]), float(top[2]) + 0.1 * self.length)
         self._parts[name] = [shown, self._scene.add_label(f"/{name}/words", arrows.words, position=place)]
 
-    def show_points(self, name: str, points: Array | None, colours: Colours = (70, 130, 180)) -> None:
+    def show_points(
+        self, name: str, points: Array | None, colours: Colours = (70, 130, 180), size: float = 0.012
+    ) -> None:
         """Draw points ``(n, 3)`` [m] in the world in one upload; None takes them away.
 
         Parameters
         ----------
         colours
             One for all, or one each ``(n, 3)`` from 0 to 255.
+        size
+            By the length of the arm.
         """
-        self._clear(name)
         if points is None or not len(points):
+            self._clear(name)
+            return
+        if known := self._parts.get(name):  # one that is taken away and drawn again flickers
+            with self._server.atomic():
+                known[0].points, known[0].colors = points.astype(np.float32), np.asarray(colours, np.uint8)
+                known[0].point_size = size * self.length
             return
         shown = self._scene.add_point_cloud(
             f"/{name}",
             points.astype(np.float32),
             np.asarray(colours, np.uint8),
-            point_size=0.012 * self.length,
+            point_size=size * self.length,
             point_shape="circle",
             precision="float32",
         )
         self._parts[name] = [shown]
+
+    def show_lines(self, name: str, segments: Array | None, colours: Colours = (90, 98, 106)) -> None:
+        """Draw straight lines ``(n, 2, 3)`` [m] in the world in one upload; None takes them away.
+
+        Parameters
+        ----------
+        colours
+            One for all, or one each ``(n, 3)`` from 0 to 255.
+        """
+        if segments is None or not len(segments):
+            self._clear(name)
+            return
+        # What viser takes for the colour of a line is proportional to its light.
+        light = (255.0 * (np.asarray(colours, float) / 255.0) ** 2.2).astype(np.uint8)
+        each = np.ascontiguousarray(np.broadcast_to(light.reshape(-1, 1, 3), (len(segments), 2, 3)))
+        if (known := self._parts.get(name)) and known[0].points.shape == segments.shape:
+            with self._server.atomic():
+                known[0].points, known[0].colors = segments.astype(np.float32), each
+            return
+        self._clear(name)
+        shown = self._scene.add_line_segments(
+            f"/{name}", segments.astype(np.float32), each, thickness=0.005 * self.length
+        )
+        self._parts[name] = [shown]
+
+    def show_balls(self, name: str, centres: Array | None, radii: Array, colour: Colour = _FIXTURE) -> None:
+        """Draw a few transparent balls about centres ``(n, 3)`` with radii ``(n,)`` [m]; None takes them away."""
+        self._clear(name)
+        for number, (centre, radius) in enumerate(zip(() if centres is None else centres, radii, strict=False)):
+            if np.isfinite(radius) and radius > 0.0:
+                ball = self._scene.add_icosphere(
+                    f"/{name}/{number}",
+                    radius=float(radius),
+                    color=colour,
+                    opacity=_SEE_THROUGH,
+                    position=centre,
+                    cast_shadow=False,
+                )
+                self._parts[name].append(ball)
+
+    def show_names(self, name: str, places: Mapping[str, Array]) -> None:
+        """Write words at places [m] in the world; none take them away."""
+        if len(known := self._parts.get(name, [])) == len(places):
+            with self._server.atomic():
+                for label, (words, place) in zip(known, places.items(), strict=True):
+                    label.text, label.position = words, place
+            return
+        self._clear(name)
+        for number, (words, place) in enumerate(places.items()):
+            self._parts[name].append(self._scene.add_label(f"/{name}/{number}", words, position=place))
 
     # -- parts ---------------------------------------------------------------------------------------------
 
@@ -233,8 +330,10 @@ class Scene:
         if self._tip is not None:
             self._tip.remove()
             self._tip = None
-        self.solid = None if nominal is None else DrawnRobot(self._scene, "/nominal", nominal)
-        self.ghost = None if calibrated is None else DrawnRobot(self._scene, "/calibrated", calibrated, ghost=True)
+        self.solid = None if nominal is None else DrawnRobot(self._scene, "/nominal", nominal, self._meshes)
+        self.ghost = (
+            None if calibrated is None else DrawnRobot(self._scene, "/calibrated", calibrated, self._meshes, ghost=True)
+        )
 
     def _surroundings(self, robot: Robot) -> None:
         """Draw frames, floor and fixtures around a robot, and say from where it is looked at first."""
@@ -276,6 +375,12 @@ class Scene:
         look += base.rotation @ np.array([0.0, 0.0, 0.6 * self.solid.floor])
         self._look_at(look, look + base.rotation @ (self.length * np.array([0.85, -1.15, 0.6])))
 
+    def _light(self) -> None:
+        """Light the scene from above and all around: viser's picture of a room costs a slow computer half a minute."""
+        self._scene.configure_environment_map(None)
+        self._scene.add_light_hemisphere("/light/sky", sky_color=_SKY, ground_color=_GROUND, intensity=_ALL_ROUND)
+        self._scene.add_light_directional("/light/side", intensity=_SIDEWAYS, position=(1.0, -2.0, 0.6))
+
     def _look_at(self, look: Array, place: Array) -> None:
         """Say from where windows look at first; those that are open follow the robot to another place."""
         start = self._server.initial_camera
@@ -291,7 +396,8 @@ class Scene:
         kinematics = robot.fixture_kinematics(fixture.name)
         position, turned = kinematics.position[:, 0], kinematics.matrix()[0]
         size = _TRIAD * self.length
-        label = self._scene.add_label(f"{name}/name", fixture.name, position=position)
+        # Not below the fixture's own name: it would be moved with that once more.
+        label = self._scene.add_label(f"{name}-name", printable(fixture.name), position=position)
         if fixture.kind == "frame":
             quaternion = quaternion_from_rotation(turned)
             return [
@@ -312,6 +418,15 @@ class Scene:
             wxyz=quaternion_from_rotation(frame_about(turned[:, 2])),
         )
         return [plane, label]
+
+    def show_line(self, name: str, points: Array | None, colour: Colour = (214, 140, 60)) -> None:
+        """Draw a line through points ``(n, 3)`` [m] in the world in one upload; None takes it away."""
+        self._clear(name)
+        if points is not None and len(points) > 1:
+            segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+            self._parts[name] = [
+                self._scene.add_line_segments(f"/{name}", segments, colour, thickness=2.0, thickness_units="screen")
+            ]
 
     def _clear(self, name: str) -> None:
         for part in reversed(self._parts.get(name, [])):

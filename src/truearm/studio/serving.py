@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from truearm.errors import InputError
-from truearm.studio.gate import Access, Gate, is_loopback, listening_socket, new_token, start_server
+from truearm.studio.access import Access, is_loopback, listening_socket, new_token
+from truearm.studio.gate import Gate, start_server
 from truearm.studio.page import Page
 from truearm.studio.pages import PAGES
 from truearm.studio.project import Project, open_project
+from truearm.studio.uploads import Uploads
 from truearm.studio.window import Window
 
 #: What is chosen in a new project of the demonstration: what it calibrated and corrected itself.
@@ -107,7 +109,7 @@ def serve(
             project.look()
         progress("opening the window")
         access = Access(host, bound.getsockname()[1], chosen, names_of(host))
-        gate = Gate(access)
+        gate = Gate(access, Uploads(project.folder))
         server = start_server(gate, bound, "truearm studio")
     except BaseException:
         bound.close()

@@ -41,17 +41,6 @@ class Outcome:
     finished: bool = True
 
 
-def check(folder: Path, robot: str, data: str, progress: Progress) -> Outcome:
-    """Say what is wrong with measurements: :func:`truearm.check`."""
-    from truearm.jobs.check import check as job
-
-    os.chdir(folder)
-    progress("comparing the readings with the robot")
-    with confined_reads(folder):
-        found = job(robot, data)
-    return Outcome(tuple(found.lines()), found.warnings)
-
-
 def calibrate(folder: Path, robot: str, data: str, out: str, progress: Progress, **options: Any) -> Outcome:
     """Calibrate and write the result: :func:`truearm.calibrate`.
 
@@ -76,37 +65,11 @@ def calibrate_command(robot: str, data: str, options: dict[str, Any]) -> str:
 
 
 def option_words(options: Mapping[str, Any]) -> list[str]:
-    """Return parameters of a job as the words of its command."""
-    return [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
-
-
-def compensate(
-    folder: Path,
-    robot: str,
-    program: str,
-    out: str,
-    cell: str | None,
-    taught: Sequence[str] | None,
-    controller_kinematics: str | None,
-    progress: Progress,
-) -> Outcome:
-    """Correct a program and write it: :func:`truearm.compensate`."""
-    from truearm.jobs.compensate import compensate as job
-
-    os.chdir(folder)
-    with confined_reads(folder):
-        made = job(
-            robot,
-            [program],
-            out=out,
-            tools=cell,
-            frames=cell,
-            taught=taught,
-            controller_kinematics=controller_kinematics,
-            command=compensate_command(robot, program, cell, taught, controller_kinematics),
-            progress=progress,
-        )
-    return Outcome(tuple(made.lines()), made.warnings, tuple(one.name for one in made.files))
+    """Return parameters of a job as the words of its command; what is true is a flag."""
+    words: list[str] = []
+    for name, value in options.items():
+        words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
+    return words
 
 
 def compensate_command(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import viser
+from viser._messages import FileTransferPartAck, RemoveNotificationMessage
 from websockets.asyncio.server import ServerConnection
 
 from truearm.errors import InputError
@@ -23,7 +24,9 @@ from truearm.studio import words
 from truearm.studio.gate import Gate
 from truearm.studio.page import Page
 from truearm.studio.project import Project
-from truearm.studio.work import Work
+from truearm.studio.uploads import Upload
+from truearm.studio.values import fits
+from truearm.studio.work import Work, unforeseen
 from truearm.writing import put_back_old
 
 #: So much of what was said stays to be read.
@@ -63,11 +66,14 @@ class Window:
         self._windows: dict[int, tuple[viser.ClientHandle, ServerConnection]] = {}
         self._banners: dict[int, list[Any]] = {}
         self._changes: tuple[Any, ...] = ()
+        self._typing: dict[object, tuple[threading.Timer, Callable[[], None]]] = {}
         self._stopped = threading.Event()
         self.pages: list[Page] = []
         self._theme()
         self._frame(pages)
         gate.blocked = self._say_blocked
+        gate.uploads.told = self._say_came
+        gate.fits = self._fits
         gate.say = lambda text: self.tell(Notice("refused", text.removeprefix("refused: "), "warning"))
         server.on_client_connect(self._arrived)
         server.on_client_disconnect(self._gone)
@@ -83,34 +89,83 @@ class Window:
         """
 
         def called(event: Any) -> None:
-            if getattr(event, "client", None) is None:
-                return
-            with self.lock, confined_reads(self.project.folder):
-                try:
-                    do()
-                except InputError as error:
-                    self.refuse(error)
-                    self.refresh()
+            if getattr(event, "client", None) is not None:
+                with self.lock:
+                    if self._typed(*self._typing):
+                        self._do(do)
 
         return called
 
+    def _do(self, do: Callable[[], None]) -> bool:
+        """Do something for the user, and show what is refused; return whether nothing was."""
+        with self.lock, confined_reads(self.project.folder):
+            try:
+                do()
+            except InputError as error:
+                self.refuse(error)
+                self.refresh()
+            except Exception as error:  # it is told, and its place is on standard error
+                self.refuse(unforeseen(error))
+            else:
+                return True
+        return False
+
+    def receive(self, button: Any, do: Callable[[Upload], None]) -> None:
+        """Let a button for uploads take in files: `do` is called as by :meth:`action`, with each that has come whole.
+
+        A file that `do` leaves where it has come is removed.
+        """
+
+        def take(upload: Upload) -> None:
+            try:
+                self._do(lambda: do(upload))
+            finally:
+                upload.discard()
+
+        def begin(upload: Upload) -> None:
+            threading.Thread(target=take, args=(upload,), daemon=True).start()
+
+        self.gate.uploads.takers[button._impl.uuid] = begin
+
     def settled(self, do: Callable[[], None]) -> Callable[[Any], None]:
-        """Return a callback as :meth:`action` does, for a text that somebody types: it waits for the typing to rest."""
-        act, waiting = self.action(do), list[threading.Timer]()
+        """Return a callback as :meth:`action` does, for a text that somebody types.
+
+        It waits for the typing to rest, or for what is done next: that is done with what was typed, or not at all where
+        that is refused.
+        """
+        key = object()
 
         def called(event: Any) -> None:
+            if getattr(event, "client", None) is None:
+                return
             with self.lock:
-                while waiting:
-                    waiting.pop().cancel()
-                timer = threading.Timer(_REST, act, (event,))
+                if key in self._typing:
+                    self._typing.pop(key)[0].cancel()
+                timer = threading.Timer(_REST, self._typed, (key,))
                 timer.daemon = True
-                waiting.append(timer)
+                self._typing[key] = (timer, partial(self._take_typed, event.target, event.target.value, do))
                 timer.start()
 
         return called
 
-    def edit(self, **changes: Any) -> None:
-        """Change settings of the project; pages are shown anew where something changed.
+    def _take_typed(self, field: Any, text: Any, do: Callable[[], None]) -> None:
+        """Do what follows from a text: a field typed in before may have shown all fields anew meanwhile."""
+        field.value = text
+        do()
+
+    def _typed(self, *keys: object) -> bool:
+        """Take what was typed; return whether nothing of it was refused."""
+        taken = True
+        with self.lock:
+            for key in keys:
+                timer, do = self._typing.pop(key, (None, None))
+                if timer is not None and do is not None:
+                    timer.cancel()
+                    taken = self._do(do) and taken
+        return taken
+
+    def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> None:
+        """Change settings of the project, and small files; pages are shown anew where something changed.
 
         Raises
         ------
@@ -118,7 +173,7 @@ class Window:
             If a value cannot be.
         """
         with self.lock:
-            if self.project.edit(**changes):
+            if self.project.edit(files, **changes):
                 self.refresh()
 
     def tell(self, notice: Notice) -> None:
@@ -137,13 +192,31 @@ class Window:
             if self.gate.is_working(connection):
                 client.add_notification("Refused", text, color="red", auto_close_seconds=20)
 
-    def start(self, title: str, do: Callable[..., Any], done: Callable[[Any], None], **arguments: Any) -> None:
+    def show_once(self, title: str, texts: Sequence[str]) -> None:
+        """Show something to the window that works, and nowhere else: it is not kept, and not among the notices."""
+        for client, connection in [*self._windows.values()]:
+            if self.gate.is_working(connection):
+                modal = client.gui.add_modal(title)
+                with modal:
+                    client.gui.add_html(words.lines(texts))
+                    client.gui.add_button("Close").on_click(lambda _, modal=modal: modal.close())  # type: ignore[misc]
+
+    def start(
+        self,
+        title: str,
+        do: Callable[..., Any],
+        done: Callable[[Any], None],
+        told: Callable[[str], None] = lambda _: None,
+        **arguments: Any,
+    ) -> None:
         """Run a function of :mod:`truearm.studio.tasks` in a process of its own, with progress and cancel.
 
         Parameters
         ----------
         done
             Called with what it returned, under the lock.
+        told
+            Called with each word of its progress, under the lock.
 
         Raises
         ------
@@ -158,6 +231,8 @@ class Window:
 
             def said(text: str) -> None:
                 self._doing.content = words.paragraph(f"{title}: {text}")
+                with self.lock:
+                    told(text)
 
             def ended(outcome: Any) -> None:
                 with self.lock:
@@ -201,6 +276,10 @@ class Window:
     def stopped(self) -> bool:
         """Whether nothing is served any more."""
         return self._stopped.is_set()
+
+    def rest(self, seconds: float) -> None:
+        """Do nothing for some time, or until nothing is served any more."""
+        self._stopped.wait(seconds)
 
     def wait(self, seconds: float) -> bool:
         """Wait for the long action to end; return whether it has, for tests."""
@@ -247,6 +326,7 @@ class Window:
         if self._work is not None:
             self._work.cancel()
         self.server.stop()
+        self.gate.uploads.stop()
 
     # The frame ---------------------------------------------------------------------------------------------------
 
@@ -367,3 +447,17 @@ class Window:
         for client, mine in [*self._windows.values()]:
             if mine is connection:
                 client.add_notification("Refused", why, color="orange", auto_close_seconds=10)
+
+    def _fits(self, number: str, value: object) -> bool:
+        element = self.gui._gui_input_handle_from_uuid.get(number)
+        return element is None or fits(element, value)  # viser drops what is for an element that is gone
+
+    def _say_came(self, connection: object, number: str, element: str, upload: Upload | None) -> None:
+        """Tell a window how much of its file has come; None lets it forget the file."""
+        came, size = (0, 0) if upload is None else (upload.came, upload.size)
+        for client, mine in [*self._windows.values()]:
+            if mine is connection:
+                line = client.gui._websock_interface
+                line.queue_message(FileTransferPartAck(element, number, came, size))
+                if upload is None:
+                    line.queue_message(RemoveNotificationMessage(f"upload-{number}"))

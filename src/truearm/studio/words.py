@@ -18,10 +18,18 @@ from truearm.printable import printable, with_short_words
 _COLOURS: Final = {"note": "#4682b4", "warning": "#c77700", "error": "#d6453d"}
 _STYLE: Final = "margin:0.25em 0.75em;font-size:0.85em;overflow-wrap:anywhere"
 
+#: Cells of a table with so few letters stay on one line.
+_WHOLE: Final = 18
+
 
 def plain(text: object) -> str:
     """Return a text as HTML in which nothing is markup, whatever it holds."""
     return escape(with_short_words(printable(str(text))), quote=True)
+
+
+def one_line(text: object) -> str:
+    """Return a text for a label, which is no HTML: what cannot be printed is written out."""
+    return printable(str(text))
 
 
 def paragraph(text: object) -> str:
@@ -53,11 +61,13 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a table; cells of numbers stand to the right, as those do whose heads have a unit in brackets."""
     right = ["[" in name for name in head]
 
+    def cell(tag: str, text: object, number: bool) -> str:
+        whole = ";white-space:nowrap" if len(str(text)) <= _WHOLE else ""
+        style = f"padding:0.15em 0.5em;text-align:{'right' if number else 'left'}{whole}"
+        return f'<{tag} style="{style}">{plain(text)}</{tag}>'
+
     def cells(tag: str, texts: Sequence[object]) -> str:
-        return "".join(
-            f'<{tag} style="padding:0.15em 0.5em;text-align:{"right" if number else "left"}">{plain(text)}</{tag}>'
-            for text, number in zip(texts, right, strict=True)
-        )
+        return "".join(cell(tag, text, number) for text, number in zip(texts, right, strict=True))
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
     return (

@@ -52,7 +52,8 @@ class Work:
     def cancel(self) -> None:
         """End it at once; what it was writing is put back by whatever writes there next."""
         self._cancelled = True
-        self._process.kill()
+        with suppress(ValueError):  # it has ended, and is closed
+            self._process.kill()
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until it has ended and its end is told; return whether it has."""
@@ -72,6 +73,7 @@ class Work:
                 outcome = content
                 break
         self._process.join()
+        self._process.close()  # its pipe would stay open until somebody collects it
         self._ended(None if self._cancelled else outcome)
 
 
@@ -88,12 +90,17 @@ def _run(target: Connection, do: Callable[..., Any], arguments: dict[str, Any]) 
         outcome: Any = do(**arguments, progress=progress)
     except InputError as error:
         outcome = error
-    except Exception as error:  # it is told, and its place is on standard error
-        traceback.print_exc()
-        outcome = InputError(
-            f"this failed in an unforeseen way ({type(error).__name__}: {error})",
-            cure="Run the command of the same name on the same files, and report what it says.",
-        )
+    except Exception as error:
+        outcome = unforeseen(error)
     with suppress(OSError):
         target.send(("ended", outcome))
     target.close()
+
+
+def unforeseen(error: Exception) -> InputError:
+    """Return a refusal for what nobody has foreseen; its place is printed on standard error."""
+    traceback.print_exception(error)
+    return InputError(
+        f"this failed in an unforeseen way ({type(error).__name__}: {error})",
+        cure="Run the command of the same name on the same files, and report what it says.",
+    )

@@ -395,7 +395,7 @@ def test_an_arm_that_turns_its_back_is_refused(name: str) -> None:
     rng = np.random.default_rng(0)
     twin = truth_twin(nominal("irb120"), "nominal", rng)
     refused = []
-    for turn in np.linspace(0.0, np.pi, 4, endpoint=False):
+    for turn in (0.0, np.pi / 2):
         base = Transform((2.0, 0.5, 0.0), (float(np.cos(turn)), 0.0, 0.0, float(np.sin(turn))))
         turned = replace(twin, robot=twin.robot.with_frames(base, {"1": (0.0, 0.0, 0.1)}))
         try:
@@ -421,3 +421,15 @@ def test_a_truth_too_far_from_the_nominal_robot_cannot_be_jogged(name: str) -> N
     short = replace(twin, robot=twin.robot.with_values({"a_2": 0.02, "d_4": 0.02}))
     with pytest.raises(InputError, match=r"irb120: the tool .*place of measurement.*too far from"):
         measured_with(named_device(name), nominal("irb120"), short, 10, rng)
+
+
+def test_every_plate_is_touched_often_enough_to_be_found_again() -> None:
+    """An arm that hardly reaches one of the plates would leave it with two contacts of thirty."""
+    arm = nominal("puma560")
+    twin = truth_twin(arm, "nominal", np.random.default_rng(0))
+    for seed in (13, 18):
+        data = measured_with(named_device("plane"), arm, twin, 30, np.random.default_rng(seed), 0.0)
+        assert len(data.labels) == 30
+        assert np.bincount(data.against, minlength=3).min() >= 4
+        assert data.height is not None
+        np.testing.assert_array_equal(data.height, 0.0)

@@ -156,6 +156,7 @@ def _in_another_unit(
             f"{words}, at some configurations alone ({listed([data.labels[c] for c in sorted(cs)])}). Mend the numbers "
             "of these rows.",
             "error",
+            at=tuple((data.labels[c], "") for c in sorted(cs)),
         )
         for words, cs in found.items()
     ]
@@ -187,7 +188,8 @@ def _joints_mistaken(data: Dataset, others: dict[int, int], unlike: dict[int, fl
             "other as they should. The joint positions are wrong, or the row is another one's, or the robot or the "
             "instrument was moved for it. Mend the joint positions, or leave these rows out."
         )
-    return [Notice("joints-mistaken", " ".join(found))] if found else []
+    at = tuple((data.labels[c], "") for c in (*others, *unlike))
+    return [Notice("joints-mistaken", " ".join(found), at=at)] if found else []
 
 
 def too_few_numbers(fit: Fit, data: Dataset) -> bool:
@@ -217,14 +219,16 @@ def often_off(data: Dataset, off: Array) -> list[Notice]:
     read = int(np.isfinite(off).sum())
     if len(far) < max(_FEWEST_OFTEN, _OFTEN_SHARE * read):
         return []
-    where = [f"{data.labels[data.configuration[r]]}/{data.targets[data.target[r]]}" for r in far.tolist()]
+    at = tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in far.tolist())
     return [
         Notice(
             "outliers",
             f"{len(far)} of {read} readings ({len(far) / read:.0%}) are more than {_OFTEN_RATIO:g} times farther off "
-            f"than half of all, up to {float(size[far].max()) * 1e3:.2g} mm (configuration/target): {listed(where)}. "
+            f"than half of all, up to {float(size[far].max()) * 1e3:.2g} mm (configuration/target): "
+            f"{listed(['/'.join(one) for one in at])}. "
             "Errors of instruments and joints are not so uneven. Look for what these readings have in common; "
             "`loss=cauchy` lets them count little.",
+            at=at,
         )
     ]
 

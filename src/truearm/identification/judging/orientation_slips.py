@@ -223,12 +223,14 @@ def _other_conventions(turned: Array) -> Iterator[tuple[int, str, list[Array]]]:
         ways = _vectors(turned) if taken is None else _moving_angles(turned, taken)
         for factor in (1.0, 180.0 / np.pi):
             for meant in (*(f"{order} {axes}" for order in _ORDERS for axes in ("moving", "fixed")), None):
-                if factor == 1.0 and meant in (taken, f"{taken} moving"):
+                if taken is None and meant is None and factor == 1.0:
                     continue
                 alike = taken is not None and meant is not None and _is_proper(taken) == _is_proper(meant)
-                rare = (taken is not None and f"{taken} moving" not in _COMMON, meant not in _COMMON)
-                words = _in_words(taken, meant, factor != 1.0)
-                yield sum(rare), words, [_rotations(n * factor, meant) for n in (ways[:1] if alike else ways)]
+                for read in _as_read(taken, meant):
+                    columns = slice(None, None, -1) if read is not None and read.endswith("fixed") else slice(None)
+                    rare = (read not in _COMMON, meant not in _COMMON)
+                    numbers = [n[:, columns] * factor for n in (ways[:1] if alike else ways)]
+                    yield sum(rare), _in_words(read, meant, factor != 1.0), [_rotations(n, meant) for n in numbers]
 
 
 def _first_of(told: list[str]) -> str:
@@ -242,6 +244,17 @@ def _angles_between(ways: list[Array], predicted: Array) -> Array:
     """Return how far rotations are from those predicted [rad], ``(rows,)``; of several ways by the nearest."""
     gaps = [np.linalg.norm(rotation_vector(np.swapaxes(predicted, 1, 2) @ turned), axis=1) for turned in ways]
     return np.asarray(np.min(gaps, axis=0))
+
+
+def _as_read(taken: str | None, meant: str | None) -> list[str | None]:
+    """Return the ways in which numbers may have been read that are angles about moving axes in an order.
+
+    Turns about fixed axes are those about moving ones in the opposite order, with the columns in that order. As what
+    angles were meant, both ways to have read them tell the same; a rotation vector's numbers stand in their own order.
+    """
+    if taken is None:
+        return [None]
+    return [f"{taken} moving", *([f"{taken[::-1]} fixed"] if meant is None else [])]
 
 
 def _rotations(numbers: Array, meant: str | None) -> Array:
@@ -286,23 +299,21 @@ def _moving_angles(R: Array, order: str) -> list[Array]:
     return [np.column_stack([first, middle, last]), (second + np.pi) % (2.0 * np.pi) - np.pi]
 
 
-def _in_words(taken: str | None, meant: str | None, degrees: bool) -> str:
+def _in_words(read: str | None, meant: str | None, degrees: bool) -> str:
     """Say as what numbers were read, and as what they agree, by the entries of a mapping.
 
     Turns about moving axes are those about fixed ones in the opposite order, with the columns in that order.
     """
     unit = ", and as radians that were called degrees" if degrees else ""
-    if taken is None:
-        return f"not a rotation vector but {_way(meant)}{unit}"
-    if meant == f"{taken} moving":
+    if read is None or meant is None:
+        return f"not {_way(read)} but {_way(meant)}{unit}"
+    if meant == read:
         return f"{_way(meant)}, but in radians that were called degrees"
-    other = ""
-    if meant is not None:
-        order, _, axes = meant.partition(" ")
-        opposite = {"moving": "fixed", "fixed": "moving"}[axes]
-        other = f" (of the columns from right to left: not {_way(f'{taken[::-1]} fixed')} but "
-        other += f"{_way(f'{order[::-1]} {opposite}')})"
-    return f"not {_way(f'{taken} moving')} but {_way(meant)}{other}{unit}"
+    order, _, axes = meant.partition(" ")
+    opposite = {"moving": "fixed", "fixed": "moving"}[axes]
+    other = f" (of the columns from right to left: not {_way(f'{read[2::-1]} fixed')} but "
+    other += f"{_way(f'{order[::-1]} {opposite}')})"
+    return f"not {_way(read)} but {_way(meant)}{other}{unit}"
 
 
 def _way(way: str | None) -> str:

@@ -61,7 +61,8 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
         mine = data.target[rows] == t
         predicted[mine] = fit.robot.world_poses(data.postures, data.targets[t])[1][data.configuration[rows[mine]]]
     mended, code, words = slips_in_rows(data.quaternion[rows], predicted)
-    where = [f"{data.labels[data.configuration[r]]}/{data.targets[data.target[r]]}" for r in rows.tolist()]
+    at = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in rows.tolist()]
+    where = ["/".join(one) for one in at]
     found = []
     if mended.any():
         some = listed([name for name, one in zip(where, mended.tolist(), strict=True) if one])
@@ -71,6 +72,7 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
                 f"Some orientations do not turn as the robot does (configuration/target): {some}. They would if their "
                 f"numbers were read otherwise: {words}. Those of the other readings are right. Mend these rows.",
                 "error",
+                at=tuple(one for one, known in zip(at, mended.tolist(), strict=True) if known),
             )
         )
     if not mended.all():
@@ -85,6 +87,7 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
                 ORIENTATION_OUTLIERS,
                 f"{len(others)} {what} far off, and the positions are not (configuration/target): {listed(others)}. "
                 f"Measure {them} again, or leave {quaternions} empty; `loss=cauchy` lets {them} count little.",
+                at=tuple(at[i] for i in np.flatnonzero(~mended).tolist()),
             )
         )
     return found

@@ -157,14 +157,14 @@ def _computed(robot: Robot, data: Dataset, off: Array) -> list[Notice]:
 
 
 def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
-    words, count = [], 0
+    words, beyond = [], np.zeros(data.configurations, dtype=bool)
     for i, joint in enumerate(robot.joints):
         if joint.limits is None:
             continue
         low, high = joint.limits
         out = (data.joints[:, i] < low - _LIMIT_ROUNDING) | (data.joints[:, i] > high + _LIMIT_ROUNDING)
         if out.any():
-            count += int(out.sum())
+            beyond |= out
             unit = "deg" if joint.kind == "revolute" else "mm"
             worst = data.joints[np.argmax(np.maximum(data.joints[:, i] - high, low - data.joints[:, i])), i]
             first = data.labels[int(np.argmax(out))]
@@ -179,6 +179,7 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
             "beyond-limits",
             f"Joint positions are beyond the limits of {robot.name}: {'; '.join(words)}. Check units, joint order and "
             "the limits in the robot file.",
+            at=tuple((data.labels[c], "") for c in np.flatnonzero(beyond).tolist()),
         )
     ]
 

@@ -19,6 +19,7 @@ joint turned through a part of a turn only, keep t, and are as uncertain where t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -196,29 +197,34 @@ class Marginal:
     def __init__(self, of: Equations, variance: Array, noise: float) -> None:
         self.of, self.noise = of, noise
         self.variance = np.where(variance * of.size > _NOTHING * noise, variance, 0.0)
-        used = self.variance > 0.0
+        self._used = used = self.variance > 0.0
         v, b = self.variance[used], of.b[used]
-        self.known, self.found = np.zeros(len(variance)), np.zeros(len(variance))
+        root = np.sqrt(v / noise)
+        self.found = np.zeros(len(variance))
         if used.sum() <= len(of.F):
-            root = np.sqrt(v)
-            H = of.H[np.ix_(used, used)]
-            M = np.eye(len(v)) + root[:, None] * H * (root / noise)
-            inverse = np.linalg.inv(M)
-            self.found[used] = root * (inverse @ (root * b)) / noise
-            self.known[used] = 1.0 - np.diag(inverse)
-            logs = _log_determinant(M)
+            self._part: Array | None = None
+            self._triangle, logs = _factored(np.eye(len(v)) + root[:, None] * of.H[np.ix_(used, used)] * root)
+            self.found[used] = root * _solved(self._triangle, root * b)
         else:
-            part = of.F[:, used]
-            V = np.eye(len(part)) + (part * (v / noise)) @ part.T
-            turned = np.linalg.solve(V, np.column_stack([part, of.z]))
-            self.found[used] = v * (part.T @ turned[:, -1]) / noise
-            self.known[used] = v * np.einsum("ij,ij->j", part, turned[:, :-1]) / noise
-            logs = _log_determinant(V)
+            self._part = part = of.F[:, used] * root
+            self._triangle, logs = _factored(np.eye(len(part)) + part @ part.T)
+            self.found[used] = root * (part.T @ _solved(self._triangle, of.z))
         c = self.found[used]
         explained = float(b @ c)
         moved = of.F[:, used] @ c
         self.left = max(of.squares - 2.0 * explained + float(moved @ moved), 0.0)
         self.likelihood = -0.5 * (logs + of.rows * float(np.log(noise)) + max(of.squares - explained, 0.0) / noise)
+
+    @cached_property
+    def known(self) -> Array:
+        """What the data know of each coefficient, 0 to 1, ``(coefficients,)``."""
+        from scipy.linalg import solve_triangular
+
+        within = np.eye(len(self._triangle)) if self._part is None else self._part
+        squares = (solve_triangular(self._triangle, within, lower=True, check_finite=False) ** 2).sum(axis=0)
+        known = np.zeros(len(self.variance))
+        known[self._used] = 1.0 - squares if self._part is None else squares
+        return known
 
     def at(self, variance: Array, noise: float) -> Marginal:
         """Return it at other variances."""
@@ -229,10 +235,25 @@ class Marginal:
         return self.at(np.where(coefficients, 0.0, self.variance), self.noise).likelihood
 
 
-def _log_determinant(matrix: Array) -> float:
-    """Return the logarithm of the determinant; infinite where rounding left the matrix indefinite."""
-    sign, logarithm = np.linalg.slogdet(matrix)
-    return float(logarithm) if sign > 0.0 else np.inf
+def _factored(matrix: Array) -> tuple[Array, float]:
+    """Return the lower triangle by Cholesky of a matrix that is not below 1, and the logarithm of its determinant.
+
+    The logarithm is infinite where rounding left the matrix indefinite.
+    """
+    try:
+        triangle = np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        sizes, axes = np.linalg.eigh(matrix)
+        rows = np.sqrt(np.maximum(sizes, 1.0))[:, None] * axes.T
+        return np.asarray(np.linalg.qr(rows)[1].T), np.inf
+    return np.asarray(triangle), 2.0 * float(np.log(np.diag(triangle)).sum())
+
+
+def _solved(triangle: Array, right: Array) -> Array:
+    """Return the solution of equations whose matrix has this Cholesky triangle, ``(n,)``."""
+    from scipy.linalg import cho_solve
+
+    return np.asarray(cho_solve((triangle, True), right, check_finite=False))
 
 
 class _Climb:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from truearm.identification.solving.losses import ABSOLUTE, Loss, norms_of, robust_scale, weighed_together, weights
 from truearm.identification.solving.problem import Rows
+from truearm.identification.solving.watching import step_taken
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
@@ -155,6 +156,7 @@ def solve(
         if not accepted:
             break
         here = trial
+        step_taken(problem, here.vector, cost - gain)
         before, size = size, float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max())
         last = size < small * (_CREEPING_FACTOR if loss in ABSOLUTE else 1.0)
         if loss == "linear" and damping == 0.0 and bounds is None and size < before < np.inf:

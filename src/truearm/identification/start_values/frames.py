@@ -65,7 +65,7 @@ def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Ro
     InputError
         If no target has a position.
     """
-    placement = _placements(robot.with_frames(Transform(), {}), [data], held)[0]
+    placement = _placements([robot.with_frames(Transform(), {})], [data], held)[0]
     return robot.with_frames(placement.base, placement.targets)  # type: ignore[arg-type]
 
 
@@ -79,13 +79,29 @@ def placed_errors(robot: Robot, tried: Sequence[Dataset]) -> list[Array]:
     tried
         Data that the robot is placed by one after the other; many of them together take little longer than one.
     """
-    placements = _placements(robot, tried, NOTHING_HELD)
+    return _left_over(_placements([robot] * len(tried), tried, NOTHING_HELD))
+
+
+def errors_of_placed(robots: Sequence[Robot], data: Dataset) -> list[Array]:
+    """Return how far position readings are from each of some robots placed by them [m], ``(readings,)`` each.
+
+    Parameters
+    ----------
+    robots
+        At the origin, with no targets; many of them together take little longer than one.
+    data
+        What each of them is placed by, as :func:`initial_frames` does.
+    """
+    return _left_over(_placements(robots, [data] * len(robots), NOTHING_HELD))
+
+
+def _left_over(placements: Sequence[_Placement]) -> list[Array]:
     return [np.asarray(np.linalg.norm(placement.left_over, axis=1)) for placement in placements]
 
 
-def _placements(placed: Robot, tried: Sequence[Dataset], held: Held) -> list[_Placement]:
-    """Return where each of the data say that a robot stands that is at the origin and has no targets."""
-    rows = [_rows(placed, data, held) for data in tried]
+def _placements(robots: Sequence[Robot], tried: Sequence[Dataset], held: Held) -> list[_Placement]:
+    """Return where each of the data say that its robot stands, which is at the origin and has no targets."""
+    rows = [_rows(placed, data, held) for placed, data in zip(robots, tried, strict=True)]
     if not rows:
         return []
     if held.base is not None:

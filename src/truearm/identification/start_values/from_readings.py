@@ -8,6 +8,7 @@ or is held at a distance is looked for around the flange.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Final
@@ -43,6 +44,8 @@ _SEARCH_SMALL: Final = 1e-2
 _READINGS_USED: Final = 120
 #: How many of one fixture, at least.
 _LEAST_OF_A_FIXTURE: Final = 12
+#: So alike a fixture's name that was read a few times must be to another for a slip of the pen.
+_ALIKE: Final = 0.8
 #: Singular values below this share of the largest belong to unknowns that are not determined.
 _LEAST_SINGULAR_VALUE: Final = 1e-5
 
@@ -300,16 +303,25 @@ def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind], held: Held) -> 
         held = np.isfinite(data.position[mine]).all(axis=1).any()
         count = int(mine.sum())
         if name not in known and count < (1 if held else least[kinds[name]]):
-            near = nearest_names(name, [other for other in data.fixtures if other != name], 1)
+            near = nearest_names(name, [other for other in data.fixtures if _may_be(name, other)], 1, _ALIKE)
             raise InputError(
                 "a fixture was measured too few times to locate it",
                 where=f"{data.source}, fixture {name}",
                 came=f"{count} reading{'' if count == 1 else 's'} among {data.configurations} configurations",
                 allowed=f"{least[kinds[name]]} or more",
-                cure=f"Did you mean {near[0]}? Else measure more, or leave it out."
+                cure=f"Did you mean {near[0]}? Else measure it at more configurations, or leave its readings out."
                 if near
-                else "Measure more, or leave it out.",
+                else "Measure it at more configurations, or leave its readings out.",
             )
+
+
+def _may_be(name: str, other: str) -> bool:
+    """Return whether a name may be another's, misspelt: those of a row of fixtures differ in digits or at the end."""
+    return (
+        name != other
+        and re.findall("[0-9]", name) == re.findall("[0-9]", other)
+        and name[-1:].lower() == other[-1:].lower()
+    )
 
 
 def _fixture_places(

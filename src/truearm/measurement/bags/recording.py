@@ -10,7 +10,14 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.measurement.bags.standstills import Sighting, Standstill, find_standstills, missed_pauses, seen_at
+from truearm.measurement.bags.standstills import (
+    Sighting,
+    Standstill,
+    find_standstills,
+    lost_messages,
+    missed_pauses,
+    seen_at,
+)
 from truearm.measurement.bags.streams import JointStream, TargetStream
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of
@@ -33,6 +40,8 @@ class Recording:
         In order, one a configuration.
     missed
         When the robot paused, or may have, without a standstill that can be used [s].
+    lost
+        How many messages of the joints are missing between others.
     sightings
         Of each target in each standstill.
     data
@@ -43,6 +52,7 @@ class Recording:
     targets: tuple[TargetStream, ...]
     standstills: tuple[Standstill, ...]
     missed: tuple[float, ...]
+    lost: int
     sightings: tuple[tuple[Sighting, ...], ...]
     data: Dataset
 
@@ -125,4 +135,4 @@ def found_in(
     labels = tuple(str(n + sum(at < s.start for at in missed)) for n, s in enumerate(stills, 1))
     positions = np.array([still.joints for still in stills])
     data = dataset_of(readings, Configurations(labels, positions, kinds, readings.configuration, joints_are))
-    return Recording(joints, tuple(targets), stills, missed, sightings, data)
+    return Recording(joints, tuple(targets), stills, missed, lost_messages(joints), sightings, data)

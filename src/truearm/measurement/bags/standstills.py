@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.bags.streams import JointStream, TargetStream
+from truearm.measurement.dataset import IntArray
 from truearm.modeling.chain import Array
 
 #: A sample so many times further from the median of its standstill than half of them is no reading of it: for normal
@@ -32,8 +33,17 @@ _CREEP: Final = 3.0
 #: Slower than this share of the fast motions is a pause, if it lasts so long [s].
 _PAUSE: Final = 0.05
 _SHORTEST: Final = 0.3
-#: A part of the stream that takes so many times longer than its number of samples tells has a gap.
+#: So many usual times between two messages, and no more seconds, may no message come where they are rare.
+_MESSAGES_OF_A_GAP: Final = 10.0
+_LONGEST_GAP: Final = 1.0
 _GAP: Final = 1.5
+#: Times are alike by this factor, and compared with this rounding [s].
+_ALIKE: Final = 1.1
+_ROUNDING: Final = 1e-6
+#: Times between messages are multiples of the usual one within this share of it, up to so many, in so many of all.
+_EVEN_WITHIN: Final = 0.25
+_MOST_IN_A_ROW: Final = 50.0
+_MOSTLY_EVEN: Final = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +96,9 @@ class Sighting:
 def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[Standstill, ...]:
     """Return the longest times in which every joint keeps still, in order.
 
+    Messages may be missing: times count, not samples. Where none came for longer than an arm needs to leave a place and
+    to come back, which is 0.3 s or ten usual times between messages (1 s at most), a standstill ends.
+
     Parameters
     ----------
     stream
@@ -100,12 +113,9 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
     InputError
         If there is none, or the joints creep.
     """
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
     times, positions = stream.times, stream.positions
     where = f"topic {stream.topic}"
-    steps = np.diff(times)
-    usual = float(np.median(steps)) if len(steps) else 0.0
+    usual = _usual_step(times)
     if usual <= 0.0 or times[-1] < hold:
         raise InputError(
             "the joints were recorded for too short a time",
@@ -113,15 +123,16 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
             came=f"{len(times)} samples in {times[-1]:.3g} s",
             allowed=f"{hold:g} s and more",
         )
-    count = max(math.ceil(hold / usual) + 1, 3)
-    if count > len(times):
+    last = np.searchsorted(times, times + hold - _ROUNDING)
+    first = np.arange(len(times))
+    last = np.maximum(last, first + 2)[last < len(times)]
+    last = last[last < len(times)]
+    if not len(last):
         raise InputError("there are too few samples of the joints", where=where, came=f"{len(times)}")
-    # a filter of scipy looks to both sides; its output at `count // 2` is about the first `count` samples
-    first, last = count // 2, count // 2 + len(times) - count + 1
-    spans = np.zeros(len(times) - count + 1)
-    for joint in positions.T:
-        spans = np.maximum(spans, (maximum_filter1d(joint, count) - minimum_filter1d(joint, count))[first:last])
-    whole = times[count - 1 :] - times[: len(times) - count + 1] <= _GAP * count * usual
+    first = first[: len(last)]
+    spans = _spans(positions, last)
+    gaps = np.concatenate([[0], np.cumsum(np.diff(times) > _longest_gap(usual))])
+    whole = gaps[last] == gaps[first]
     quiet = np.concatenate([[False], (spans <= still) & whole, [False]])
     begin, end = (np.flatnonzero(np.diff(quiet.astype(int)) == step) for step in (1, -1))
     if not len(begin):
@@ -138,7 +149,7 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
             "if that was a standstill.",
         )
     found = []
-    for i, j in zip(begin.tolist(), (end - 1 + count).tolist(), strict=True):
+    for i, j in _joined(positions, gaps, zip(begin.tolist(), (last[end - 1] + 1).tolist(), strict=True), still):
         part = positions[i:j]
         span = float(np.ptp(part, axis=0).max())
         if span > _CREEP * still:
@@ -154,6 +165,82 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
     return tuple(found)
 
 
+def _spans(positions: Array, last: IntArray) -> Array:
+    """Return how far the joint that moves most goes from each sample to its last one, ``(len(last),)``.
+
+    Extremes of runs of 1, 2, 4, .. samples are made one from the other; two of them cover any run.
+    """
+    length = last - np.arange(len(last)) + 1
+    level = np.frexp(length)[1] - 1
+    spans, low, high = np.zeros(len(last)), positions, positions
+    for power in range(int(level.max()) + 1):
+        mine = np.flatnonzero(level == power)
+        other = last[mine] - (1 << power) + 1
+        reach = np.maximum(high[mine], high[other]) - np.minimum(low[mine], low[other])
+        spans[mine] = reach.max(axis=1)
+        low, high = (
+            extreme(ends[: -(1 << power)], ends[1 << power :])
+            for extreme, ends in ((np.minimum, low), (np.maximum, high))
+        )
+    return spans
+
+
+def _joined(positions: Array, gaps: IntArray, parts: Iterable[tuple[int, int]], still: float) -> list[tuple[int, int]]:
+    """Return parts of the stream, neighbours as one whose joints agree with no motion and no long gap between.
+
+    Parameters
+    ----------
+    gaps
+        How many long gaps there are before each sample, ``(n,)``.
+    """
+    found: list[tuple[int, int]] = []
+    for i, j in parts:
+        if found and gaps[found[-1][1] - 1] == gaps[i]:
+            before = found[-1]
+            means = [positions[a:b].mean(axis=0) for a, b in (before, (i, j))]
+            between = np.concatenate([means, positions[before[1] : i]])
+            if float(np.ptp(between, axis=0).max()) <= still:
+                found[-1] = (before[0], max(j, before[1]))
+                continue
+        found.append((i, j))
+    return found
+
+
+def _usual_step(times: Array) -> float:
+    """Return the most frequent time between two samples [s], 0 if there is none: it stays as messages are lost."""
+    steps = np.diff(times)
+    steps = steps[steps > _ROUNDING]
+    if not len(steps):
+        return 0.0
+    bins = np.floor(np.log(steps) / math.log(_ALIKE)).astype(int)
+    bins -= bins.min()
+    most = int(np.bincount(bins).argmax())
+    return float(np.median(steps[np.abs(bins - most) <= 1]))
+
+
+def _longest_gap(usual: float) -> float:
+    """Return how long no message may come in a standstill [s]: an arm that left it and came back takes longer."""
+    return max(_SHORTEST, min(_MESSAGES_OF_A_GAP * usual, _LONGEST_GAP), _GAP * usual)
+
+
+def lost_messages(stream: JointStream) -> int:
+    """Return how many messages of the joints are missing between others, 0 where their times are too uneven to tell.
+
+    A time between two messages that is three times the usual one has two of them missing. Gaps in which nobody knows
+    what the robot did are not counted (:func:`missed_pauses`).
+    """
+    usual = _usual_step(stream.times)
+    steps = np.diff(stream.times)
+    steps = steps[steps <= _longest_gap(usual)]
+    if usual <= 0.0 or not len(steps):
+        return 0
+    multiples = np.round(steps / usual)
+    even = (np.abs(steps / usual - multiples) <= _EVEN_WITHIN) & (multiples <= _MOST_IN_A_ROW)
+    if float(even.mean()) < _MOSTLY_EVEN:
+        return 0
+    return max(int((multiples[even] - 1.0).sum()), 0)
+
+
 def missed_pauses(stream: JointStream, stills: Sequence[Standstill]) -> tuple[float, ...]:
     """Return when the robot paused without standing still: too short, creeping, or the joints were not recorded [s].
 
@@ -161,14 +248,14 @@ def missed_pauses(stream: JointStream, stills: Sequence[Standstill]) -> tuple[fl
     because nobody knows what the robot did in it.
     """
     times, positions = stream.times, stream.positions
-    usual = float(np.median(np.diff(times)))
+    usual = _usual_step(times)
     span = max(round(_SHORTEST / 3.0 / usual), 1)
     pace = np.abs(positions[span:] - positions[:-span]).max(axis=1) / np.maximum(times[span:] - times[:-span], usual)
     slow = np.concatenate([[False], pace < _PAUSE * np.quantile(pace, 0.95), [False]])
     begin, end = (np.flatnonzero(np.diff(slow.astype(int)) == step) for step in (1, -1))
     pauses = [(float(times[i]), float(times[j - 1 + span])) for i, j in zip(begin, end, strict=True)]
     missed = [a for a, b in pauses if b - a >= _SHORTEST and not any(s.start < b and a < s.end for s in stills)]
-    holes = np.flatnonzero(np.diff(times) > max(_SHORTEST, 10.0 * usual))
+    holes = np.flatnonzero(np.diff(times) > _longest_gap(usual))
     return tuple(sorted({*missed, *times[holes].tolist()}))
 
 

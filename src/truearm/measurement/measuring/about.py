@@ -70,7 +70,7 @@ class _Air(BaseModel):
     humidity: Number | None = None
 
 
-class _AboutFile(BaseModel):
+class AboutFile(BaseModel):
     """Schema ``truearm-about/1``."""
 
     model_config = STRICT
@@ -178,30 +178,40 @@ def read_about(path: Path) -> About:
     InputError
         If an entry is not known, or a number cannot be meant.
     """
-    content = read_yaml(path, _AboutFile)
+    return about_of(read_yaml(path, AboutFile), str(path))
+
+
+def about_of(content: AboutFile, where: str) -> About:
+    """Return what the entries of a file say.
+
+    Raises
+    ------
+    InputError
+        If a number cannot be meant.
+    """
     texts = (content.instrument.name, content.instrument.serial, content.robot.serial)
     for text in (*texts, *(air.at for air in content.environment)):
         if text is not None and not is_one_line(text):
-            raise InputError("one line of text belongs here", where=str(path), came=text)
+            raise InputError("one line of text belongs here", where=where, came=text)
     radius = offset = None
     if content.reflector is not None:
-        radius = sized_si(content.reflector.radius, content.units.length, f"{path}, reflector.radius")
+        radius = sized_si(content.reflector.radius, content.units.length, f"{where}, reflector.radius")
         if not 0.0 < radius <= _LARGEST_REFLECTOR:
             raise InputError(
                 "no reflector is so small or so large",
-                where=f"{path}, reflector.radius",
+                where=f"{where}, reflector.radius",
                 came=f"{radius * 1e3:g} mm",
                 allowed=f"above 0, up to {_LARGEST_REFLECTOR * 1e3:g} mm",
             )
         if content.reflector.offset is not None:
-            offset = sized_si(content.reflector.offset, content.units.length, f"{path}, reflector.offset")
+            offset = sized_si(content.reflector.offset, content.units.length, f"{where}, reflector.offset")
     for number, air in enumerate(content.environment, 1):
         for name, (low, high, unit) in _AIR.items():
             value = getattr(air, name)
             if value is not None and not low <= value <= high:
                 raise InputError(
                     "no hall has such air",
-                    where=f"{path}, environment[{number}].{name}",
+                    where=f"{where}, environment[{number}].{name}",
                     came=f"{value:g} {unit}",
                     allowed=f"{low:g} to {high:g} {unit}",
                 )

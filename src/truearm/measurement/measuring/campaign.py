@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Final, Self
 from truearm.errors import InputError
 from truearm.measurement.measuring.reading_log import ReadingLog
 from truearm.measurement.measuring.session import Entry, Session
-from truearm.measurement.measuring.sources import Source
+from truearm.measurement.measuring.sources import Incoming, Source
 from truearm.notices import Notice
 
 #: So many configurations are named in a notice.
@@ -38,6 +39,7 @@ class Campaign:
 
     def __init__(self, session: Session, source: Source, folder: Path) -> None:
         self.session, self.source = session, source
+        self._coming: deque[Incoming] = deque()
         self.log = ReadingLog(folder)
         try:
             session.add(*self.log.entries)
@@ -59,10 +61,21 @@ class Campaign:
     ) -> None:
         self.close()
 
-    def step(self, seconds: float = 0.0) -> tuple[Entry, ...]:
-        """Take what has come, or comes within some time, and return what became of it; all of it is on disk then."""
-        taken = []
-        for one in self.source.poll(self.session, seconds):
+    def step(self, seconds: float = 0.0, most: int | None = None) -> tuple[Entry, ...]:
+        """Take what has come, or comes within some time, and return what became of it; all of it is on disk then.
+
+        Parameters
+        ----------
+        seconds
+            To wait at most.
+        most
+            So much is taken at once, and the rest by the next call; None takes all of it.
+        """
+        taken: list[Entry] = []
+        if not self._coming:
+            self._coming.extend(self.source.poll(self.session, seconds))
+        for _ in range(len(self._coming) if most is None else min(most, len(self._coming))):
+            one = self._coming.popleft()
             if one.reading is not None:
                 entry = self._written(self.session.judged(one.reading))
             elif one.left is not None:

@@ -22,7 +22,8 @@ from truearm.modeling.chain import Array
 from truearm.printable import is_one_line
 from truearm.units import as_number, sized_si
 
-_WITH_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+#: A number with a decimal comma.
+WITH_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 #: Makes a decimal comma a point, and a point what is no part of a number.
 _SWAPPED: Final = str.maketrans(".,", ",.")
 _LINE: Final = re.compile(r"[^\r\n]*+(?:\r\n?|\n)|[^\r\n]++")
@@ -196,7 +197,7 @@ class Cells:
             cure = "Leave the cell empty where there is no reading." if missing else "Fill in the number."
             if missing and self.absent is not None:
                 cure = "Name this text under missing in the mapping if it means that nothing was measured."
-        elif self.decimal == "." and _WITH_COMMA.fullmatch(cell):
+        elif self.decimal == "." and WITH_COMMA.fullmatch(cell):
             what = "the number has a decimal comma"
             cure = "Write a decimal point, or import the file with `truearm import table` and decimal: comma."
         else:

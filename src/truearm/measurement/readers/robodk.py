@@ -23,7 +23,7 @@ from truearm.errors import InputError
 from truearm.files import read_text
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.canonical import refuse_other_separators
-from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
+from truearm.measurement.readers.cells import WITH_COMMA, Cells, Layout, lines_of, read_cells
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.orientations import MOVING_XYZ_ANGLES
@@ -100,7 +100,9 @@ def read_robodk(
     text = read_text(path)
     header = 1 + next((number for number, line in enumerate(lines_of(text)) if line.strip()), 0)
     if delimiter == "comma":
-        refuse_other_separators(text, f"{path}, line {header}", ", or name what the file has by `delimiter`")
+        refuse_other_separators(
+            text, f"{path}, line {header}", ", or name what the file has by `delimiter` and `decimal`"
+        )
     cells = read_cells(text, str(path), Layout(DELIMITERS[delimiter], DECIMALS[decimal], header))
     columns = len(cells.names)
     if columns and not cells.names[-1] and not any(cells.columns[-1]):  # every line ends with a comma
@@ -115,6 +117,8 @@ def read_robodk(
         )
     _refuse_no_heading(cells)
     _refuse_other_headings(cells)
+    if decimal == "point" and delimiter != "comma":
+        _refuse_decimal_commas(cells, range(columns))
     poses = columns == _POSES
     if poses and angle_unit is None:
         raise InputError(
@@ -229,6 +233,20 @@ def _refuse_other_headings(cells: Cells) -> None:
                 came=f"{cells.names[place]} behind {cells.names[place - 1]}",
                 allowed=f"the joints in their order, 1 to {_JOINTS}",
                 cure="Put the columns in this order.",
+            )
+
+
+def _refuse_decimal_commas(cells: Cells, columns: range) -> None:
+    for column in columns:
+        row = next((row for row, text in enumerate(cells.columns[column]) if WITH_COMMA.fullmatch(text)), None)
+        if row is not None:
+            raise InputError(
+                "the number has a decimal comma",
+                parameter="decimal",
+                where=cells.place(row, column),
+                came=cells.columns[column][row],
+                allowed="a decimal point",
+                cure="Name the sign that the file has: `decimal=comma`.",
             )
 
 

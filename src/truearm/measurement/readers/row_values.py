@@ -18,10 +18,14 @@ from truearm.measurement.readers.orientation_columns import quaternions_of_angle
 from truearm.measurement.readers.rows import Configurations
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
+from truearm.shown import counted
 from truearm.units import as_number, sized_si
 
 #: Deviations of the coordinates of a reading are called uneven if they are so many times apart in half of all.
 _UNEVEN: Final = 2.0
+#: A full turn, and a little for rounding [rad]; and in how many rows joints that are degrees are beyond.
+_FULL_TURN: Final = 2.0 * np.pi + 0.01
+_OFTEN: Final = 0.5
 #: A unit behind a name.
 _IN_BRACKETS: Final = re.compile(r"[\[({].*")
 #: Temperatures of an arm that are meant [degC].
@@ -149,6 +153,52 @@ def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list
             )
         )
     return found
+
+
+def unlikely_radians(cells: Cells, content: MappingFile, joints: Cells | None, mapping: Path) -> list[Notice]:
+    """Say if numbers that are read as radians go beyond a full turn, as degrees do.
+
+    An angle of an orientation never needs to. A joint may, so that half of the rows must have one.
+
+    Parameters
+    ----------
+    joints
+        The table that has the columns of the joints that the mapping names; None if it names none.
+    """
+    found: list[Notice] = []
+    for number, reading in enumerate(content.readings, 1):
+        for name, entry in (("angles", reading.angles), ("rotation_vector", reading.rotation_vector)):
+            if entry is not None and entry.unit == "rad":
+                read = numbers_of(cells, reading.turned, entry.unit, mapping, f"readings[{number}]")
+                large = np.nanmax(np.abs(read), axis=1, initial=0.0)
+                if (large > _FULL_TURN).any():
+                    found.append(
+                        _of_radians(
+                            large, f"orientations ({', '.join(entry.columns)})", f"readings[{number}].{name}.unit"
+                        )
+                    )
+    turning = [
+        column
+        for column, unit in zip(content.joints.columns, content.joints.unit_of_each, strict=True)
+        if unit == "rad"
+    ]
+    if joints is not None and turning:
+        named = {f"columns[{n}]": column for n, column in enumerate(turning, 1)}
+        of_unit = "joints.unit" if content.joints.units is None else "joints.units"
+        large = np.abs(numbers_of(joints, named, "rad", mapping, "joints")).max(axis=1)
+        if float(np.mean(large > _FULL_TURN)) >= _OFTEN:
+            found.append(_of_radians(large, f"joints ({', '.join(turning)})", of_unit))
+    return found
+
+
+def _of_radians(large: Array, what: str, entry: str) -> Notice:
+    rows = int(np.sum(large > _FULL_TURN))
+    return Notice(
+        "radians-unlikely",
+        f"The angles of {what} are read as radians and go beyond a full turn in {rows} of "
+        f"{counted(len(large), 'row')}, up to {large.max():.4g}: they look like degrees. Correct {entry} in the "
+        "mapping, if they are.",
+    )
 
 
 def called_in(content: MappingFile) -> dict[str, str]:

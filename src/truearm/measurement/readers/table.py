@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
@@ -29,6 +30,7 @@ from truearm.measurement.readers.row_values import (
     refuse_second_header,
     temperatures,
     uneven_deviations,
+    unlikely_radians,
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.measurement.readers.sheets import is_workbook, read_sheet
@@ -144,7 +146,8 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
     cells, labels, found = _named_rows(_read(path, content.layout, f"{mapping}, layout"), content, mapping)
     if labels is None:
         labels = [str(number) for number in range(1, len(cells.lines) + 1)]
-    configurations, of_row = _configurations(cells, labels, files, whose, joints_are)
+    of_joints = _table_of_joints(cells, files)
+    configurations, of_row = _configurations(cells, labels, of_joints, files, whose, joints_are)
     rows = _mapped(cells, labels, found, content, mapping)
     targets, position, quaternion = list(rows.targets), rows.position, rows.quaternion
     sigma, sigma_rot = rows.sigma, rows.sigma_rot
@@ -179,7 +182,10 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
         called=called_in(content),
     )
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
-    noticed = tuple(uneven_deviations(cells, content, mapping))
+    noticed = (
+        *uneven_deviations(cells, content, mapping),
+        *unlikely_radians(cells, content, of_joints, mapping),
+    )
     if content.temperature is None:
         return data, noticed
     warm = temperatures(cells, configurations, of_row, content.temperature, mapping)
@@ -365,19 +371,22 @@ def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells,
 
 
 def _configurations(
-    cells: Cells, labels: list[str], files: TableFiles, joints_are: JointsOf, asked: JointsOf | None
+    cells: Cells,
+    labels: list[str],
+    of_joints: Cells | None,
+    files: TableFiles,
+    joints_are: JointsOf,
+    asked: JointsOf | None,
 ) -> tuple[Configurations, IntArray]:
     """Return the configurations and which of them each row of the table belongs to."""
     entry, mapping = files.content.joints, files.mapping
-    if files.joints is not None and not entry.columns:
+    if files.joints is not None and of_joints is None:
         table, configurations = joints_in_file(files.joints)
         if asked is not None:
             _whose(configurations.joints_are, asked, table.source)
         return configurations, _of_rows(cells, labels, configurations, table, "configuration")
-    if files.joints is None:
-        table, row_labels = cells, labels
-    else:
-        table, row_labels = _read(files.joints, entry.layout or LayoutEntry(), f"{mapping}, joints.layout"), []
+    table = cells if of_joints is None else of_joints
+    row_labels = labels if files.joints is None else []
     places = [
         place_of(table, column, mapping, f"joints.columns[{number}]") for number, column in enumerate(entry.columns, 1)
     ]
@@ -397,6 +406,16 @@ def _configurations(
     return configurations, _of_rows(cells, labels, configurations, table, entry.key)
 
 
+def _table_of_joints(cells: Cells, files: TableFiles) -> Cells | None:
+    """Return the table that has the columns of the joints; None if the mapping names none."""
+    entry = files.content.joints
+    if not entry.columns:
+        return None
+    if files.joints is None:
+        return cells
+    return _read(files.joints, entry.layout or LayoutEntry(), f"{files.mapping}, joints.layout")
+
+
 def _of_rows(
     cells: Cells, labels: list[str], configurations: Configurations, table: Cells, key: str | None
 ) -> IntArray:
@@ -405,12 +424,20 @@ def _of_rows(
     for row, label in enumerate(labels):
         if label not in index:
             near = nearest_names(label, index, 1)
+            number = re.search(r"[0-9]+$", label)
+            if number and (alone := str(int(number[0]))) in index:
+                cure = (
+                    f"Did you mean {alone}? A pattern of the mapping reads the number alone: "
+                    "names: {column: ..., pattern: '[^0-9]*0*(?P<configuration>[0-9]+)'}."
+                )
+            else:
+                cure = f"Did you mean {near[0]}?" if near else "Check joints.key, or add the row."
             raise InputError(
                 f"the configuration has no joints in {table.source}",
                 where=f"{cells.source}, line {cells.lines[row]}",
                 came=label,
                 allowed=f"a label in column {key}",
-                cure=f"Did you mean {near[0]}?" if near else "Check joints.key, or add the row.",
+                cure=cure,
             )
     return np.array([index[label] for label in labels], dtype=np.intp)
 

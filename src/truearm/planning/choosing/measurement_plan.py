@@ -77,6 +77,8 @@ class MeasurementPlan:
         What the device reads at each configuration, in words; nothing if no device was named.
     fixtures
         Where fixtures stand in the base frame [m], ``(3,)`` each; of a plane the foot of its distance from the origin.
+    among
+        The usable candidates [rad or m], ``(usable, joints)``.
     """
 
     robot: Robot
@@ -95,6 +97,7 @@ class MeasurementPlan:
     prediction: Prediction
     reads: tuple[str, ...] = ()
     fixtures: Mapping[str, Array] = field(default_factory=dict)
+    among: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def with_targets(robot: Robot, data: Dataset | None = None) -> Robot:
@@ -296,6 +299,7 @@ def plan_measurements(
     return MeasurementPlan(
         reads=() if readings is None else _in_words(readings.of_configurations(chosen)),
         fixtures=at_fixtures,
+        among=candidates.joints[usable],
         robot=seen,
         model=model,
         objective=objective,

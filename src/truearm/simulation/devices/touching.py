@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -14,6 +15,8 @@ from truearm.modeling.robot import Robot
 from truearm.simulation.devices.device import Arm, Device, recorded
 from truearm.simulation.devices.jogging import SPARE, jogged, postures_at, site
 
+#: Three contacts place a plate, one more tells something of the robot.
+_LEAST_ON_A_PLATE: Final = 4
 _STYLUS: Final = Tool({"stylus": (0.02, 0.01, 0.15)})
 
 
@@ -46,6 +49,11 @@ class PlaneProbe(Device):
         goals = middle + np.einsum("nij,nj->ni", plates[of], places)
         facing = -plates[of, :, 2]
         kept, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=facing)
+        if count >= _LEAST_ON_A_PLATE * len(plates):
+            for plate in np.flatnonzero(np.bincount(of[kept], minlength=len(plates)) < _LEAST_ON_A_PLATE).tolist():
+                on = np.flatnonzero(of == plate)
+                more, q = postures_at(nominal, name, goals[on], _LEAST_ON_A_PLATE, rng, self.name, facing=facing[on])
+                kept, joints = _with_these(kept, joints, on[more], q, of)
         of, up = of[kept], -facing[kept]
         miss = sigma * rng.standard_normal(count)
 
@@ -64,6 +72,20 @@ class PlaneProbe(Device):
             fixture=of.astype(np.intp),
             sigma=sigma,
         )
+
+
+def _with_these(
+    kept: NDArray[np.intp], joints: Array, added: NDArray[np.intp], q: Array, of: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], Array]:
+    """Return as many contacts as before, those of one plate exchanged, and the last of the fullest plates given up."""
+    count, other = len(kept), of[kept] != of[added[0]]
+    kept, joints = kept[other], joints[other]
+    while len(kept) + len(added) > count:
+        last = np.flatnonzero(of[kept] == np.bincount(of[kept]).argmax())[-1]
+        kept, joints = np.delete(kept, last), np.delete(joints, last, axis=0)
+    together = np.concatenate([kept, added])
+    order = np.argsort(together)
+    return together[order], np.concatenate([joints, q])[order]
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
 from truearm.identification.choosing.choice import AUTO
 from truearm.identification.solving.losses import LOSSES
 from truearm.identification.solving.models import FRAMES, MODELS
+from truearm.jobs.following import FitStep
 from truearm.studio import words
+from truearm.studio.fit_course import fit_course
 from truearm.studio.pages.check import data_of
 from truearm.studio.pages.choices import NONE, chosen, offer
+from truearm.studio.pictures import Picture
 from truearm.studio.tasks import Outcome, calibrate
 from truearm.studio.window import Window
 
+#: The course of a fit is drawn so often at most [s].
+_PAUSE: Final = 0.5
 _MODELS: Final = (*(model.name for model in MODELS), AUTO, FRAMES.name)
 
 
@@ -31,6 +37,10 @@ class CalibratePage:
         self._seed: Any = gui.add_text("Seed", str(settings.seed), hint="of the split, a whole number from 0 on")
         self._loss = gui.add_dropdown("Loss", tuple(LOSSES))
         self._run = gui.add_button("Calibrate")
+        self._steps: list[FitStep] = []
+        self._drawn = 0.0
+        self._shown: tuple[int, bool] = (0, False)
+        self._course = Picture(window, "Cost and error, step by step", 0.75)
         self._said = gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))
         self._data.on_update(window.action(lambda: window.edit(data=chosen(self._data))))
         self._model.on_update(window.action(lambda: window.edit(model=self._model.value)))
@@ -41,6 +51,7 @@ class CalibratePage:
 
     def refresh(self) -> None:
         """Show the settings."""
+        self._draw()
         settings = self._window.project.settings
         offer(self._data, self._window.project.names(".csv"), settings.data)
         offer(self._model, _MODELS, settings.model, None)
@@ -50,10 +61,12 @@ class CalibratePage:
 
     def _calibrate(self) -> None:
         window, settings = self._window, self._window.project.settings
+        self._steps, self._shown = [], (0, False)
         window.start(
             "Calibrate",
             calibrate,
             self._done,
+            self._told,
             folder=window.project.folder,
             robot=settings.robot,
             data=data_of(window),
@@ -63,9 +76,25 @@ class CalibratePage:
             seed=settings.seed or None,
             loss=None if settings.loss == "linear" else settings.loss,
             payload=settings.payload,
+            exclude=settings.exclude,
         )
 
+    def _told(self, text: str) -> None:
+        """Draw the course of the fit as far as it is known."""
+        if isinstance(text, FitStep):
+            self._steps.append(text)
+            if time.monotonic() - self._drawn > _PAUSE:
+                self._draw()
+
+    def _draw(self) -> None:
+        shown = (len(self._steps), self._window.project.settings.dark)
+        if self._steps and shown != self._shown:
+            self._shown = shown
+            self._course.show(fit_course(self._steps))
+            self._drawn = time.monotonic()
+
     def _done(self, outcome: Outcome) -> None:
+        self._draw()
         written = f"Written to {self._window.project.settings.result}: {', '.join(outcome.files)}"
         self._said.content = words.lines([*outcome.lines, written])
 

@@ -1,53 +1,222 @@
-"""What is wrong with measurements before they are believed."""
+"""What is wrong with measurements before they are believed, and readings that are excluded."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar, Final
+
+import numpy as np
 
 from truearm.errors import InputError
-from truearm.notices import worst_first
+from truearm.files import exists
+from truearm.measurement.excluded import Exclusion, exclusions_text, read_exclusions
+from truearm.modeling.chain import Array
+from truearm.notices import Notice
+from truearm.shown import counted
 from truearm.studio import words
+from truearm.studio.checked import Checked, checked, with_exclusions
 from truearm.studio.pages.choices import NONE, chosen, offer
-from truearm.studio.tasks import Outcome, check
+from truearm.studio.pages.jog import JogPage
 from truearm.studio.window import Window
+
+#: What is chosen instead of a finding, and instead of a reading.
+_ANY: Final = "(any reading)"
+_ALL: Final = "(all of them)"
+#: So many readings are offered at most.
+_LISTED: Final = 2000
+#: The file of excluded readings, where none is chosen.
+_FILE: Final = "excluded.csv"
+#: How other readings, chosen ones and excluded ones are drawn: name, colour, and size by the length of the arm.
+_DRAWN: Final = (
+    ("readings", (150, 156, 166), 0.005),
+    ("finding", (214, 69, 61), 0.016),
+    ("excluded", (230, 140, 0), 0.012),
+)
+_RULE: Final = (
+    "Exclude readings for reasons of the instrument alone, such as a broken beam. To exclude what fits badly, or to "
+    "measure it again, falsifies the proof. Nothing is deleted: the reasons stand in a file of the project, and the "
+    "report counts what was excluded, in the held-out part too."
+)
 
 
 class CheckPage:
-    """Chooses the measurements, and shows what :func:`truearm.check` finds in them as a table."""
+    """Shows what :func:`truearm.check` finds as a table and in the scene, and excludes readings."""
 
     title: ClassVar[str] = "Check"
 
     def __init__(self, window: Window) -> None:
         self._window = window
+        self._checked: Checked | None = None
+        self._of: tuple[Any, ...] = ()
+        self._shown: tuple[Any, ...] = ()
+        self._excluded: tuple[Exclusion, ...] = ()
         gui = window.gui
-        self._data = gui.add_dropdown("Measurements", (NONE,), hint="a CSV file of the project")
+        self._data: Any = gui.add_dropdown("Measurements", (NONE,), hint="a CSV file of the project")
+        self._file: Any = gui.add_dropdown("Exclude", (NONE,), hint="a file of readings that are excluded")
         self._run = gui.add_button("Check the measurements")
         self._found = gui.add_html("")
+        with gui.add_folder("Readings", visible=False) as self._readings:
+            self._finding: Any = gui.add_dropdown("Finding", (_ANY,))
+            self._reading: Any = gui.add_dropdown("Reading", (_ALL,), hint="configuration/target")
+            self._draws: Any = gui.add_checkbox("In the scene", True)
+            self._drawn = gui.add_html("")
+            self._arm: Any = gui.add_button("Move the drawn arm there")
+            self._reason: Any = gui.add_text("Reason", "", hint="what went wrong with the instrument")
+            self._exclude: Any = gui.add_button("Exclude")
+        with gui.add_folder("Excluded readings"):
+            gui.add_html(words.paragraph(_RULE))
+            self._table = gui.add_html("")
+            self._back: Any = gui.add_dropdown("Reading", (NONE,), visible=False)
+            self._restore: Any = gui.add_button("Restore", visible=False)
         self._data.on_update(window.action(lambda: window.edit(data=chosen(self._data))))
+        self._file.on_update(window.action(lambda: window.edit(exclude=chosen(self._file))))
         self._run.on_click(window.action(self._check))
-        self._of: tuple[str, str] | None = None
+        self._finding.on_update(window.action(self._choose))
+        self._reading.on_update(window.action(self._draw))
+        self._draws.on_update(window.action(self._draw))
+        self._arm.on_click(window.action(self._go))
+        self._exclude.on_click(window.action(self._add))
+        self._restore.on_click(window.action(self._remove))
 
     def refresh(self) -> None:
         """Offer the files of the folder; what was found of others is no longer shown."""
-        settings = self._window.project.settings
-        offer(self._data, self._window.project.names(".csv"), settings.data)
-        if self._of is not None and self._of != (settings.robot, settings.data):
-            self._found.content, self._of = words.paragraph("Robot or measurements have changed: check again."), None
+        project, settings = self._window.project, self._window.project.settings
+        offer(self._data, project.names(".csv"), settings.data)
+        offer(self._file, project.names(".csv"), settings.exclude)
+        self._show_excluded()
+        if self._checked is not None and self._of != self._now():
+            changed = "Exclusions" if self._of[:2] == self._now()[:2] else "Robot or measurements"
+            self._found.content = words.paragraph(f"{changed} have changed: check again.")
+            if changed != "Exclusions":
+                self._checked = None
+        self._readings.visible = self._checked is not None
+        self._draw()
+
+    # -- checking ------------------------------------------------------------------------------------------
 
     def _check(self) -> None:
         window, settings = self._window, self._window.project.settings
-        data = data_of(window)
-        of = (settings.robot, data)
+        data, of = data_of(window), self._now()
 
-        def done(outcome: Outcome) -> None:
-            self._of = of
-            rows = [[n.level, n.code, words.spelled(n.message)] for n in worst_first(outcome.notices)]
-            shown = words.lines(outcome.lines[:1])
+        def done(found: Checked) -> None:
+            self._checked, self._of = found, of
+            rows = [[one.level, one.code, words.spelled(one.message)] for one in found.findings]
+            shown = words.lines(found.outcome.lines[:1])
             shown += words.table(["level", "finding", "what it says"], rows) if rows else ""
-            rest = [line for line in outcome.lines[1:] if not any(n.message in line for n in outcome.notices)]
+            messages = [one.message for one in found.findings]
+            rest = [line for line in found.outcome.lines[1:] if not any(text in line for text in messages)]
             self._found.content = shown + words.lines(rest)
+            names = (_ANY, *(_name(number, one) for number, one in enumerate(found.findings, 1) if one.at))
+            offer(self._finding, names, names[1] if len(names) > 1 else _ANY, None)
+            self._draws.value = len(names) > 1  # where nothing is wrong, nothing stands in the way
+            self._choose()
 
-        window.start("Check", check, done, folder=window.project.folder, robot=settings.robot, data=data)
+        window.start(
+            "Check",
+            checked,
+            done,
+            folder=window.project.folder,
+            robot=settings.robot,
+            data=data,
+            exclude=settings.exclude,
+        )
+
+    def _choose(self) -> None:
+        """Offer the readings of the chosen finding, and draw them."""
+        found = self._checked
+        if found is None:
+            return
+        named = self._named(found)[:_LISTED]
+        every = () if self._finding.value == _ANY else (_ALL,)
+        names = [*every, *(_reading(*found.readings[k]) for k in named)]
+        offer(self._reading, dict.fromkeys(names), next(iter(names), _ALL), None)
+        self._draw()
+
+    def _named(self, found: Checked) -> list[int]:
+        """Return the readings of the chosen finding; all if none is chosen."""
+        for number, one in enumerate(found.findings, 1):
+            if self._finding.value == _name(number, one):
+                return [int(k) for k in found.rows_of(one.at)]
+        return list(range(len(found.readings)))
+
+    def _chosen(self, found: Checked) -> list[int]:
+        rows = self._named(found)
+        if self._reading.value == _ALL:
+            return rows if self._finding.value != _ANY else []
+        return [k for k in rows if _reading(*found.readings[k]) == self._reading.value]
+
+    # -- the scene -----------------------------------------------------------------------------------------
+
+    def _draw(self) -> None:
+        jog = next((page for page in self._window.pages if isinstance(page, JogPage)), None)
+        found = self._checked
+        if jog is None:
+            return
+        scene = jog.scene
+        solid = None if scene.solid is None else scene.solid.robot
+        shown = (found, self._finding.value, self._reading.value, self._excluded, solid, self._draws.value)
+        if shown == self._shown:
+            return
+        self._shown = shown
+        if found is None or scene.solid is None or not self._draws.value:
+            for name, *_ in _DRAWN:
+                scene.show_points(name, None)
+            self._drawn.content = ""
+            return
+        base = scene.solid.robot.base
+        points = found.points @ base.rotation.T + np.array(base.translation)
+        rows = self._chosen(found)
+        gone = {(one.configuration, one.target) for one in self._excluded}
+        out = [k for k, one in enumerate(found.readings) if one in gone]
+        others = sorted(set(range(len(points))) - {*rows, *out})
+        for (name, colour, size), some in zip(_DRAWN, (others, [k for k in rows if k not in out], out), strict=True):
+            scene.show_points(name, _seen(points[some]), colour, size)
+        unseen = len(rows) - len(_seen(points[rows]))
+        told = f"{counted(len(rows), 'reading')} chosen: red in the scene; excluded ones are orange, all others grey."
+        self._drawn.content = words.paragraph(
+            told
+            + (f" The first {_LISTED} can be chosen here." if len(self._named(found)) > _LISTED else "")
+            + (f" {unseen} of them have no place in the instrument's frame, and are not drawn." if unseen else "")
+        )
+
+    def _go(self) -> None:
+        found = self._checked
+        rows = [] if found is None else self._chosen(found)
+        if found is None or not rows:
+            raise InputError("no reading is chosen", parameter="Reading", cure="Choose one, or a finding.")
+        next(page for page in self._window.pages if isinstance(page, JogPage)).go_to_joints(found.joints[rows[0]])
+
+    # -- excluding -----------------------------------------------------------------------------------------
+
+    def _add(self) -> None:
+        found = self._checked
+        rows = [] if found is None else self._chosen(found)
+        if found is None or not rows:
+            raise InputError("no reading is chosen", parameter="Reading", cure="Choose one, or a finding.")
+        self._write(with_exclusions(self._excluded, [found.readings[k] for k in rows], self._reason.value))
+
+    def _remove(self) -> None:
+        kept = [one for one in self._excluded if _reading(one.configuration, one.target) != self._back.value]
+        self._write(tuple(kept))
+
+    def _write(self, excluded: tuple[Exclusion, ...]) -> None:
+        name = self._window.project.settings.exclude or _FILE
+        self._window.edit({name: exclusions_text(excluded)}, exclude=name)
+
+    def _show_excluded(self) -> None:
+        path = self._window.project.file("exclude")
+        self._excluded = read_exclusions(path) if path is not None and exists(path) else ()
+        rows = [[_reading(one.configuration, one.target), one.reason] for one in self._excluded]
+        self._table.content = words.table(["reading", "reason"], rows) if rows else words.paragraph("None.")
+        self._back.visible = self._restore.visible = bool(rows)
+        if rows:
+            names = dict.fromkeys(row[0] for row in rows)
+            offer(self._back, names, self._back.value if self._back.value in names else next(iter(names)), None)
+
+    # -- what is shown is of what --------------------------------------------------------------------------
+
+    def _now(self) -> tuple[Any, ...]:
+        settings = self._window.project.settings
+        return settings.robot, settings.data, self._excluded
 
 
 def data_of(window: Window) -> str:
@@ -61,3 +230,15 @@ def data_of(window: Window) -> str:
     if window.project.settings.data is None:
         raise InputError("no measurements are chosen", parameter="data", cure="Choose a CSV file on the page Check.")
     return window.project.settings.data
+
+
+def _name(number: int, finding: Notice) -> str:
+    return f"{number}. {finding.level} {finding.code}"
+
+
+def _reading(configuration: str, target: str) -> str:
+    return f"{configuration}/{target}"
+
+
+def _seen(points: Array) -> Array:
+    return np.asarray(points[np.isfinite(points).all(axis=1)])

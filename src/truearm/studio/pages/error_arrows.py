@@ -58,6 +58,7 @@ class ErrorArrows:
             train=settings.train,
             seed=settings.seed or None,
             payload=settings.payload,
+            exclude=settings.exclude,
         )
 
     def _found(self, vectors: ErrorVectors) -> None:
@@ -87,7 +88,7 @@ class ErrorArrows:
         """Return what the arrows are of."""
         project = self._window.project
         stamps = []
-        for file in (project.file("data"), project.file("result")):
+        for file in (project.file("data"), project.file("exclude"), project.file("result")):
             place = None if file is None else (file / "result.json" if file.is_dir() else file)
             stat = None if place is None or not exists(place) else place.stat()
             stamps.append(None if stat is None else (str(place), stat.st_mtime_ns, stat.st_size))

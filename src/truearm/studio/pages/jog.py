@@ -12,11 +12,15 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import exists
+from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.jogging import JOG_FRAMES, Branch, JogFrame, Jogging
+from truearm.studio.pages.jog_path import JogPath
+from truearm.studio.pages.jog_views import JogViews
+from truearm.studio.pages.robot_looks import RobotLooks
 from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
@@ -29,6 +33,8 @@ _NEAREST: Final = "nearest"
 _WHOSE: Final = ("controller", "model")
 #: Of a motion that is played, a picture so often [s].
 _PICTURE: Final = 0.04
+#: Ends of a slider that differ by less are the same [deg or mm].
+_ROUNDING: Final = 1e-6
 _SAFE: Final = "This moves a drawing. No real robot is connected to this window, and none moves."
 
 
@@ -40,6 +46,7 @@ class JogPage:
     def __init__(self, window: Window) -> None:
         self._window = window
         self.scene = Scene(window.server)
+        self._looks = RobotLooks(window)
         self.jogging: Jogging | None = None
         self._arms: dict[str, Robot] = {}
         self._branches: list[Branch] = []
@@ -79,6 +86,8 @@ class JogPage:
             self._recorded = gui.add_html("")
             self._speed = gui.add_number("Speed [deg/s, mm/s]", 45.0, min=0.1, max=1000.0, step=1.0)
             self._play = gui.add_button_group("Motion", ("play", "stop"))
+        self.views = JogViews(window, self.scene)
+        self.path = JogPath(window, self.scene, self._jogged, self.play, self.stop)
         self._handle: Any = None
         self._callbacks()
 
@@ -90,9 +99,10 @@ class JogPage:
         nominal, calibrated = window.robot(), window.calibrated()
         same_arm = calibrated is None or len(calibrated.joints) == len(nominal.joints)
         ghost = calibrated if same_arm else None
-        if self.scene.show(nominal, ghost, dark=window.project.settings.dark) or self.jogging is None:
+        meshes = self._looks.meshes(nominal)
+        if self.scene.show(nominal, ghost, meshes, dark=window.project.settings.dark) or self.jogging is None:
             assert self.scene.solid is not None
-            self._stop()
+            self.stop()
             self._arms = {"nominal": self.scene.solid.robot}
             if ghost is not None:
                 self._arms["calibrated"] = ghost
@@ -100,6 +110,7 @@ class JogPage:
             self._ghost.disabled = ghost is None
             self._take("calibrated" if self._arm.value == "calibrated" and ghost is not None else "nominal")
         self._show_recorded()
+        self.path.refresh()
 
     # Elements ----------------------------------------------------------------------------------------------------
 
@@ -116,7 +127,7 @@ class JogPage:
         self._branch.on_update(window.action(self._take_branch))
         self._list.on_update(window.action(self._show_recorded))
         self._record.on_click(window.action(lambda: self._recording(self._record.value)))
-        self._play.on_click(window.action(lambda: self._start() if self._play.value == "play" else self._stop()))
+        self._play.on_click(window.action(lambda: self._start() if self._play.value == "play" else self.stop()))
 
     def _newest(self, name: str, do: Callable[[], None]) -> Callable[[Any], None]:
         """Return a callback of an element that is dragged: of events that wait for each other the last is done."""
@@ -186,6 +197,8 @@ class JogPage:
         self._branches = self._jogged().branches()
         names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
         self._branch.options = (_NEAREST, *names)
+        if not names:
+            self._said.content += words.paragraph("No other way to this pose was found.")
 
     def _take_branch(self) -> None:
         names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
@@ -205,10 +218,17 @@ class JogPage:
         self._shown()
         self._show_recorded()
 
+    def go_to_joints(self, joints: Array, arm: str | None = None) -> None:
+        """Move the drawn arm, ``nominal`` or ``calibrated``, to joint positions of the model [rad or m]."""
+        if arm is not None and arm in self._arms and arm != self._arm.value:
+            self._take(arm)
+        self._jogged().go(joints)
+        self._moved()
+
     # What follows from where the arm is --------------------------------------------------------------------------
 
     def _jogged(self) -> Jogging:
-        self._stop()
+        self.stop()
         if self.jogging is None:
             raise InputError("there is no robot to move", cure="Choose one on the page Cell.")
         return self.jogging
@@ -234,7 +254,7 @@ class JogPage:
                 self._handle.position, self._handle.wxyz = position, quaternion_from_rotation(rotation)
             for slider, number, (low, high) in zip(self._sliders, arm.numbers, arm.ranges(), strict=True):
                 high = max(high, low + 0.01)
-                if slider.min != low or slider.max != high:
+                if abs(slider.min - low) > _ROUNDING or abs(slider.max - high) > _ROUNDING:
                     slider.min, slider.max = min(low, slider.value), max(high, slider.value)
                     slider.value = min(max(number, low), high)
                     slider.min, slider.max = low, high
@@ -242,6 +262,7 @@ class JogPage:
                     slider.value = min(max(number, low), high)
             self._place.value, self._turns.value = arm.pose_numbers(self._frame.value)
             self._said.content = "".join(words.paragraph(text) for text in arm.words())
+            self.views.moved(arm)
 
     def _show_handle(self) -> None:
         self._handle.visible = self._handle_on.value
@@ -291,12 +312,41 @@ class JogPage:
 
     def _start(self) -> None:
         """Play the configurations of the file, from where the arm is."""
-        arm, known = self._jogged(), self._read()
-        if known is None:
-            raise InputError("there is nothing to play", parameter="File", came=self._list.value, cure="Record a pose.")
-        for joints in known.joints:
-            Jogging(arm.robot).go(joints)
-        motion = Motion.through(np.concatenate([arm.joints[None], known.joints]), float(self._speed.value), arm.robot)
+        self.play_file(self._window.project.relative(self._file()), float(self._speed.value))
+
+    def play_file(self, name: str, speed: float, *, from_its_start: bool = False) -> Array:
+        """Play the configurations of a file, from where the arm is or from the first of them.
+
+        Parameters
+        ----------
+        speed
+            Of the fastest joint [deg/s, or mm/s for prismatic joints].
+
+        Returns
+        -------
+        Configurations on the way, ``(n, joints)`` [rad or m].
+        """
+        arm, file = self._jogged(), self._window.project.path(name)
+        if not exists(file):
+            raise InputError("there is nothing to play", parameter="File", came=name, cure="Record a pose.")
+        joints = read_recorded(file, arm.robot).joints
+        if not from_its_start:
+            joints = np.concatenate([arm.joints[None], joints])
+        motion = Motion.through(joints, speed, arm.robot)
+        self.play(motion)
+        return motion.on_the_way()
+
+    def play(self, motion: Motion) -> None:
+        """Play a motion.
+
+        Raises
+        ------
+        InputError
+            If it leads beyond the limits of a joint.
+        """
+        tried = Jogging(self._jogged().robot)
+        for joints in motion.joints:
+            tried.go(joints)
         self._playing = over = threading.Event()
         threading.Thread(target=self._run, args=(motion, over), daemon=True).start()
 
@@ -314,7 +364,8 @@ class JogPage:
                     return
             over.wait(_PICTURE)
 
-    def _stop(self) -> None:
+    def stop(self) -> None:
+        """End a motion that is played."""
         if self._playing is not None:
             self._playing.set()
             self._playing = None

@@ -1,25 +1,37 @@
-"""Which configurations to measure: chosen, drawn in space, and written as a sheet."""
+"""Which configurations to measure: chosen, drawn in space, driven in the scene, and written as a sheet or a program."""
 
 from __future__ import annotations
 
+from contextlib import suppress
+from pathlib import PurePosixPath
 from typing import Any, ClassVar, Final
 
+import numpy as np
+
 from truearm.errors import InputError
-from truearm.files import exists
 from truearm.identification.solving.models import MODELS
+from truearm.manifest import MANIFEST
+from truearm.modeling.chain import Array
+from truearm.planning.choosing.measurement_plan import ERROR
+from truearm.planning.choosing.observability import INDICES
 from truearm.simulation.devices import DEVICES
 from truearm.studio import words
 from truearm.studio.arrows import coloured
-from truearm.studio.pages.choices import NONE, chosen
+from truearm.studio.pages.choices import NONE, offer
+from truearm.studio.pages.fields import Fields
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pictures import Picture
 from truearm.studio.planned import Planned, planned
+from truearm.studio.recorded import read_recorded
 from truearm.studio.window import Window
 
-#: The sheet and the page that a plan writes.
-_FILES: Final = ("plan.csv", "plan.html")
-#: Of the chosen configurations.
+#: Of the chosen configurations, of those that were not chosen, and of the ways between them.
 _CHOSEN: Final = (214, 69, 61)
+_CANDIDATES: Final = (150, 158, 170)
+_WAYS: Final = (214, 140, 60)
+#: Languages of programs that drive a plan.
+_LANGUAGES: Final = ("rapid", "krl", "fanuc", "urscript", "inform", "val3")
+_FILES: Final = (".yaml", ".yml")
 
 
 class PlanPage:
@@ -29,29 +41,82 @@ class PlanPage:
 
     def __init__(self, window: Window) -> None:
         self._window = window
+        self._planned: Planned | None = None
+        self._of = ""
+        self._drawn: tuple[Any, ...] = ()
         gui = window.gui
-        self._poses: Any = gui.add_text("Poses", "60", hint="how many to choose, or auto")
-        self._model: Any = gui.add_dropdown("Model", tuple(model.name for model in MODELS), initial_value="geometric")
-        self._device: Any = gui.add_dropdown(
-            "Instrument", (NONE, *(device.name for device in DEVICES)), hint="none: all targets everywhere"
-        )
-        self._noise: Any = gui.add_number("Noise [mm]", 0.1, min=0.0001, max=10.0, step=0.01)
-        self._candidates: Any = gui.add_number("Candidates", 1000, min=10, max=20000, step=10)
-        self._seed: Any = gui.add_number("Seed", 0, min=0, step=1)
+        self.fields = fields = Fields(window, self._now, self._change)
+        fields.text("poses", "Poses", "how many to choose, or auto")
+        fields.choice("model", "Model", [model.name for model in MODELS], "what will be identified", none=None)
+        fields.choice("device", "Instrument", [one.name for one in DEVICES], "none: all targets are read everywhere")
+        fields.number("noise", "Noise [mm]", "of a coordinate about a well identified model", optional=False)
+        fields.number("candidates", "Candidates", "random ones to choose from", optional=False, whole=True)
+        fields.file("candidates_from", "Candidates from", (".csv",), "choose among the configurations of a file")
+        fields.number("seed", "Seed", "of the random candidates", optional=False, whole=True)
+        with gui.add_folder("Where it shall be accurate", expand_by_default=False):
+            fields.file("accurate_at", "For", _programs(), "a program, or poses of the flange: .csv")
+            fields.text("region", "Region [mm]", "a box for the flange, base frame: 300..600,-200..200,100..400")
+            fields.choice("objective", "Objective", (*INDICES, ERROR), "none: O1, or the error where something is said")
+        with gui.add_folder("Ways that are clear", expand_by_default=False):
+            fields.file("constraints", "Constraints", _FILES, "boxes and more: of the page Cell, or a file")
+            fields.number("floor", "Floor [mm]", "its height in the base frame, 0 or less; 0 if not said")
+            fields.flag("no_floor", "No floor", "neither a floor nor a surface on which the robot is mounted")
+            fields.number("clearance", "Clearance [mm]", "room to floor, boxes and own links; 50 if not said")
+            fields.text("home", "Home [deg]", "the safe configuration: 0,-30,30,0,30,0; one is found if not said")
+        with gui.add_folder("Measuring program", expand_by_default=False):
+            fields.choice("program", "Program", _LANGUAGES, "a program that drives the plan, with a sheet")
+            fields.flag("approach", "Approach", "every joint comes to each configuration from one side")
+            fields.text("speed", "Speed [mm/s, %]", "highest one of the tip, and of the joints; 250,10 if not said")
+            fields.number("dwell", "Dwell [s]", "how long it stands in each configuration; 2 if not said")
+            fields.text("wait", "Wait", "what for then: time, operator, or input 3,300s; time if not said")
+        fields.text("out", "Write to", "plan.csv if not said; with a program a folder: plan")
         self._run = gui.add_button("Plan")
-        self._cloud: Any = gui.add_checkbox("Predicted error and chosen poses in the scene", True)
         self._said = gui.add_html(words.paragraph("There is no plan of this window yet."))
         self._enough = Picture(window, "How many poses are enough")
-        self._files: Any = gui.add_button_group("Download", _FILES, visible=False)
-        self._planned: Planned | None = None
+        self._file: Any = gui.add_dropdown("File", (NONE,), visible=False)
+        self._download = gui.add_button("Download the file", visible=False)
+        with gui.add_folder("In the scene"):
+            self._cloud: Any = gui.add_checkbox("Predicted error", True, hint="and the chosen configurations, red")
+            self._scale = gui.add_html("", visible=False)
+            self._among: Any = gui.add_checkbox(
+                "All candidates", False, hint="where the flange is at those that are usable"
+            )
+            self._speed: Any = gui.add_number("Speed [deg/s, mm/s]", 60.0, min=0.1, max=1000.0, step=1.0)
+            self._tour: Any = gui.add_button_group("Ways", ("drive", "stop"))
         self._run.on_click(window.action(self._plan))
         self._cloud.on_update(window.action(self._draw))
-        self._files.on_click(window.action(self._download))
+        self._among.on_update(window.action(self._draw))
+        self._tour.on_click(window.action(self._driven))
+        self._download.on_click(window.action(self._downloaded))
 
     def refresh(self) -> None:
-        """Show the picture as light or dark as the window is."""
-        self._files.visible = all(exists(self._window.project.path(name)) for name in _FILES)
-        self._picture()
+        """Show the fields of the settings, the files that plans have written, and what is in them."""
+        self.fields.refresh()
+        names = self._written()
+        self._file.visible = self._download.visible = bool(names)
+        if names:
+            value = str(self._file.value)
+            offer(self._file, names, value if value in names else names[0], None)
+        if self._planned is not None:
+            self._enough.show(self._planned.enough)
+        seen = self._seen()
+        if seen != self._drawn:
+            self._drawn = seen
+            self._jog().scene.show_line("ways", None)
+            self._draw()
+
+    # The fields --------------------------------------------------------------------------------------------------
+
+    def _now(self) -> dict[str, Any]:
+        settings = self._window.project.settings
+        return {**settings.plan.model_dump(), "constraints": settings.constraints}
+
+    def _change(self, name: str, value: Any) -> None:
+        if name == "constraints":
+            self._window.edit(constraints=value)
+            return
+        said = self._window.project.settings.plan.model_dump(mode="json")
+        self._window.edit(plan={**said, name: value})
 
     def _plan(self) -> None:
         window, settings = self._window, self._window.project.settings
@@ -61,45 +126,96 @@ class PlanPage:
             self._done,
             folder=window.project.folder,
             robot=settings.robot,
-            poses=_count(self._poses.value),
-            out=_FILES[0],
-            model=self._model.value,
-            device=chosen(self._device),
-            noise=float(self._noise.value) / 1e3,
-            candidates=None if chosen(self._device) else int(self._candidates.value),
-            seed=int(self._seed.value),
+            fields=settings.plan,
+            cell=settings.cell,
+            constraints=settings.constraints,
             payload=settings.payload,
         )
 
     def _done(self, found: Planned) -> None:
-        self._planned = found
-        written = f"Written: {', '.join(found.outcome.files)}"
-        self._said.content = words.lines([*found.outcome.lines, written])
-        self._draw()
+        self._planned, self._of = found, self._window.project.settings.robot
+        place = PurePosixPath(found.outcome.files[0])
+        self._window.project.look(*found.outcome.files, str(place.parent / MANIFEST))
+        self._said.content = words.lines([*found.outcome.lines, f"Written: {', '.join(found.outcome.files)}"])
+        self._drawn = ()
+
+    # The scene ---------------------------------------------------------------------------------------------------
 
     def _draw(self) -> None:
-        scene = next(page.scene for page in self._window.pages if isinstance(page, JogPage))
-        found = self._planned if self._cloud.value else None
-        if found is None or scene.solid is None:
-            scene.show_points("predicted", None)
-            scene.show_points("chosen", None)
+        scene = self._jog().scene
+        self._scale.visible = False
+        found = self._planned if self._of == self._window.project.settings.robot else None
+        files = self._written()
+        for name in ("predicted", "chosen", "candidates"):
+            scene.show_points(name, None)
+        if scene.solid is None:
             return
-        base = scene.solid.robot.base  # where the instrument has found it, if it has
-        chosen_at, places = (points @ base.rotation.T + base.translation for points in (found.chosen, found.places))
-        low, high = float(found.errors.min()), float(found.errors.max())
-        scene.show_points("predicted", places, coloured(found.errors, low, high))
-        scene.show_points("chosen", chosen_at, _CHOSEN)
+        robot = scene.solid.robot
+        base = robot.base  # where the instrument has found it, if it has
 
-    def _picture(self) -> None:
-        if self._planned is not None:
-            self._enough.show(self._planned.enough)
+        def in_world(points: Array) -> Array:
+            return np.asarray(points @ base.rotation.T + base.translation)
 
-    def _download(self) -> None:
-        self._window.download(self._window.project.path(self._files.value))
+        if self._cloud.value:
+            if found is not None:
+                low, high = float(found.errors.min()), float(found.errors.max())
+                told = f"From {1e3 * low:.3g} mm (dark) to {1e3 * high:.3g} mm (light); chosen configurations are red."
+                self._scale.content, self._scale.visible = words.paragraph(told), True
+                scene.show_points("predicted", in_world(found.places), coloured(found.errors, low, high))
+                scene.show_points("chosen", in_world(found.chosen), _CHOSEN)
+            elif self._table() in files:
+                with suppress(InputError):  # the plan may be of another arm
+                    joints = read_recorded(self._window.project.path(self._table()), robot).joints
+                    scene.show_points("chosen", robot.forward(joints, frame="world")[0], _CHOSEN)
+        if self._among.value and found is not None:
+            scene.show_points("candidates", in_world(found.candidates), _CANDIDATES, size=0.004)
+
+    def _driven(self) -> None:
+        """Play the ways of the plan from its safe configuration, or stop."""
+        jog = self._jog()
+        if self._tour.value == "stop":
+            jog.stop()
+            return
+        name = self._ways()
+        if name not in self._written():
+            raise InputError("there are no ways to drive yet", where=name, cure="Plan first.")
+        joints = jog.play_file(name, float(self._speed.value), from_its_start=True)
+        solid = jog.scene.solid
+        if solid is not None:
+            jog.scene.show_line("ways", solid.robot.forward(joints, frame="world")[0], _WAYS)
+
+    def _jog(self) -> JogPage:
+        return next(page for page in self._window.pages if isinstance(page, JogPage))
+
+    # The files ---------------------------------------------------------------------------------------------------
+
+    def _table(self) -> str:
+        plan = self._window.project.settings.plan
+        return plan.place if plan.program is None else f"{plan.place}/plan.csv"
+
+    def _ways(self) -> str:
+        return f"{self._table().removesuffix('.csv')}-ways.csv"
+
+    def _written(self) -> list[str]:
+        """Return the files of the plan: with a program all of their folder."""
+        plan, project = self._window.project.settings.plan, self._window.project
+        if plan.program is None:
+            names = [plan.place, f"{plan.place.removesuffix('.csv')}.html", self._ways()]
+            return [name for name in names if project.path(name).is_file()]
+        return [name for name in project.names() if name.startswith(f"{plan.place}/")]
+
+    def _seen(self) -> tuple[Any, ...]:
+        """Return what is drawn: of which plan and which robot."""
+        path = self._window.project.path(self._table())
+        stamp = path.stat().st_mtime_ns if path.is_file() else None
+        scene = self._jog().scene
+        return (id(self._planned), stamp, self._table(), None if scene.solid is None else id(scene.solid))
+
+    def _downloaded(self) -> None:
+        self._window.download(self._window.project.path(self._file.value))
 
 
-def _count(text: str) -> int | str:
-    text = text.strip()
-    if text == "auto" or text.isdecimal():
-        return text if text == "auto" else int(text)
-    raise InputError("a number of poses belongs here", parameter="poses", came=text, allowed="a whole number, or auto")
+def _programs() -> tuple[str, ...]:
+    from truearm.compensation.programs import LANGUAGES
+
+    return (".csv", *(suffix for language in LANGUAGES for suffix in language.suffixes))

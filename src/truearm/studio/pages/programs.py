@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
 from truearm.files import exists
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.results.program_correction import REPORT
 from truearm.studio import words
+from truearm.studio.drawn_program import DrawnProgram, corrected_program, read_program
 from truearm.studio.pages.choices import NONE, chosen, offer
-from truearm.studio.tasks import Outcome, compensate
+from truearm.studio.pages.program_in_space import ProgramInSpace
 from truearm.studio.window import Window
 
 #: What stands in a list where nothing was said.
@@ -33,7 +34,10 @@ class ProgramsPage:
         self._kinematics = gui.add_dropdown(
             "Controller has", (_UNSAID, *STATED), hint="with what the controller turns poses into joint positions"
         )
+        self._read = gui.add_button("Draw the program")
         self._run = gui.add_button("Correct the program")
+        self._space = ProgramInSpace(window)
+        self._of: tuple[Any, ...] = ()
         self._downloads = gui.add_button_group("Download", ("corrected program", "report"), visible=False)
         self._said = gui.add_html("")
         self._program.on_update(window.action(lambda: window.edit(program=chosen(self._program))))
@@ -42,6 +46,7 @@ class ProgramsPage:
         self._kinematics.on_update(
             window.action(lambda: window.edit(controller_kinematics=chosen(self._kinematics, _UNSAID)))
         )
+        self._read.on_click(window.action(self._show))
         self._run.on_click(window.action(self._correct))
         self._downloads.on_click(window.action(self._download))
 
@@ -59,34 +64,63 @@ class ProgramsPage:
         offer(self._kinematics, STATED, settings.controller_kinematics, _UNSAID)
         folder = project.file("corrected")
         self._downloads.visible = folder is not None and exists(folder / REPORT)
+        if self._of and self._of != (settings.robot, settings.program):
+            self._of = ()
+            self._space.take(None)
+        else:
+            self._space.show()
 
     def _teach(self) -> None:
         said = chosen(self._taught, _UNSAID)
         self._window.edit(taught=None if said is None else said.split(", "))
 
+    def _show(self) -> None:
+        window, settings = self._window, self._window.project.settings
+        window.start(
+            "Draw the program",
+            read_program,
+            self._take,
+            folder=window.project.folder,
+            robot=settings.robot,
+            program=self._chosen(),
+        )
+
+    def _take(self, drawn: DrawnProgram) -> None:
+        settings = self._window.project.settings
+        self._of = (settings.robot, settings.program)
+        self._space.take(drawn)
+
+    def _chosen(self) -> str:
+        program = self._window.project.settings.program
+        if program is None:
+            raise InputError("no program is chosen", parameter="programs", cure="Choose a file of the project.")
+        return program
+
     def _correct(self) -> None:
         window, settings = self._window, self._window.project.settings
-        if settings.program is None:
-            raise InputError("no program is chosen", parameter="programs", cure="Choose a file of the project.")
+        program = self._chosen()
         robot = f"{settings.result}/calibrated.yaml"
         if not exists(window.project.path(robot)):
             raise InputError("there is no calibrated robot yet", parameter="robot", cure="Calibrate first.")
         window.start(
             "Correct the program",
-            compensate,
+            corrected_program,
             self._done,
             folder=window.project.folder,
             robot=robot,
-            program=settings.program,
+            program=program,
             out=settings.corrected,
             cell=settings.cell,
             taught=settings.taught,
             controller_kinematics=settings.controller_kinematics,
         )
 
-    def _done(self, outcome: Outcome) -> None:
+    def _done(self, drawn: DrawnProgram) -> None:
+        outcome = drawn.outcome
+        assert outcome is not None
         written = f"Written to {self._window.project.settings.corrected}: {', '.join(outcome.files)}"
         self._said.content = words.lines([*outcome.lines, written])
+        self._take(drawn)
 
     def _download(self) -> None:
         project, settings = self._window.project, self._window.project.settings

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
 from truearm.files import exists, read_text
+from truearm.measurement.excluded import read_exclusions
 from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES
 from truearm.studio import words
 from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.error_arrows import ErrorArrows
-from truearm.studio.pictures import Picture
+from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.window import Window
 
-#: Where the report has the data of its pictures.
-_FIGURES: Final = re.compile(r'<script type="application/json" id="figures">(.*?)</script>', re.S)
 _PARTS: Final = (("nominal", "before"), ("validation", "after, held out"), ("train", "after, training"))
 _KINDS: Final = (("position_mm", "mm"), ("length_mm", "mm"), ("orientation_mrad", "mrad"))
 
@@ -54,7 +52,9 @@ class ProofPage:
             self._picture.visible = self._files.visible = self._drawn.place.visible = False
             return
         stat = (folder / "result.json").stat()
-        shown = (folder, stat.st_mtime_ns, stat.st_size, project.settings.data, project.settings.dark)
+        exclude = project.file("exclude")
+        rows = exclude.stat().st_mtime_ns if exclude is not None and exists(exclude) else None
+        shown = (folder, stat.st_mtime_ns, stat.st_size, project.settings.data, rows, project.settings.dark)
         if shown == self._shown:
             return
         result = _read_result(folder / "result.json")
@@ -65,7 +65,7 @@ class ProofPage:
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise _no_result(folder / "result.json") from error
         self._table.content, self._notices.content = shown_figures, told
-        self._figures = _report_figures(folder / "report.html")
+        self._figures = report_figures(folder / "report.html")
         self._files.visible = True
         self._picture.visible = self._drawn.place.visible = bool(self._figures)
         if self._figures:
@@ -83,6 +83,12 @@ class ProofPage:
             if f"sha256 {digest}" not in str(result.get("history", "")):
                 text = f"This result is of other measurements than {self._window.project.settings.data} as it is now."
                 found.append(Notice("other-measurements", text, "warning"))
+        exclude = self._window.project.file("exclude")
+        chosen = read_exclusions(exclude) if exclude is not None and exists(exclude) else ()
+        now = [(one.configuration, one.target, one.reason) for one in chosen]
+        if now != [(one["configuration"], one["target"], one["reason"]) for one in result.get("excluded", ())]:
+            text = "This result is without other readings than those that are excluded now: calibrate again."
+            found.append(Notice("other-measurements", text, "warning"))
         return found
 
     def _draw(self) -> None:
@@ -125,15 +131,3 @@ def _read_result(path: Path) -> dict[str, Any]:
 
 def _no_result(path: Path) -> InputError:
     return InputError("this is no result of a calibration", where=str(path), cure="Calibrate again.")
-
-
-def _report_figures(path: Path) -> dict[str, Any]:
-    """Return the pictures of a report by their names; none if it has none."""
-    if not exists(path):
-        return {}
-    found = _FIGURES.search(read_text(path))
-    try:
-        figures = json.loads(found[1]) if found else {}
-    except (json.JSONDecodeError, RecursionError):
-        return {}
-    return figures if isinstance(figures, dict) else {}

@@ -7,22 +7,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from typing import Any, Literal
 
 from truearm.errors import InputError, Words
-from truearm.files import read_text
 from truearm.planning.iso9283.criteria import TEST_OF
-from truearm.printable import shortened
 from truearm.validation.iso9283.comparable import (
     PlanOfResult,
-    Rated,
     same_place,
     unlike_bandwidths,
     unlike_plans,
     unlike_rated,
 )
+from truearm.validation.iso9283.result_file import Entry, ResultFile, read_result
 
 Verdict = Literal["smaller", "larger", "not told apart", "no interval"]
 
@@ -132,56 +128,6 @@ class Comparison:
         return text
 
 
-_Length = Annotated[float, Field(allow_inf_nan=False)] | None
-
-
-class _Entry(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-    id: str
-    component: str
-    where: str
-    value: Annotated[float, Field(allow_inf_nan=False)] | None
-    unit: str
-    interval_95: tuple[float, float] | None
-    conditions: dict[str, float | str]
-    status: str
-    bandwidth_hz: Annotated[float, Field(allow_inf_nan=False, gt=0)] | None = None
-
-
-class _Tie(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-    kind: str
-
-
-class _Curve(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-    id: str
-    where: str
-    conditions: dict[str, float | str]
-    along_mm: tuple[_Length, ...]
-    distance_mm: tuple[_Length, ...]
-
-
-class _Offset(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-    id: str
-    where: str
-    conditions: dict[str, float | str]
-    offset_mm: tuple[_Length, _Length, _Length]
-
-
-class _Result(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-    truearm: Literal["truearm-iso9283-result/1"]
-    robot: str
-    alignment: _Tie
-    rated: Rated | None = None
-    plan: PlanOfResult | None = None
-    criteria: tuple[_Entry, ...]
-    curves: tuple[_Curve, ...] = ()
-    offsets: tuple[_Offset, ...] = ()
-
-
 #: Criteria whose values depend on how the instrument was tied to the base.
 _TIED = ("AP", "AT", "AT-reorientation")
 
@@ -204,12 +150,8 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
     InputError
         If the file is no such result, or one of another robot or another tip, or both have no value of the same kind.
     """
-    text = read_text(other)
-    try:
-        second = _Result.model_validate_json(text)
-    except ValidationError as error:
-        raise _no_result(other, error.errors()[0]) from error
-    first = _Result.model_validate_json(json.dumps(summary))
+    second = read_result(other)
+    first = ResultFile.model_validate_json(json.dumps(summary))
     if first.robot != second.robot:
         raise InputError(
             "the other result is of another robot", where=str(other), came=second.robot, allowed=first.robot
@@ -267,7 +209,9 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
     return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)), told, second.plan is None, *drawn)
 
 
-def _unlike(first: _Result, second: _Result, id_: str, where: str, conditions: Mapping[str, float | str]) -> str | None:
+def _unlike(
+    first: ResultFile, second: ResultFile, id_: str, where: str, conditions: Mapping[str, float | str]
+) -> str | None:
     """Return why a value of the two was planned otherwise, None if it was not, or that is not told."""
     if id_ not in TEST_OF:
         return None
@@ -288,25 +232,6 @@ def _numbers(lengths: Sequence[float | None]) -> tuple[float, ...]:
     return tuple(math.nan if length is None else length for length in lengths)
 
 
-def _no_result(other: Path, fault: Any) -> InputError:
-    """Return the refusal of a file that is no result, in words of a person who gave another file."""
-    entry = ".".join(map(str, fault["loc"]))
-    if fault["type"] == "json_invalid":
-        came = "a text that is not JSON"
-    elif entry in ("", "truearm"):
-        kind = fault["input"] if entry and isinstance(fault["input"], str) else None
-        came = "JSON of something else" if kind is None else f"a file of the kind {shortened(kind, 60)}"
-    else:
-        came = f"a result {'without' if fault['type'] == 'missing' else 'with another kind of'} {entry}"
-    return InputError(
-        "this is no result of tests by ISO 9283",
-        where=str(other),
-        came=Words(came),
-        allowed="the file iso9283.json that an evaluation has written",
-        cure="Evaluate the other tests first, and give the iso9283.json of that folder.",
-    )
-
-
 def _shown(name: str, value: float | str) -> str:
     """Return a condition in words."""
     if isinstance(value, str):
@@ -314,7 +239,7 @@ def _shown(name: str, value: float | str) -> str:
     return f"{'load ' * (name == 'load_percent')}{value:g} %"
 
 
-def _key(entry: _Entry) -> tuple[object, ...]:
+def _key(entry: Entry) -> tuple[object, ...]:
     return entry.id, entry.component, entry.where, entry.unit, tuple(sorted(entry.conditions.items()))
 
 

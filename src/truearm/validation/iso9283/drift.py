@@ -206,11 +206,12 @@ def _scatter_of_spread(groups: list[Array], spread: Array) -> _Scatter:
     if len(groups) < 2 or min(map(len, groups)) < LEAST_CYCLES or not spread.max() > 0:
         return None
     about = np.concatenate([group - group.mean(axis=0) for group in groups])
+    of_cycles = {cycles: repeatability_scatter(about, cycles) for cycles in {*map(len, groups)}}
 
     def drawn(which: int) -> Array:
         columns = []
         for k, group in enumerate(groups):
-            ratios = repeatability_scatter(about, len(group))
+            ratios = of_cycles[len(group)]
             order = np.random.default_rng((9283, 2 * k + which)).permutation(len(ratios))
             columns.append(spread.mean() * (ratios[order] - 1.0))
         return np.stack(columns, axis=1)

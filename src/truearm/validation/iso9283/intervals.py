@@ -66,7 +66,7 @@ def mean_interval(values: Array, known_variance: float = 0.0) -> Interval | None
     tuple or None
         None for fewer than :data:`LEAST_CYCLES` values.
     """
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     n = len(values)
     if n < LEAST_CYCLES:
@@ -75,7 +75,7 @@ def mean_interval(values: Array, known_variance: float = 0.0) -> Interval | None
     whole = variance + known_variance
     # Of a variance of zero any degrees of freedom do.
     freedom = (n - 1) * (whole / variance) ** 2 if variance > 0 else 1e9
-    half = float(t.ppf(1.0 - TAIL, freedom)) * math.sqrt(whole)
+    half = float(stdtrit(freedom, 1.0 - TAIL)) * math.sqrt(whole)
     mean = float(values.mean())
     return mean - half, mean + half
 
@@ -86,11 +86,11 @@ def spread_interval(deviation: float, cycles: int) -> Interval | None:
     Chi-square: exact for a Gaussian, too wide for what has shorter tails. None for fewer than :data:`LEAST_CYCLES`
     cycles or no scatter at all.
     """
-    from scipy.stats import chi2
+    from scipy.special import gammaincinv
 
     if cycles < LEAST_CYCLES or not deviation > 0:
         return None
-    low, high = (float(chi2.ppf(share, cycles - 1)) for share in (TAIL, 1.0 - TAIL))
+    low, high = (2.0 * float(gammaincinv(0.5 * (cycles - 1), share)) for share in (TAIL, 1.0 - TAIL))
     return 3.0 * deviation * math.sqrt((cycles - 1) / high), 3.0 * deviation * math.sqrt((cycles - 1) / low)
 
 

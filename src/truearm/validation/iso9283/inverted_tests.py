@@ -79,19 +79,21 @@ def _likeliest(mean: Array, variances: Array, norms: Array) -> Array:
     lowest = 1.0 / float(variances.max())
     low, high = np.full(len(norms), -lowest), np.full(len(norms), lowest)
 
-    def too_long(factor: Array) -> Array:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.linalg.norm(mean / (1.0 + factor[:, None] * variances), axis=1) > norms)
+    squares = norms**2
 
-    for _ in range(_HALVINGS_FACTOR):
-        long = too_long(high)
-        if not long.any():
-            break
-        high = np.where(long, 4.0 * high, high)
-    for _ in range(_HALVINGS_FACTOR):
-        middle = 0.5 * (low + high)
-        long = too_long(middle)
-        low, high = np.where(long, middle, low), np.where(long, high, middle)
+    def too_long(factor: Array) -> Array:
+        return np.asarray(((mean / (1.0 + factor[:, None] * variances)) ** 2).sum(axis=1) > squares)
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for _ in range(_HALVINGS_FACTOR):
+            long = too_long(high)
+            if not long.any():
+                break
+            high = np.where(long, 4.0 * high, high)
+        for _ in range(_HALVINGS_FACTOR):
+            middle = 0.5 * (low + high)
+            long = too_long(middle)
+            low, high = np.where(long, middle, low), np.where(long, high, middle)
     place = mean / np.maximum(1.0 + high[:, None] * variances, 1e-12)
     size = np.linalg.norm(place, axis=1)
     return np.asarray(place * np.where(size > 0, norms / np.where(size > 0, size, 1.0), 0.0)[:, None])
@@ -165,8 +167,8 @@ def barycentre_scatter(covariance: Array, cycles: int, known: Array | None, stre
         ``(m, d)``.
     """
     d = len(covariance)
-    drawn, shares = _drawn(stream)
-    scale = np.sqrt((cycles - 1) / _chi_square(shares, cycles - 1))
+    drawn, _ = _drawn(stream)
+    scale = _scale(stream, cycles)
     made = scale[:, None] * (drawn[:, :d] @ _root(covariance / cycles).T)
     if known is not None:
         made = made + drawn[:, 3 : 3 + d] @ _root(known).T
@@ -180,10 +182,13 @@ def _drawn(stream: int) -> tuple[Array, Array]:
     return rng.standard_normal((_DRAWS, 6)), rng.random(_DRAWS)
 
 
-def _chi_square(shares: Array, freedom: int) -> Array:
+@lru_cache(maxsize=256)
+def _scale(stream: int, cycles: int) -> Array:
+    """Return roots of degrees of freedom over chi-square, drawn, ``(m,)``: what makes a Gaussian a multivariate t."""
     from scipy.special import gammaincinv
 
-    return np.asarray(2.0 * gammaincinv(0.5 * freedom, shares))
+    freedom = cycles - 1
+    return np.asarray(np.sqrt(0.5 * freedom / gammaincinv(0.5 * freedom, _drawn(stream)[1])))
 
 
 def _root(covariance: Array) -> Array:

@@ -158,11 +158,11 @@ def deviations_of(run: Run, stations: int = STATIONS) -> PathDeviations:
     distance = np.linalg.norm(mean, axis=1)
     half = np.full(len(along), np.nan)
     if n > 1:
-        from scipy import stats
+        from scipy.special import stdtrit
 
         unit = mean / np.maximum(distance, 1e-12)[:, None]
         of_cycle = (deviation * unit).sum(axis=2)
-        half = stats.t.ppf(0.975, n - 1) * of_cycle.std(axis=0, ddof=1) / np.sqrt(n)
+        half = stdtrit(n - 1, 0.975) * of_cycle.std(axis=0, ddof=1) / np.sqrt(n)
     return PathDeviations(
         run.path.path.name, run, along, deviation, mean, distance, half, _spread(deviation), angles, pooled
     )
@@ -314,7 +314,7 @@ def _accuracy_interval(deviation: Array, tie: Array | None, rng: np.random.Gener
     The upper end is the largest over stations of the upper end of each for itself, Student's t in the direction in
     which cycles scatter most: it lies above the truth if that at the station with the largest true distance does.
     """
-    from scipy import stats
+    from scipy.special import ndtri, stdtrit
 
     n, m, d = deviation.shape
     mean = deviation.mean(axis=0)
@@ -336,9 +336,9 @@ def _accuracy_interval(deviation: Array, tie: Array | None, rng: np.random.Gener
         low = 0.0
     away = residual.reshape(n, m, d)
     scatter = np.einsum("nmi,nmj->mij", away, away) / (n * (n - 1))
-    half = stats.t.ppf(0.975, n - 1) * np.sqrt(np.maximum(np.linalg.eigvalsh(scatter)[:, -1], 0.0))
+    half = stdtrit(n - 1, 0.975) * np.sqrt(np.maximum(np.linalg.eigvalsh(scatter)[:, -1], 0.0))
     if tie is not None:
-        half = np.hypot(half, stats.norm.ppf(0.975) * float(np.max(tie)))
+        half = np.hypot(half, ndtri(0.975) * float(np.max(tie)))
     return max(low, 0.0), float((distance + half).max())
 
 

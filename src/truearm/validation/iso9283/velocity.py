@@ -158,7 +158,7 @@ def _cycle(
 
 
 def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
-    from scipy import stats
+    from scipy.special import gammaincinv, stdtrit
 
     run, v = curve.run, curve.commanded
     n = len(curve.mean)
@@ -179,10 +179,10 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
     coarse_range = noise_range > COARSE * fluctuation
     enough = n >= LEAST_CYCLES
     if enough:
-        half = float(stats.t.ppf(0.975, n - 1) * spread / np.sqrt(n) / v)
+        half = float(stdtrit(n - 1, 0.975) * spread / np.sqrt(n) / v)
         interval_av = (accuracy - half, accuracy + half)
         degrees = 2.0 / (2.0 / (n - 1) + _KURTOSIS / n)
-        low, high = (float(np.sqrt(degrees / stats.chi2.ppf(p, degrees))) for p in (0.975, 0.025))
+        low, high = (float(np.sqrt(0.5 * degrees / gammaincinv(0.5 * degrees, p))) for p in (0.975, 0.025))
         interval_rv = (3 * spread / v * low, 3 * spread / v * high)
         few, many = _largest_of(ranges)
         interval_fv = (max(few - noise_range, 0.0), many / _KEPT)

@@ -277,7 +277,7 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
     entries["header"] = (line, "the last line of names above the numbers")
     if first != line + 1:
         entries["first_row"] = (first, "the first line of numbers")
-    if len(above) > 1:
+    if len(above) > 1 and sum(map(bool, above[-2][1])) > 1:
         notes = (f"line {above[-2][0]} looks like a second line of headings", *notes)
     return replace(made, names=tuple(names), headings=tuple(names), notes=notes)
 

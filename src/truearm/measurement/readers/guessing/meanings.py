@@ -22,7 +22,7 @@ _AT_THE_END: Final = re.compile(r"(?P<name>.*[^\s_/,])[\s_/,]+(?P<unit>[^\s_/,]+
 _GLUED: Final = re.compile("(?P<name>[XYZxyz])(?P<unit>mm|m|in)")
 _TOKEN: Final = re.compile(r"[XYZ](?=(?:act|nom|meas|cmd|ist|soll)\b)|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_]+")
 #: Words before the number of a joint.
-_JOINT: Final = frozenset({"joint", "joints", "axis", "ax", "achse", "gelenk", "j", "a", "q", "theta", "rax"})
+_JOINT: Final = frozenset({"joint", "joints", "jt", "axis", "ax", "achse", "gelenk", "j", "a", "q", "theta", "rax"})
 _UR: Final = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
 _YASKAWA: Final = tuple("slurbt")
 _DEVIATION: Final = frozenset({"std", "stdev", "stddev", "sigma", "sd", "unc", "uncertainty", "σ"})

@@ -1,0 +1,107 @@
+"""Readings that a job is told to exclude, and what is said of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from truearm.errors import refusals_of
+from truearm.files import path_argument
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.excluded import read_exclusions, without_readings
+from truearm.measurement.statistics import Errors, errors_of
+from truearm.measurement.table_motion import without_table_motion
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.results.excluded import Excluded, Part, reasons
+from truearm.shown import counted
+
+_RULE: Final = (
+    "Exclude readings for reasons of the instrument alone: to exclude what fits badly, or to repeat it, falsifies the "
+    "proof."
+)
+
+
+def without_excluded(data: Dataset, exclude: str | Path | None) -> tuple[Dataset, tuple[Excluded, ...]]:
+    """Return data in which the readings that a file excludes are missing, and these, all of them as of training.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used, or excludes what was not read.
+    """
+    if exclude is None:
+        return data, ()
+    path = path_argument(exclude, "exclude")
+    with refusals_of("exclude"):
+        rows = read_exclusions(path)
+        made, counts = without_readings(data, rows)
+    return made, tuple(Excluded(row, count, "training") for row, count in zip(rows, counts, strict=True))
+
+
+def in_parts(excluded: tuple[Excluded, ...], split: Dataset, held_out: IntArray) -> tuple[Excluded, ...]:
+    """Return excluded readings with the part of a split that they would belong to.
+
+    Parameters
+    ----------
+    split
+        The data that were split.
+    """
+    judging, known = {split.labels[c] for c in held_out.tolist()}, set(split.labels)
+
+    def part(label: str) -> Part:
+        return "held out" if label in judging else "training" if label in known else "left out"
+
+    return tuple(Excluded(one.row, one.readings, part(one.row.configuration)) for one in excluded)
+
+
+def excluded_notices(excluded: tuple[Excluded, ...]) -> list[Notice]:
+    """Say how many readings are excluded, before any split."""
+    count = sum(one.readings for one in excluded)
+    if not count:
+        return []
+    return [
+        Notice(
+            "excluded",
+            f"{counted(count, 'reading')} {'is' if count == 1 else 'are'} excluded: {reasons(excluded)}. Excluded "
+            f"readings count as missing. {_RULE}",
+            "note",
+        )
+    ]
+
+
+def check_excluded(
+    excluded: tuple[Excluded, ...], robot: Robot, as_read: Dataset | None, held_out: IntArray, without: Errors | None
+) -> list[Notice]:
+    """Say if readings are excluded by which a fit would be judged, and what the errors are with them.
+
+    Parameters
+    ----------
+    robot
+        The calibrated one.
+    as_read
+        The data that were split, with the excluded readings; None if they cannot be compared.
+    without
+        Errors on the held-out part as it judges; None if there is none.
+    """
+    mine = tuple(one for one in excluded if one.part == "held out")
+    count = sum(one.readings for one in mine)
+    if not count:
+        return []
+    told = ""
+    if as_read is not None and without is not None:
+        whole = errors_of(robot, without_table_motion(as_read).of_configurations(held_out))
+        some, every = without.position or without.length, whole.position or whole.length
+        if some is not None and every is not None:
+            it = "it" if count == 1 else "them"
+            told = (
+                f" With {it} the held-out errors are {every.mean * 1e3:.3f} mm on average and {every.max * 1e3:.3f} mm "
+                f"at most; without {it} {some.mean * 1e3:.3f} and {some.max * 1e3:.3f} mm."
+            )
+    return [
+        Notice(
+            "held-out-excluded",
+            f"{counted(count, 'reading')} of the held-out part {'is' if count == 1 else 'are'} excluded: "
+            f"{reasons(mine)}.{told} {_RULE}",
+        )
+    ]

@@ -1,0 +1,117 @@
+"""Measurements of the project that were checked, and where each of their readings is drawn."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.files import confined_reads
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.excluded import Exclusion
+from truearm.modeling.chain import Array
+from truearm.notices import Notice, worst_first
+from truearm.studio.tasks import Outcome, Progress
+
+#: The nominal robot is placed by so many configurations at most: to draw points, more are not needed.
+_PLACED_BY = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """What a check found, and the readings that it looked at, the excluded ones too.
+
+    Attributes
+    ----------
+    outcome
+        What its command prints.
+    findings
+        Its notices, the worst first.
+    readings
+        Label of the configuration and name of the target of each reading.
+    points
+        Where the instrument saw it, in the robot's base frame as far as that is known [m], ``(readings, 3)``; NaN where
+        it read no place of its own.
+    joints
+        Of the model at each reading's configuration [rad or m], ``(readings, joints)``.
+    """
+
+    outcome: Outcome
+    findings: tuple[Notice, ...]
+    readings: tuple[tuple[str, str], ...]
+    points: Array
+    joints: Array
+
+    def rows_of(self, named: tuple[tuple[str, str], ...]) -> NDArray[np.intp]:
+        """Return which readings are named; an empty target names all of its configuration."""
+        whole = {label for label, target in named if not target}
+        wanted = set(named)
+        found = [k for k, one in enumerate(self.readings) if one in wanted or one[0] in whole]
+        return np.array(found, dtype=np.intp)
+
+
+def checked(folder: Path, robot: str, data: str, exclude: str | None, progress: Progress) -> Checked:
+    """Say what is wrong with measurements: :func:`truearm.check`."""
+    from truearm.jobs.check import check
+    from truearm.jobs.load_data import load_data
+
+    os.chdir(folder)
+    progress("comparing the readings with the robot")
+    with confined_reads(folder):
+        found = check(robot, data, exclude=exclude)
+        progress("finding where the robot stands")
+        read = load_data(data, robot)
+        base = _base(robot, found.data)
+    parts = [read] if read.references is None else [read, read.references]
+    points = np.concatenate([np.where(part.has_position[:, None], part.position, np.nan) for part in parts])
+    if base is not None:
+        rotation, translation = base
+        points = (points - translation) @ rotation
+    return Checked(
+        Outcome(tuple(found.lines()), found.warnings),
+        worst_first(found.warnings),
+        tuple(
+            (part.labels[c], part.targets[t])
+            for part in parts
+            for c, t in zip(part.configuration.tolist(), part.target.tolist(), strict=True)
+        ),
+        points,
+        np.concatenate([read.joints[part.configuration] for part in parts]),
+    )
+
+
+def with_exclusions(before: tuple[Exclusion, ...], named: list[tuple[str, str]], reason: str) -> tuple[Exclusion, ...]:
+    """Return excluded readings with some more; those that are excluded already keep their reason.
+
+    Raises
+    ------
+    InputError
+        If no reason is given.
+    """
+    text = " ".join(reason.split())
+    if not text:
+        raise InputError(
+            "a reading is excluded for a reason",
+            parameter="Reason",
+            came=reason,
+            allowed="what went wrong with the instrument, such as: beam broken",
+        )
+    known = {(one.configuration, one.target) for one in before}
+    return (*before, *(Exclusion(*one, text) for one in dict.fromkeys(named) if one not in known))
+
+
+def _base(robot: str, data: Dataset) -> tuple[Array, Array] | None:
+    """Return rotation and translation of the robot's base in the world, found by the readings; None if they do not."""
+    from truearm.identification.solving.fit import place
+    from truearm.library import load_robot
+
+    some = np.unique(np.linspace(0, data.configurations - 1, min(data.configurations, _PLACED_BY)).round().astype(int))
+    try:
+        found = place(load_robot(robot), data.of_configurations(some), "cauchy").base
+    except InputError:
+        return None
+    return found.rotation, np.array(found.translation)

@@ -1,0 +1,130 @@
+"""A robot program in the project: where it sends the tip, on the nominal robot and on the real one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from truearm.compensation.programs.program import Program
+from truearm.files import confined_reads
+from truearm.modeling.chain import Array
+from truearm.studio.tasks import Outcome, Progress, compensate_command
+
+#: So many moves are drawn at most.
+_MOVES: Final = 5000
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnProgram:
+    """What of a program is drawn, in the robot's base frame [m].
+
+    Attributes
+    ----------
+    outcome
+        What the command prints that corrects it; None if it was only read.
+    names
+        Of each target, with its line.
+    tips
+        Where the controller takes the tip of each target to be, ``(n, 3)``.
+    way
+        These in the order of the moves, with rows of NaN between routines, ``(m, 3)``.
+    joints
+        That the controller commands, of the model [rad or m], ``(n, joints)``; NaN where it finds none.
+    meant, before, after
+        Where tips shall be on the real robot, and where the calibrated robot takes them with the program as it was
+        and as it is corrected, ``(n, 3)`` each; NaN for targets that were not corrected. Empty if it was only read.
+    corrected
+        Joint positions that the corrected program commands, like `joints`; empty if it was only read.
+    """
+
+    outcome: Outcome | None
+    names: tuple[str, ...]
+    tips: Array
+    way: Array
+    joints: Array
+    meant: Array
+    before: Array
+    after: Array
+    corrected: Array
+
+    def between(self, share: float) -> Array:
+        """Return how far the tips are from where they shall be, from the original program, 0, to the corrected, 1."""
+        return (1.0 - share) * self.before + share * self.after - self.meant
+
+
+def read_program(folder: Path, robot: str, program: str, progress: Progress) -> DrawnProgram:
+    """Read a program, and find where the nominal robot goes with it."""
+    from truearm.compensation.correction import way_through
+    from truearm.compensation.program_correction import commanded_tips
+    from truearm.compensation.program_files import program_files, read_programs
+    from truearm.library import load_robot
+
+    os.chdir(folder)
+    progress("reading the program")
+    with confined_reads(folder):
+        (read,) = read_programs(program_files([Path(program)], again=False))[:1]
+        joints, tips = commanded_tips(load_robot(robot), read)
+    none = np.zeros((0, 3))
+    way = way_through(read, tips, _MOVES)
+    return DrawnProgram(None, _names(read), tips[:, :3, 3], way, joints, none, none, none, np.zeros((0, 0)))
+
+
+def corrected_program(
+    folder: Path,
+    robot: str,
+    program: str,
+    out: str,
+    cell: str | None,
+    taught: Sequence[str] | None,
+    controller_kinematics: str | None,
+    progress: Progress,
+) -> DrawnProgram:
+    """Correct a program and write it, :func:`truearm.compensate`, and find where the real robot goes with it."""
+    from truearm.compensation.cell import EMPTY_CELL, Cell, read_frames, read_tools
+    from truearm.compensation.correction import way_through
+    from truearm.compensation.program_correction import commanded
+    from truearm.jobs.compensate import compensate
+
+    os.chdir(folder)
+    with confined_reads(folder):
+        made = compensate(
+            robot,
+            [program],
+            out=out,
+            tools=cell,
+            frames=cell,
+            taught=taught,
+            controller_kinematics=controller_kinematics,
+            command=compensate_command(robot, program, cell, taught, controller_kinematics),
+            progress=progress,
+        )
+        progress("drawing the program")
+        places = (
+            EMPTY_CELL if cell is None else Cell(*(read(made.robot, Path(cell)) for read in (read_tools, read_frames)))
+        )
+        before, after = (
+            commanded(made.robot, one, places) for one in (made.result.corrections[0].program, made.as_written()[0])
+        )
+    correction, real_tips = made.result.corrections[0], made.result.real_tips[0]
+    (meant, there), (_, then) = real_tips(before), real_tips(after)
+    kept = ~correction.corrected[:, None]
+    return DrawnProgram(
+        Outcome(tuple(made.lines()), made.warnings, tuple(one.name for one in made.files)),
+        _names(correction.program),
+        correction.tips[:, :3, 3],
+        way_through(correction.program, correction.tips, _MOVES),
+        before,
+        np.where(kept, np.nan, meant),
+        np.where(kept, np.nan, there),
+        np.where(kept, np.nan, then),
+        after,
+    )
+
+
+def _names(program: Program) -> tuple[str, ...]:
+    return tuple(f"{target.name or 'inline'}, line {target.line}" for target in program.targets)

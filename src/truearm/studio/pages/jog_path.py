@@ -1,0 +1,231 @@
+"""Lines, circles and curves through waypoints, made where the tip is, and played: a part of the page Jog."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.files import exists, read_text
+from truearm.modeling.chain import Array
+from truearm.planning.paths.path_file import PlannedPath, read_path
+from truearm.studio import words
+from truearm.studio.jogging import Jogging
+from truearm.studio.path_points import (
+    PlayedPath,
+    Point,
+    entries_of,
+    in_words,
+    new_path,
+    path_text,
+    played_path,
+    with_section,
+    with_speed,
+    without_last,
+)
+from truearm.studio.recorded import Motion
+from truearm.studio.scene import Scene
+from truearm.studio.window import Window
+from truearm.writing import write_text
+
+#: The file that is written where none is named.
+PATH: Final = "path.yaml"
+_FREE, _KEPT = "free", "direction of z as at its start"
+_LINE: Final = (70, 130, 180)
+
+
+class JogPath:
+    """Makes a path file point by point, draws the path, and plays it as :func:`truearm.path` follows it.
+
+    Parameters
+    ----------
+    arm
+        Returns the arm that is jogged, after ending what is played.
+    play
+        Plays a motion.
+    stop
+        Ends it.
+    """
+
+    def __init__(
+        self,
+        window: Window,
+        scene: Scene,
+        arm: Callable[[], Jogging],
+        play: Callable[[Motion], None],
+        stop: Callable[[], None],
+    ) -> None:
+        self._window, self._scene, self._arm, self._play, self._stop = window, scene, arm, play, stop
+        self._path: dict[str, Any] | None = None
+        self._first: Point | None = None
+        self._drawn: tuple[Any, ...] = ()
+        gui = window.gui
+        with gui.add_folder("Path", expand_by_default=False):
+            self._file: Any = gui.add_text("File", PATH, hint="a path file; made here, or any other to be played")
+            self._kept: Any = gui.add_dropdown("Orientation", (_FREE, _KEPT), hint="all along the path")
+            self._speed: Any = gui.add_number("Speed [mm/s]", 200.0, min=0.1, max=5000.0, step=10.0)
+            self._add: Any = gui.add_button_group(
+                "From here", ("start", "line", "circle", "waypoint"), hint="where the tip is now; a circle takes two"
+            )
+            self._do: Any = gui.add_button_group("Path", ("play", "stop", "remove last"))
+            self._said = gui.add_html(words.paragraph(_NONE))
+        self._file.on_update(window.settled(lambda: window.edit(path=self._file.value.strip() or None)))
+        self._speed.on_update(window.settled(self._other_speed))
+        self._add.on_click(window.action(lambda: self._added(self._add.value)))
+        self._do.on_click(window.action(self._done))
+
+    def refresh(self) -> None:
+        """Show the path of the file, in words and in the scene."""
+        project = self._window.project
+        name = project.settings.path or PATH
+        if self._file.value != name:
+            self._file.value = name
+        path, solid = project.path(name, "path"), self._scene.solid
+        stamp = path.stat().st_mtime_ns if exists(path) else None
+        seen = (name, stamp, None if solid is None else id(solid))
+        if seen == self._drawn:
+            return
+        self._drawn = seen
+        self._scene.show_line("path", None)
+        if stamp is None:
+            return
+        self._first = None
+        try:
+            planned = read_path(path)
+            self._path = entries_of(read_text(path))
+            if self._path is not None:
+                self._speed.value = float(self._path["speed"])
+            self._show(planned)
+        except InputError as error:
+            self._path = None
+            self._said.content = words.paragraph(words.refusal(error))
+
+    # What a user does --------------------------------------------------------------------------------------------
+
+    def _added(self, kind: str) -> None:
+        arm, path = self._arm(), self._known()
+        if kind == "start":
+            if path is not None and path["sections"]:
+                raise InputError(
+                    "this path has begun already", where=self._name(), cure="Remove its sections, or name another file."
+                )
+            position, rotation = arm.pose()
+            axis = None if self._kept.value == _FREE else _point(rotation[:, 2])
+            speed, tip = float(self._speed.value), arm.tip
+            self._path = new_path(_point(1e3 * position), speed, frame="base", target=tip, axis=axis)
+            self._first = None
+            self._say(self._path)
+            return
+        if path is None:
+            raise InputError("the path has no start yet", where=self._name(), cure="Go there, and press start.")
+        here = _point(1e3 * arm.pose("world" if path["frame"] == "world" else "base")[0])
+        if kind == "circle" and self._first is None:
+            self._first = here
+            self._say(path, "A circle through here: go to another point of it, and press circle again.")
+            return
+        points = [here] if self._first is None or kind != "circle" else [self._first, here]
+        self._first = None
+        self._write(with_section(path, "hermite" if kind == "waypoint" else kind, points))
+
+    def _done(self) -> None:
+        if self._do.value == "stop":
+            self._stop()
+        elif self._do.value == "play":
+            self._start()
+        else:
+            path = self._known()
+            left = None if path is None else without_last(path)
+            self._first = None
+            if left is not None and left["sections"]:
+                self._write(left)
+            elif path is not None and path["sections"]:
+                raise InputError("the only section of a file is not removed", where=self._name())
+            else:
+                self._path = None
+                self._said.content = words.paragraph(_NONE)
+
+    def _other_speed(self) -> None:
+        path = self._path
+        if path is not None:
+            self._path = with_speed(path, float(self._speed.value))
+            if path["sections"]:
+                self._write(self._path)
+
+    def _start(self) -> None:
+        window, arm = self._window, self._arm()
+        if not exists(window.project.path(self._name(), "path")):
+            raise InputError("there is no path to play", where=self._name(), cure="Give it a start and a section.")
+        window.start(
+            "Play the path",
+            played_path,
+            self._found,
+            folder=window.project.folder,
+            robot=arm.robot,
+            file=self._name(),
+            seed=arm.joints,
+        )
+
+    def _found(self, found: PlayedPath) -> None:
+        self._window.tell_lines("Path", found.outcome.lines)
+        self._play(found.motion)
+
+    # The file ----------------------------------------------------------------------------------------------------
+
+    def _name(self) -> str:
+        return self._window.project.settings.path or PATH
+
+    def _known(self) -> dict[str, Any] | None:
+        """Return the path that is made; None if there is none yet; a file that was not made here is not changed."""
+        file = self._window.project.path(self._name(), "path")
+        if exists(file) and (self._path is None or path_text(self._path) != read_text(file)):
+            raise InputError(
+                "this path was not made here, or was changed since, and is not changed",
+                where=self._name(),
+                cure="Name another file.",
+            )
+        return self._path
+
+    def _write(self, path: dict[str, Any]) -> None:
+        """Write the file, if it can be read again: a circle through points of a line is none."""
+        window, name = self._window, self._name()
+        file = window.project.path(name, "path")
+        before = read_text(file) if exists(file) else None
+        write_text(file, path_text(path))
+        try:
+            read_path(file)
+        except InputError:
+            if before is None:
+                file.unlink()
+            else:
+                write_text(file, before)
+            raise
+        finally:
+            window.project.look(name)
+        self._path = path
+        window.edit(path=name)
+        window.refresh()
+
+    def _show(self, planned: PlannedPath) -> None:
+        if self._path is None:
+            self._said.content = words.paragraph(f"Of another program: {', '.join(planned.kinds)}. It can be played.")
+        else:
+            self._say(self._path)
+        solid = self._scene.solid
+        if solid is not None:
+            at: Array = planned.trajectory.position
+            if planned.frame != "world":
+                at = at @ solid.robot.base.rotation.T + solid.robot.base.translation
+            self._scene.show_line("path", at, _LINE)
+
+    def _say(self, path: dict[str, Any], more: str = "") -> None:
+        self._said.content = words.lines(in_words(path)) + (words.paragraph(more) if more else "")
+
+
+_NONE: Final = "No path yet: go to where it starts, and press start."
+
+
+def _point(values: Array) -> Point:
+    x, y, z = np.asarray(values, float).tolist()
+    return x, y, z

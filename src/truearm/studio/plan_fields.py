@@ -1,0 +1,108 @@
+"""What a plan of measurements is asked for: the fields of the page Plan, as options of the command say them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from truearm.jobs.texts import read_region, read_seed, read_speed
+from truearm.units import sized_si
+
+_Text = Annotated[str, Field(min_length=1)]
+_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+#: How many candidates the job draws where nothing is said.
+_CANDIDATES: Final = 5000
+
+
+class PlanFields(BaseModel):
+    """The entry ``plan`` of a project file: names are parameters of :func:`truearm.plan`.
+
+    Texts and lengths are as the command takes them, in mm, deg, percent and s. What is None is not said.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    poses: _Text = "60"
+    candidates_from: _Text | None = None
+    objective: _Text | None = None
+    accurate_at: _Text | None = None
+    region: _Text | None = None
+    model: _Text = "geometric"
+    candidates: Annotated[int, Field(strict=True, ge=1)] = 1000
+    device: _Text | None = None
+    noise: _Number = 0.1
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    floor: _Number | None = None
+    no_floor: bool = False
+    clearance: _Number | None = None
+    home: _Text | None = None
+    program: _Text | None = None
+    approach: bool = False
+    speed: _Text | None = None
+    dwell: _Number | None = None
+    wait: _Text | None = None
+    out: _Text | None = None
+
+    @property
+    def place(self) -> str:
+        """Where the plan is written in the project: a file, or a folder where a program drives it."""
+        return self.out or ("plan.csv" if self.program is None else "plan")
+
+    def said(self, cell: str | None, constraints: str | None, payload: str | None) -> dict[str, Any]:
+        """Return what is given to the command beside robot and poses, by the names of parameters, in its order.
+
+        Parameters
+        ----------
+        cell
+            File of tools and frames, given where the robot shall be accurate at the targets of a program.
+        constraints, payload
+            As the job takes them.
+        """
+        drawn = self.device is None and self.candidates_from is None
+        at_program = self.accurate_at is not None and not self.accurate_at.lower().endswith(".csv")
+        given = {
+            "candidates_from": self.candidates_from,
+            "objective": self.objective,
+            "accurate_at": self.accurate_at,
+            "region": self.region,
+            "tools": cell if at_program else None,
+            "frames": cell if at_program else None,
+            "model": None if self.model == "geometric" else self.model,
+            "candidates": self.candidates if drawn and self.candidates != _CANDIDATES else None,
+            "device": self.device,
+            "constraints": constraints,
+            "noise": None if self.noise == 0.1 else self.noise,
+            "seed": self.seed or None,
+            "payload": payload,
+            "floor": self.floor,
+            "no_floor": self.no_floor or None,
+            "clearance": self.clearance,
+            "home": self.home,
+            "program": self.program,
+            "approach": self.approach or None,
+            "speed": self.speed,
+            "dwell": self.dwell,
+            "wait": self.wait,
+        }
+        return {name: value for name, value in given.items() if value is not None}
+
+
+def plan_arguments(robot: str, said: dict[str, Any]) -> dict[str, Any]:
+    """Return what :func:`truearm.plan` takes of what its command is given: lengths in m, joints in rad or m.
+
+    Raises
+    ------
+    InputError
+        If a text or a length is none, with the parameter.
+    """
+    given = dict(said)
+    for name in ("noise", "floor", "clearance"):
+        if name in given:
+            given[name] = sized_si(given[name], "mm", parameter=name, deviation=name == "noise")
+    if "region" in given:
+        given["region"] = read_region(given["region"])
+    if "speed" in given:
+        given["speed"] = read_speed(given["speed"])
+    if "home" in given:
+        given["home"] = read_seed(robot, given["home"], None, "home")
+    return given

@@ -1,0 +1,155 @@
+"""Readings are excluded by a file, each with its reason: they count as missing, and the result tells of them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+from typer.testing import CliRunner
+
+from truearm.cli import app
+from truearm.errors import InputError
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.check import check
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.excluded import Exclusion, exclusions_text, read_exclusions, without_readings
+from truearm.measurement.readers.canonical import csv_text
+from truearm.measurement.statistics import errors_of
+
+DATA = campaign("irb120", 24, 0.05e-3, 4)[1]
+#: Of 24 configurations with the seed 0.
+HELD_OUT = [DATA.labels[c] for c in np.random.default_rng(0).permutation(24)[17:]]
+TRAINING = [label for label in DATA.labels if label not in HELD_OUT]
+
+
+@pytest.fixture
+def csv(tmp_path: Path) -> Path:
+    """Measurements in which one reading of the held-out part is 3 mm off."""
+    position = DATA.position.copy()
+    (row,) = _rows(DATA, HELD_OUT[0], "2")
+    position[row] += [0.003, 0.0, 0.0]
+    path = tmp_path / "data.csv"
+    path.write_text(csv_text(replace(DATA, position=position)))
+    return path
+
+
+def _rows(data: Dataset, configuration: str, target: str) -> list[int]:
+    return [
+        row
+        for row in range(len(data.target))
+        if (data.labels[data.configuration[row]], data.targets[data.target[row]]) == (configuration, target)
+    ]
+
+
+def _file(folder: Path, *rows: tuple[str, str, str]) -> Path:
+    path = folder / "excluded.csv"
+    path.write_text(exclusions_text(Exclusion(*row) for row in rows))
+    return path
+
+
+def test_excluded_readings_count_as_missing_and_the_split_stays(csv: Path, tmp_path: Path) -> None:
+    file = _file(tmp_path, (TRAINING[0], "1", "beam, broken"), (HELD_OUT[0], "2", "touched"))
+    found = calibrate("irb120", csv, model="offsets", exclude=file, out=tmp_path / "result")
+    plain = calibrate("irb120", csv, model="offsets")
+    assert np.array_equal(found.held_out, plain.held_out)
+    position = DATA.position.copy()
+    position[_rows(DATA, TRAINING[0], "1")] = np.nan
+    emptied = calibrate("irb120", replace(DATA, position=position), model="offsets")
+    for name, value in emptied.fit.robot.values.items():
+        assert found.fit.robot.values[name] == pytest.approx(value, abs=1e-7)
+
+    said = "Excluded: 2 readings (1 of the training part, 1 of the held-out part): beam, broken (1), touched (1)"
+    assert said in found.lines()
+    assert " 2 readings excluded, redundancy" in found.history
+    assert f"exclude='{file}'" in found.command
+    rows = json.loads((tmp_path / "result" / "result.json").read_text())["excluded"]
+    assert [(row["configuration"], row["reason"], row["part"]) for row in rows] == [
+        (TRAINING[0], "beam, broken", "training"),
+        (HELD_OUT[0], "touched", "held out"),
+    ]
+    assert f"{HELD_OUT[0]}/2 (held out): touched" in (tmp_path / "result" / "report.html").read_text()
+    assert "excluded" not in plain.summary()
+
+
+def test_who_excludes_from_the_held_out_part_is_told_what_it_is_worth_with_them(csv: Path, tmp_path: Path) -> None:
+    file = _file(tmp_path, (HELD_OUT[0], "2", "looks wrong"))
+    found = calibrate("irb120", csv, model="offsets", exclude=file)
+    (told,) = [one for one in found.warnings if one.code == "held-out-excluded"]
+    assert told.level == "warning"
+    assert "1 reading of the held-out part is excluded: looks wrong (1)." in told.message
+    whole = calibrate("irb120", csv, model="offsets")
+    with_it = errors_of(found.fit.robot, whole.data.of_configurations(whole.held_out)).position
+    assert with_it is not None
+    assert found.validation is not None
+    assert found.validation.position is not None
+    assert f"With it the held-out errors are {with_it.mean * 1e3:.3f} mm on average" in told.message
+    assert f"{with_it.max * 1e3:.3f} mm at most; without it {found.validation.position.mean * 1e3:.3f}" in told.message
+    only_training = _file(tmp_path, (TRAINING[0], "2", "beam broken"))
+    fit = calibrate("irb120", csv, model="offsets", exclude=only_training)
+    assert "held-out-excluded" not in [one.code for one in fit.warnings]
+
+
+def test_what_stands_in_a_configuration_that_is_left_out_belongs_to_no_part(csv: Path, tmp_path: Path) -> None:
+    file = _file(tmp_path, ("3", "2", "beam broken"))
+    found = calibrate("irb120", csv, model="offsets", exclude=file, without=["3"])
+    assert "Excluded: 1 reading (1 of configurations that are left out): beam broken (1)" in found.lines()
+
+
+def test_what_is_excluded_is_no_longer_found_and_counted(csv: Path, tmp_path: Path) -> None:
+    before = check("irb120", csv)
+    assert "outliers" in [one.code for one in before.warnings]
+    file = _file(tmp_path, (HELD_OUT[0], "2", "touched"))
+    done = CliRunner().invoke(app, ["check", "irb120", str(csv), "--exclude", str(file), "--json"])
+    found = {one["code"]: one for one in json.loads(done.stdout)["warnings"]}
+    assert "outliers" not in found
+    assert found["excluded"]["level"] == "note"
+    assert "1 reading is excluded: touched (1). Excluded readings count as missing." in found["excluded"]["message"]
+    assert "falsifies the proof" in found["excluded"]["message"]
+    words = ["calibrate", "irb120", str(csv), "--model", "offsets", "--exclude", str(file), "--json"]
+    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "r")])
+    assert json.loads(done.stdout)["excluded"][0]["part"] == "held out"
+
+
+def test_one_of_several_visits_and_reference_points_are_excluded(tmp_path: Path) -> None:
+    twice = Dataset.of(np.zeros((2, 6)), np.ones((2, 1, 3)), configurations=["a", "b"])
+    double = replace(twice.of_readings([0, 0, 1]), visit=np.array([1, 2, 1]), references=twice.of_readings([0, 1]))
+    assert double.references is not None
+    named = replace(double, references=replace(double.references, targets=("nest",)))
+    made, counts = without_readings(named, [Exclusion("a", "1", "x", visit="2"), Exclusion("b", "nest", "y")])
+    assert np.isnan(made.position[:, 0]).tolist() == [False, True, False]
+    assert made.references is not None
+    assert np.isnan(made.references.position[:, 0]).tolist() == [False, True]
+    assert counts == (1, 1)
+    assert without_readings(named, [Exclusion("a", "1", "x")])[1] == (2,)
+    text = exclusions_text([Exclusion("a", "1", "x", visit="2"), Exclusion("b", "nest", "y")])
+    assert text == "configuration,target,reason,visit\na,1,x,2\nb,nest,y,\n"
+    path = tmp_path / "excluded.csv"
+    path.write_text(text)
+    assert exclusions_text(read_exclusions(path)) == text
+    path.write_text(exclusions_text([]))
+    assert read_exclusions(path) == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("configuration,target\n1,1\n", "line 1: the column reason is missing"),
+        ("configuration,target,reason,why\n1,1,x,y\n", "line 1: the column is not known; got 'why'"),
+        ("configuration,target,reason,reason\n1,1,x,y\n", "line 1: the column reason appears twice"),
+        ("configuration,target,reason\n1,1,\n", "line 2, column reason: the cell is empty"),
+        ("configuration,target,reason\n1,1,x\n1,1,y\n", "line 3: this reading is excluded twice"),
+        ("configuration,target,reason\n241,1,x\n", "line 2: there is no configuration of this name; got '241'"),
+        ("configuration,target,reason\n1,tip,x\n", "line 2: there is no target of this name; got 'tip'"),
+        ("configuration,target,reason,visit\n1,1,x,2\n", "line 2: nothing was read there"),
+    ],
+)
+def test_files_that_exclude_nothing_that_was_read_are_refused(text: str, what: str, csv: Path, tmp_path: Path) -> None:
+    path = tmp_path / "excluded.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=rf"excluded\.csv, {what}") as told:
+        check("irb120", csv, exclude=path)
+    assert told.value.parameter == "exclude"

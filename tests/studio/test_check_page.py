@@ -1,0 +1,159 @@
+"""The page Check: findings in the scene, and readings that are excluded and restored."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+from tests.studio.conftest import Serving
+from tests.studio.pressing import act, at_once, notices
+
+from truearm.errors import InputError
+from truearm.jobs import following
+from truearm.jobs.calibrate import calibrate
+from truearm.measurement.readers.canonical import csv_text
+from truearm.notices import Notice
+from truearm.studio.checked import Checked
+from truearm.studio.pages.calibrate import CalibratePage
+from truearm.studio.pages.check import CheckPage
+from truearm.studio.pages.jog import JogPage
+from truearm.studio.pages.proof import ProofPage
+from truearm.studio.tasks import Outcome
+from truearm.studio.window import Window
+
+TWIN, DATA = campaign("irb120", 24, 0.05e-3, 4)
+
+
+@pytest.fixture
+def window(serving: Serving, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Window:
+    """A project in which one reading of configuration 3 is 5 mm off."""
+    folder = tmp_path / "project"
+    folder.mkdir()
+    position = DATA.position.copy()
+    position[7] += [0.005, 0.0, 0.0]
+    (folder / "data.csv").write_text(csv_text(replace(DATA, position=position)))
+    (folder / "truearm-studio.yaml").write_text(
+        "truearm: truearm-studio/1\nrobot: irb120\ndata: data.csv\nmodel: offsets\n"
+    )
+    window = serving(folder).window
+    at_once(window, monkeypatch)
+    return window
+
+
+def page_of(window: Window) -> tuple[CheckPage, JogPage]:
+    (page,) = (page for page in window.pages if isinstance(page, CheckPage))
+    (jog,) = (page for page in window.pages if isinstance(page, JogPage))
+    return page, jog
+
+
+def test_a_finding_shows_its_readings_where_they_were_read(window: Window) -> None:
+    page, jog = page_of(window)
+    act(page._run)
+    assert page._finding.value == "1. warning outliers"
+    assert page._reading.options == ("(all of them)", "3/2")
+    (drawn,) = jog.scene._parts["finding"]
+    # In the base frame of the drawn arm, though the instrument stands elsewhere.
+    base = TWIN.robot.base
+    expected = (DATA.position[7] + [0.005, 0.0, 0.0] - np.array(base.translation)) @ base.rotation
+    assert drawn.points[0] == pytest.approx(expected, abs=3e-3)
+    assert len(jog.scene._parts["readings"][0].points) == len(DATA.position) - 1
+    act(page._arm)
+    assert jog.jogging is not None
+    assert jog.jogging.joints == pytest.approx(DATA.joints[2])
+    act(page._finding, "(any reading)")
+    act(page._reading, "24/3")
+    assert "1 reading chosen" in page._drawn.content
+    assert len(jog.scene._parts["finding"][0].points) == 1
+    act(page._draws, False)
+    assert jog.scene._parts["finding"] == jog.scene._parts["readings"] == []
+
+
+def test_readings_are_excluded_with_a_reason_undone_and_restored(window: Window) -> None:
+    page, jog = page_of(window)
+    file = window.project.folder / "excluded.csv"
+    act(page._run)
+    act(page._exclude)
+    assert "a reading is excluded for a reason" in notices(window)
+    assert not file.exists()
+    page._reason._impl.value = " beam\n broken "
+    act(page._exclude)
+    assert file.read_text() == "configuration,target,reason\n3,2,beam broken\n"
+    assert window.project.settings.exclude == "excluded.csv"
+    assert "Exclusions have changed: check again." in page._found.content
+    assert "beam broken" in page._table.content
+    assert len(jog.scene._parts["excluded"][0].points) == 1
+    assert jog.scene._parts["finding"] == []
+    window._undo_edit()
+    assert not file.exists()
+    assert window.project.settings.exclude is None
+    assert jog.scene._parts["excluded"] == []
+    window._redo_edit()
+    assert "3,2,beam broken" in file.read_text()
+    act(page._run)
+    assert "(outliers)" not in page._found.content
+    assert "1 reading is excluded: beam broken (1)." in page._found.content
+    act(page._restore)
+    assert file.read_text() == "configuration,target,reason\n"
+    assert window.project.changes() == ()
+    file.write_text("configuration,target,reason\n1,1,by another program\n")
+    with pytest.raises(InputError, match="another program has changed this file, and it is not overwritten"):
+        window.project.undo()
+    window.refresh()
+    assert "by another program" in page._table.content
+
+
+def test_a_calibration_is_without_what_is_excluded_and_says_so(
+    window: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(following, "_TIME", 1e9)  # however slow this computer is, every step is told
+    page, _ = page_of(window)
+    (calibrating,) = (page for page in window.pages if isinstance(page, CalibratePage))
+    (proof,) = (page for page in window.pages if isinstance(page, ProofPage))
+    act(page._run)
+    page._reason._impl.value = "beam broken"
+    act(page._exclude)
+    act(calibrating._run)
+    folder = window.project.folder
+    command = "truearm calibrate irb120 data.csv --model offsets --exclude excluded.csv --out DIR"
+    calibrate(
+        "irb120",
+        folder / "data.csv",
+        model="offsets",
+        exclude=folder / "excluded.csv",
+        out=tmp_path / "r",
+        command=command,
+    )
+    assert (folder / "result/calibrated.yaml").read_bytes() == (tmp_path / "r/calibrated.yaml").read_bytes()
+    assert "Excluded: 1 reading (1 of the " in calibrating._said.content
+    assert [step.number for step in calibrating._steps][:2] == [1, 2]
+    assert calibrating._steps[-1].error < calibrating._steps[0].error
+    assert calibrating._course.place.visible
+    assert "other readings than those that are excluded now" not in proof._notices.content
+    act(page._restore)
+    assert "other readings than those that are excluded now" in proof._notices.content
+
+
+def test_where_nothing_is_wrong_nothing_is_drawn_before_it_is_asked_for(window: Window) -> None:
+    page, jog = page_of(window)
+    (window.project.folder / "data.csv").write_text(csv_text(DATA))
+    act(page._run)
+    assert (page._finding.value, page._draws.value) == ("(any reading)", False)
+    assert jog.scene._parts.get("readings", []) == []
+    act(page._draws, True)
+    assert len(jog.scene._parts["readings"][0].points) == len(DATA.position) - 1
+    page._reason._impl.value = "beam broken"
+    act(page._exclude)
+    window.edit(robot="irb1600")
+    assert not page._readings.visible
+    assert jog.scene._parts["excluded"] == []
+
+
+def test_readings_without_a_place_are_chosen_and_not_drawn() -> None:
+    readings = (("1", "a"), ("1", "b"), ("2", "a"))
+    found = Checked(Outcome(()), (), readings, np.full((3, 3), np.nan), np.zeros((3, 6)))
+    assert found.rows_of((("1", ""),)).tolist() == [0, 1]
+    assert found.rows_of((("2", "a"), ("9", "z"))).tolist() == [2]
+    assert Notice("x", "y") == Notice("x", "y", at=(("1", "a"),))

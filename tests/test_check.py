@@ -301,6 +301,17 @@ def test_one_target_a_configuration_is_a_campaign() -> None:
     assert missing.message.startswith("90 readings are missing (1 29, 2 31, 3 30). They are left out;")
 
 
+def test_configurations_that_are_off_are_not_called_nothing_wrong() -> None:
+    _, data = campaign("irb120", 30, 0.05e-3, 17)
+    joints = data.joints.copy()
+    joints[7, 1] += np.radians(0.05)
+    found = check("irb120", replace(data, joints=joints))
+    assert not found.warnings
+    assert found.next[0].code == "measure-again"
+    assert found.lines()[1] == "Nothing looks wrong but the configurations named next."
+    assert check("irb120", data).lines()[1] == "Nothing looks wrong."
+
+
 def test_messages_count_in_words() -> None:
     _, data = campaign("irb120", 10, 0.05e-3, 17)
 
@@ -313,7 +324,10 @@ def test_messages_count_in_words() -> None:
     assert far.startswith("1 reading is far from where it must be (configuration/target): 2/2 (")
     assert far.endswith("Measure it again or leave it out; `loss=cauchy` lets it count little.")
     (wrong,) = told(moved_readings(data, np.array([4]), np.array([0.3, 0.0, 0.0])))
-    assert wrong.startswith("1 reading was taken from another point than it names (configuration/target): 2/2 (")
+    assert wrong.startswith("1 reading is far from where it must be (configuration/target): 2/2 (")
+    elsewhere = data.position[5] - data.position[4]
+    (wrong,) = told(moved_readings(data, np.array([4]), elsewhere))
+    assert wrong.startswith("1 reading was taken from another point than it names (configuration/target): 2/")
     again = np.append(np.arange(30), 4)
     copied = replace(
         data,

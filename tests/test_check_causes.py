@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.solving.fit import Status
+from truearm.identification.judging.far_off import too_few_numbers
+from truearm.identification.solving.fit import Status, identify
+from truearm.identification.solving.models import named_model
 from truearm.jobs.calibrate import calibrate
 from truearm.jobs.check import check
 from truearm.library import load_robot
@@ -196,6 +198,52 @@ def test_joint_positions_of_another_row_are_told() -> None:
     joints[4] = joints[9]
     (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
     assert notice.code == "joints-repeated"
+
+
+def test_joint_positions_that_belong_to_no_row_are_told_and_not_their_readings() -> None:
+    data = honest()
+    joints = data.joints.copy()
+    joints[4, 2] += np.radians(10.0)
+    wrong = replace(data, joints=joints)
+    (notice,) = check(ROBOT, wrong).warnings
+    assert (notice.code, notice.level) == ("joints-mistaken", "warning")
+    assert notice.message.startswith("The joint positions of configuration 5 (")
+    assert "do not belong to their readings" in notice.message
+    assert "narrow-data" not in {n.code for n in calibrate(ROBOT, wrong, train=18).warnings}
+    (notice,) = check(ROBOT, one_target_of(wrong)).warnings
+    assert notice.code == "outliers"
+    assert notice.message.startswith("1 reading is far from where it must be (configuration/target): 5/1 (")
+
+
+def one_target_of(data: Dataset) -> Dataset:
+    return replace(data.of_readings(data.target == 0), targets=data.targets[:1])
+
+
+@pytest.mark.parametrize("of_one", [False, True])
+def test_rows_in_another_unit_of_angle_are_told(of_one: bool) -> None:
+    data = one_target_of(honest()) if of_one else honest()
+    joints = data.joints.copy()
+    joints[[2, 6]] *= np.pi / 180
+    (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
+    assert (notice.code, notice.level) == ("unit-angle", "error")
+    assert "radians are called deg, at some configurations alone (3, 7)" in notice.message
+
+
+def test_a_reading_far_off_is_blamed_once_and_no_good_one_with_it() -> None:
+    data = honest()
+    position = data.position.copy()
+    position[[12, 13]] += np.array([0.05, 0.0, 0.0])
+    (notice,) = check(ROBOT, replace(data, position=position)).warnings
+    assert notice.code == "outliers"
+    assert "2 readings are far from where they must be (configuration/target): 5/1 (49.9 mm off), 5/2" in notice.message
+
+
+def test_nothing_is_doubted_where_numbers_are_few() -> None:
+    few = campaign("fr3", 5, 0.05e-3, 8)[1]
+    assert too_few_numbers(identify(load_robot("fr3"), few, named_model("geometric"), loss="cauchy"), few)
+    position = few.position.copy()
+    position[4] += np.array([0.0, 2e-3, 0.0])
+    assert not check("fr3", one_target_of(replace(few, position=position))).warnings
 
 
 def renamed(data: Dataset, readings: list[int], name: str) -> Dataset:

@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
+from truearm.identification.judging.implausible import implausible
 from truearm.identification.judging.orientation_slips import orientation_slips
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import named_model
 from truearm.jobs.calibrate import calibrate
+from truearm.jobs.check import check
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.mapping_entries import AnglesEntry
@@ -133,3 +137,76 @@ def test_orientations_that_nothing_explains_are_given_no_name() -> None:
             np.arange(6)
         )
         assert not orientation_slips(nominal, few)
+
+
+# -- single rows ---------------------------------------------------------------------------------------------
+
+
+@cache
+def one_target() -> Dataset:
+    return replace((data := with_orientations(ROBOT, 20, 5)).of_readings(data.target == 0), targets=("1",))
+
+
+def turned(rows: list[int], R: np.ndarray) -> Dataset:
+    """Return the data with other orientations at some rows."""
+    data = one_target()
+    quaternion = np.array(data.quaternion)
+    quaternion[rows] = quaternion_from_rotation(R)
+    return replace(data, quaternion=quaternion)
+
+
+def orientations(rows: list[int]) -> np.ndarray:
+    return np.asarray(rotation_from_quaternion(np.asarray(one_target().quaternion)[rows]))
+
+
+def test_a_single_orientation_that_is_off_is_doubted_and_not_its_position() -> None:
+    data = turned([4], orientations([4]) @ rotation_from_vector(np.radians([[1.0, 2.0, -2.0]])))
+    found = check(ROBOT, data)
+    (notice,) = found.warnings
+    assert (notice.code, notice.level) == ("orientation-outliers", "warning")
+    assert notice.message.startswith(
+        "1 orientation is far off, and the positions are not (configuration/target): 5/1 (2.99 deg)"
+    )
+    assert [step.code for step in found.next] == ["see-warning", "calibrate"]
+    run = calibrate(ROBOT, data, train=15)
+    codes = {notice.code for notice in run.warnings}
+    assert "orientation-outliers" in codes
+    assert not codes & {"narrow-data", "residuals-exceed-sigma"}
+    assert [step.code for step in run.next] == ["see-warning"]
+
+
+def test_a_turn_about_the_axis_of_a_joint_through_the_target_may_be_the_joint() -> None:
+    robot = load_robot(ROBOT)
+    joints = robot.random_configurations(20, np.random.default_rng(0))
+    position, R = robot.forward(joints)
+    noise = np.random.default_rng(1).normal(0.0, 1e-4, (2, 20, 3))
+    R[3] = R[3] @ rotation_from_vector(np.array([[0.0, 0.0, 0.2]]))[0]
+    quaternion = quaternion_from_rotation(R @ rotation_from_vector(noise[1]))
+    (notice,) = check(ROBOT, Dataset.of(joints, position + noise[0], quaternions=quaternion)).warnings
+    assert notice.code == "orientation-outliers"
+    assert "(11.5 deg, as if joint 6 were)" in notice.message
+
+
+def test_rows_of_another_convention_are_named_beside_one_that_is_off() -> None:
+    rows = [2, 5, 9]
+    numbers = about(angles(orientations(rows)), "xyz")
+    off = orientations([12]) @ rotation_from_vector(np.radians([[10.0, -20.0, 5.0]]))
+    order, single = check(ROBOT, turned([*rows, 12], np.concatenate([numbers, off]))).warnings
+    assert (order.code, order.level) == ("orientation-order", "error")
+    assert "(configuration/target): 3/1, 6/1, 10/1." in order.message
+    assert "not angles about xyz of moving axes but angles about zyx of moving axes" in order.message
+    assert single.code == "orientation-outliers"
+    assert "13/1" in single.message
+    (inverse,) = check(ROBOT, turned([7], np.swapaxes(orientations([7]), 1, 2))).warnings
+    assert (inverse.code, inverse.level) == ("quaternion-order", "error")
+
+
+def test_noise_of_orientations_that_was_declared_is_allowed() -> None:
+    data, rng = one_target(), np.random.default_rng(3)
+    noise = rotation_from_vector(rng.normal(0.0, 0.1, (20, 3)))
+    noisy = turned([*range(20)], orientations([*range(20)]) @ noise)
+    declared = replace(noisy, sigma_rot=np.full(20, 0.1))
+    assert not check(ROBOT, declared).warnings
+    fit = identify(load_robot(ROBOT), replace(data, quaternion=noisy.quaternion), named_model("geometric"))
+    assert "half of the orientations are off" in str(implausible(fit, noisy))
+    assert implausible(fit, declared) is None

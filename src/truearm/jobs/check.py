@@ -82,7 +82,7 @@ def notices_of(data: Dataset, robot: Robot, *, steady: Dataset) -> tuple[Notice,
 def _compared(
     data: Dataset, robot: Robot | None, device: str | None = None, *, steady: Dataset | None = None
 ) -> tuple[tuple[Notice, ...], Fit | None, Dataset | None]:
-    """Return one notice for each kind of fault, and a robust fit of the robot with the readings it was made from.
+    """Return one notice for each kind of fault, a robust fit of the robot, and what is believed of its readings.
 
     Parameters
     ----------
@@ -98,9 +98,10 @@ def _compared(
     part = thinned(still, len(robot.parameters), limit("derivatives") // 2)
     if part is None:
         return (*ranged, *check_data(data), _too_seldom(data)), None, None
-    against, suspects, fit = check_against(robot, part)
+    against = check_against(robot, part)
     left_out = () if part is still else (_in_part(part, still),)
-    return (*ranged, *check_data(data, suspects), *against, *left_out), fit, part
+    notices = (*ranged, *check_data(data, against.suspects), *against.notices, *left_out)
+    return notices, against.fit, against.believed
 
 
 def _too_seldom(data: Dataset) -> Notice:

@@ -18,17 +18,19 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.inclinometer import Inclinations
 from truearm.measurement.places import constellation, places_of
 from truearm.measurement.repeats import check_duplicates, repeated_joints, repeated_joints_notices
-from truearm.measurement.rigid_tool import DEVIATIONS, OTHER_REFLECTOR, SAME_POINT, UNMOVED, Suspect, rigid_suspects
+from truearm.measurement.rigid_tool import DEVIATIONS, SAME_POINT, UNMOVED, Suspect, rigid_suspects
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_columns import COLUMN
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.shown import counted
+from truearm.shown import counted, millimetres
 
 #: Temperatures of working arms [degC].
 _COLDEST: Final = -30.0
 _WARMEST: Final = 80.0
 _MOST_NAMED: Final = 6
+#: A reference point that is so far off at one configuration alone did not move, but was misread [m].
+_FAR: Final = 0.02
 #: A target read at this share of the configurations at most may be another one's misspelt name.
 _FEW_SHARE: Final = 0.1
 #: A target read at this share of the configurations or more is one that is always read.
@@ -41,14 +43,16 @@ def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list
     Parameters
     ----------
     suspects
-        Readings that are doubted for another reason as well, reported together with those found here.
+        Readings that a robot doubts. At their configurations it tells which reading is wrong better than distances do.
     """
     found = [*_misnamed(data), *_missing(data), *check_duplicates(data)]
     pairs = repeated_joints(data)
     known = {label for pair in pairs for label in pair}
     doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
     found += repeated_joints_notices(data, pairs)
-    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *doubted])
+    told = {suspect.configuration for suspect in doubted}
+    rigid = [suspect for suspect in rigid_suspects(data) if suspect.configuration not in told]
+    found += suspect_notices([*rigid, *reference_suspects(data), *doubted])
     return found + _moved(data) + _temperatures(data)
 
 
@@ -101,7 +105,13 @@ def check_range(data: Dataset, device: Ranged) -> list[Notice]:
 
 
 def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
-    """Return one notice for each kind of suspicion."""
+    """Return one notice for each kind of suspicion; of a reading the one that says most.
+
+    Parameters
+    ----------
+    suspects
+        What was found, of some readings more than once.
+    """
     advice = {
         "outliers": (
             "reading is far from where it must be",
@@ -122,16 +132,19 @@ def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
             "Leave these cells empty, or measure them again.",
         ),
     }
+    told: dict[tuple[str, str], Suspect] = {}
+    for code in ("targets-swapped", "target-mistaken", "outliers"):
+        for one in suspects:
+            if one.code == code:
+                told.setdefault((one.configuration, one.target), one)
     notices = []
     for code, words in advice.items():
-        mine = list(dict.fromkeys(s for s in suspects if s.code == code))
-        distinct = {(s.configuration, s.target): s for s in reversed(mine)}
-        if distinct:
-            ordered = [s for s in mine if distinct.get((s.configuration, s.target)) is s]
-            what, cure = words[:2] if len(ordered) == 1 else words[2:]
-            named = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in ordered]
-            message = f"{len(ordered)} {what} (configuration/target): {_listed(named)}. {cure}"
-            notices.append(Notice(code, message, at=tuple((s.configuration, s.target) for s in ordered)))
+        mine = [s for s in dict.fromkeys(suspects) if s.code == code and told[s.configuration, s.target] == s]
+        if mine:
+            what, cure = words[:2] if len(mine) == 1 else words[2:]
+            named = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in mine]
+            message = f"{len(mine)} {what} (configuration/target): {_listed(named)}. {cure}"
+            notices.append(Notice(code, message, at=tuple((s.configuration, s.target) for s in mine)))
     return notices
 
 
@@ -172,9 +185,8 @@ def _mistaken_references(data: Dataset) -> list[tuple[int, int, Suspect]]:
         alone = bool(neighbours) and all(off[k, t] <= allowed for k in neighbours)
         if nearest and gaps[nearest] < SAME_POINT:
             found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], f"is {nearest}")))
-        elif alone and off[c, t] > OTHER_REFLECTOR:
-            words = f"{off[c, t] * 1e3:.0f} mm off"
-            found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], words)))
+        elif alone and off[c, t] > _FAR:
+            found.append((c, t, Suspect("outliers", data.labels[c], names[t], f"{millimetres(off[c, t])} mm off")))
     return found
 
 

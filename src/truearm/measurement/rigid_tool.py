@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.places import Places, grouped_medians, places_of
 from truearm.modeling.chain import Array
+from truearm.shown import millimetres
 
 Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
 
@@ -21,8 +22,6 @@ UNMOVED: Final = 1e-4
 DEVIATIONS: Final = 10.0
 #: A reading this close to another known point was taken from it [m].
 SAME_POINT: Final = 1e-3
-#: A reading this far off was taken from another reflector, even an unknown one [m].
-OTHER_REFLECTOR: Final = 0.02
 #: To how many of the next targets of a configuration distances are taken: of up to nine targets that is all of them.
 _PARTNERS: Final = 8
 #: So many of the distances of a wrong reading are off; across its error a distance hardly changes.
@@ -166,7 +165,7 @@ def _blamed(data: Dataset, distances: _Distances, c: int, known: dict[str, Array
 
 
 def suspect(point: Array, label: str, target: str, size: float, known: dict[str, Array]) -> Suspect:
-    """Say what a wrong reading is: another known point, another reflector, or an outlier.
+    """Say what a wrong reading is: another known point, or an outlier.
 
     Parameters
     ----------
@@ -183,9 +182,7 @@ def suspect(point: Array, label: str, target: str, size: float, known: dict[str,
     nearest = min(gaps, key=lambda name: gaps[name]) if gaps else None
     if nearest is not None and gaps[nearest] < SAME_POINT < size:
         return Suspect("target-mistaken", label, target, f"is {nearest}")
-    if size > OTHER_REFLECTOR:
-        return Suspect("target-mistaken", label, target, f"{size * 1e3:.0f} mm off")
-    return Suspect("outliers", label, target, f"{size * 1e3:.1f} mm off")
+    return Suspect("outliers", label, target, f"{millimetres(size)} mm off")
 
 
 def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:

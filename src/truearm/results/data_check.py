@@ -43,5 +43,12 @@ class DataCheck(Record):
         """Return what the command prints."""
         data = self.data
         text = [f"{data.source}: {data.configurations} configurations, targets {listed(data.targets)}"]
-        text += notice_lines(self.warnings) or ["Nothing looks wrong."]
+        text += notice_lines(self.warnings) or [self._clean]
         return text + [step.line for step in self.next]
+
+    @property
+    def _clean(self) -> str:
+        """What is said where nothing has a name; configurations may be off all the same."""
+        if any(step.gain is not None and step.code == "measure-again" for step in self.next):
+            return "Nothing looks wrong but the configurations named next."
+        return "Nothing looks wrong."

@@ -26,6 +26,8 @@ from truearm.notices import Notice
 LARGEST_SHARE_LEFT: Final = 0.01
 #: Angle that half of the measured orientations may be off by at most [rad].
 LARGEST_ANGLE_LEFT: Final = 0.1
+#: Deviations declared of orientations that are allowed beside it: half of such angles are below 1.5.
+_NOISE: Final = 2.0
 #: How far the geometry may have moved, as a root mean square over its free parameters [priors].
 LARGEST_MOVE: Final = 5.0
 #: How far a joint zero may have moved [rad]: marks are missed by a tooth of the gear, never by a quarter of a turn.
@@ -70,10 +72,13 @@ def implausible(fit: Fit, data: Dataset) -> str | None:
             f"{reach * 1e3:.0f} mm that the arm reaches (allowed: {LARGEST_SHARE_LEFT:g})"
         )
     turned = float(np.median(errors.orientation_norms)) if len(errors.orientation_norms) else 0.0
-    if turned > LARGEST_ANGLE_LEFT:
+    allowed = LARGEST_ANGLE_LEFT
+    if data.sigma_rot is not None and np.isfinite(data.sigma_rot[data.has_orientation]).any():
+        allowed += _NOISE * float(np.nanmedian(data.sigma_rot[data.has_orientation]))
+    if turned > allowed:
         return (
             f"half of the orientations are off by more than {math.degrees(turned):.3g} deg (allowed: "
-            f"{math.degrees(LARGEST_ANGLE_LEFT):.2g})"
+            f"{math.degrees(allowed):.2g})"
         )
     size = _geometry_moved(fit, data)
     if size > LARGEST_MOVE:

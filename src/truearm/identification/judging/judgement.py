@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
@@ -19,6 +20,8 @@ from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.next_steps import Judged, steps_after_fit, what_moved
 from truearm.identification.judging.off_configurations import off_configurations
 from truearm.identification.judging.one_sided import check_one_sided
+from truearm.identification.judging.orientation_slips import ORIENTATION_SLIPS
+from truearm.identification.judging.orientations_off import ORIENTATION_OUTLIERS
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.separate_visits import check_separate_visits
 from truearm.identification.judging.sigma import check_sigma, check_sigma_beside_joints
@@ -30,6 +33,10 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.notices import Notice, has_error
 from truearm.shown import counted
+
+#: Codes of wrong readings that pull a fit away, and losses that let them.
+_PULLING: Final = frozenset({ORIENTATION_OUTLIERS, *ORIENTATION_SLIPS, "joints-mistaken", "unit-angle"})
+_PULLED: Final = frozenset({"linear", "huber"})
 
 
 @dataclass(frozen=True)
@@ -98,8 +105,10 @@ def judge(
     doubted = has_error([*unlike, *wrong_robot, *noticed])
     if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
         explained = check_remainder(left_over)
+    # A fit that these pull away leaves much and expects much, whatever the model and wherever was measured.
+    bent = loss in _PULLED and any(notice.code in _PULLING for notice in noticed)
     narrow: list[Notice] = []
-    if not unlike and (hidden or not wrong_sigma):  # more configurations do not mend these
+    if not bent and not unlike and (hidden or not wrong_sigma):  # more configurations do not mend these
         if fit.model.groups and "geometry" not in fit.model.groups:
             narrow = check_narrow_data_without_geometry(fit, training, errors, loss, held_out=held_out)
         narrow = narrow or check_narrow_data(fit, expected, training, errors, held_out=held_out)
@@ -109,7 +118,7 @@ def judge(
         *wrong_robot,
         *of_split,
         *check_payload(fit.start),
-        *check_fit(fit, expected, doubted=doubted),
+        *(n for n in check_fit(fit, expected, doubted=doubted) if not bent or n.code != "residuals-exceed-sigma"),
         *narrow,
         *(notice for notice in noticed if notice.level != "error"),
         *check_one_sided(fit, training),
@@ -132,6 +141,7 @@ def judge(
             held_out,
             expected,
             training,
+            bent,
         )
     )
     return Judgement(expected, warnings, steps)

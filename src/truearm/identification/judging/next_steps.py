@@ -25,6 +25,7 @@ from truearm.identification.judging.narrow_data import (
 )
 from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
 from truearm.identification.judging.off_configurations import Off, off_configurations
+from truearm.identification.judging.orientations_off import ORIENTATION_OUTLIERS
 from truearm.identification.judging.step_words import about_change, measured_again, other_model
 from truearm.identification.judging.unmodelled import (
     GEOMETRY,
@@ -70,6 +71,7 @@ _CURED_FIRST: Final = (
     "targets-swapped",
     "target-mistaken",
     "joints-mistaken",
+    ORIENTATION_OUTLIERS,
     "outliers",
     "joints-not-settled",
     "joints-rounded",
@@ -112,6 +114,8 @@ class Judged:
         Error to expect over the workspace.
     training
         The readings that the fit was made from.
+    bent
+        Whether wrong readings, of which a notice says which, pulled the fit away.
     """
 
     left: LeftOver
@@ -123,6 +127,7 @@ class Judged:
     held_out: bool
     expected: ExpectedError
     training: Dataset
+    bent: bool = False
 
 
 def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
@@ -130,6 +135,8 @@ def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
     first = _to_mend(judged.notices)
     if judged.status in (Status.NOT_CONVERGED, Status.IMPLAUSIBLE):
         first = first or [NextStep("mend-data", judged.status.advice)]
+    if judged.bent and any(notice.code == ORIENTATION_OUTLIERS for notice in judged.notices):
+        first = first or _cures([n for n in judged.notices if n.code == ORIENTATION_OUTLIERS], [])
     if first:
         return tuple(first)
     left, known = judged.left, _known(judged.errors)

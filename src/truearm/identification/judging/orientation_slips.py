@@ -15,6 +15,7 @@ from itertools import product
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.identification.start_values.frames import initial_frames
 from truearm.measurement.dataset import Dataset, IntArray
@@ -37,6 +38,10 @@ _AS_GOOD: Final = 1.5
 _MOST_TOLD: Final = 3
 #: Fewer orientations agree with one of so many ways by chance.
 _FEWEST: Final = 6
+#: Of single rows, where it is known how they should turn, so few.
+_FEWEST_ROWS: Final = 2
+#: And so many times nearer than they came.
+_IMPROVEMENT_OF_ROWS: Final = 10.0
 _ORDERS: Final = tuple("".join(axes) for axes in product("xyz", repeat=3) if axes[0] != axes[1] != axes[2])
 #: Conventions that controllers and instruments write most often; None is a rotation vector.
 _COMMON: Final = frozenset({"zyx moving", "xyz moving", "zyz moving", "zxz moving", "xyz fixed", "zyx fixed", None})
@@ -153,6 +158,67 @@ def _squares_off(R: Array) -> float:
 def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]:
     """Say as what the numbers of the orientations agree with the robot's, if they do as another convention's."""
     tried = []
+    for rare, words, ways in _other_conventions(turned):
+        left = readings.left(*ways)
+        if left <= _EXPLAINED_WITHIN and left * _LEAST_IMPROVEMENT <= given:
+            tried.append((rare, left, words))
+    least = min((left for _, left, _ in tried), default=0.0)
+    told = [words for _, left, words in sorted(tried) if left <= _AS_GOOD * least]
+    if not told:
+        return []
+    return [
+        Notice(
+            "orientation-order",
+            "The orientations do not turn as the robot does, and would if their three numbers were read otherwise: "
+            f"{_first_of(told)}. Mend the mapping, or whatever made quaternions of them.",
+            "error",
+        )
+    ]
+
+
+def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], str, str]:
+    """Return which single orientations turn as they should when they are read otherwise, the code, and how in words.
+
+    Of all ways the one is taken that explains most of them: it must explain two, or one by the order of a quaternion.
+
+    Parameters
+    ----------
+    read
+        Quaternions as they came, ``(rows, 4)``.
+    predicted
+        How they should turn, ``(rows, 3, 3)``.
+    """
+    turned = rotation_from_quaternion(read)
+    allowed = np.minimum(_EXPLAINED_WITHIN, _angles_between([turned], predicted) / _IMPROVEMENT_OF_ROWS)
+    of_numbers = [(0, words, [rotation_from_quaternion(mended)]) for words, mended in _of_numbers(read)]
+    for code, fewest, ways in (
+        ("quaternion-order", 1, of_numbers),
+        ("orientation-order", _FEWEST_ROWS, _other_conventions(turned)),
+    ):
+        tried = []
+        for rare, words, turns in ways:
+            off = _angles_between(turns, predicted)
+            explained = off <= allowed
+            if explained.sum() >= fewest:
+                left = float(np.sqrt(np.mean(off[explained] ** 2)))
+                tried.append((-int(explained.sum()), rare, left, words, explained))
+        if tried:
+            most = [one for one in tried if one[0] == min(count for count, *_ in tried)]
+            least = min(left for _, _, left, _, _ in most)
+            told = sorted((rare, left, words) for _, rare, left, words, _ in most if left <= _AS_GOOD * least)
+            which = next(explained for *_, words, explained in most if words == told[0][2])
+            return which, code, _first_of([words for *_, words in told])
+    return np.zeros(len(read), dtype=bool), "", ""
+
+
+def _other_conventions(turned: Array) -> Iterator[tuple[int, str, list[Array]]]:
+    """Try each way to write three numbers as the one that was taken with each other one as the one that was meant.
+
+    Yields
+    ------
+    How many of both are rare, what happened in words, and the rotations that were meant, ``(rows, 3, 3)``: one way, or
+    two of which one is right in each row.
+    """
     for taken in (*_ORDERS, None):
         ways = _vectors(turned) if taken is None else _moving_angles(turned, taken)
         for factor in (1.0, 180.0 / np.pi):
@@ -162,30 +228,22 @@ def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]
                 alike = taken is not None and meant is not None and _is_proper(taken) == _is_proper(meant)
                 for read in _as_read(taken, meant):
                     columns = slice(None, None, -1) if read is not None and read.endswith("fixed") else slice(None)
-                    left = readings.left(
-                        *(_rotations(numbers[:, columns] * factor, meant) for numbers in (ways[:1] if alike else ways))
-                    )
-                    if left <= _EXPLAINED_WITHIN and left * _LEAST_IMPROVEMENT <= given:
-                        rare = (read not in _COMMON, meant not in _COMMON)
-                        tried.append((left, sum(rare), _in_words(read, meant, factor != 1.0)))
-    least = min((left for left, *_ in tried), default=0.0)
-    told = [
-        words
-        for _, left, words in sorted((rare, left, words) for left, rare, words in tried)
-        if left <= _AS_GOOD * least
-    ]
-    if not told:
-        return []
+                    rare = (read not in _COMMON, meant not in _COMMON)
+                    numbers = [n[:, columns] * factor for n in (ways[:1] if alike else ways)]
+                    yield sum(rare), _in_words(read, meant, factor != 1.0), [_rotations(n, meant) for n in numbers]
+
+
+def _first_of(told: list[str]) -> str:
+    """Return the first ways in words, and how many more there are."""
     more = len(told) - _MOST_TOLD
     beyond = f"; or in {more} other ways, which these configurations do not tell apart" if more > 0 else ""
-    return [
-        Notice(
-            "orientation-order",
-            "The orientations do not turn as the robot does, and would if their three numbers were read otherwise: "
-            f"{'; or '.join(told[:_MOST_TOLD])}{beyond}. Mend the mapping, or whatever made quaternions of them.",
-            "error",
-        )
-    ]
+    return f"{'; or '.join(told[:_MOST_TOLD])}{beyond}"
+
+
+def _angles_between(ways: list[Array], predicted: Array) -> Array:
+    """Return how far rotations are from those predicted [rad], ``(rows,)``; of several ways by the nearest."""
+    gaps = [np.linalg.norm(rotation_vector(np.swapaxes(predicted, 1, 2) @ turned), axis=1) for turned in ways]
+    return np.asarray(np.min(gaps, axis=0))
 
 
 def _as_read(taken: str | None, meant: str | None) -> list[str | None]:

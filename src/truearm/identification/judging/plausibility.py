@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from itertools import combinations
 from typing import Final
@@ -11,36 +12,27 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.judging.far_off import allowed_off, far_off, often_off, too_few_numbers
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.joint_rounding import check_rounding
 from truearm.identification.judging.orientation_slips import ORIENTATION_SLIPS
+from truearm.identification.judging.orientations_off import check_orientations, orientations_off, without_orientations
 from truearm.identification.judging.slips import off_by, slips_by_fit, slips_in_lengths, slips_in_positions
 from truearm.identification.judging.wrong_robot import check_robot, other_robot
 from truearm.identification.solving.fit import Fit, identify, place
 from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
 from truearm.identification.start_values.from_readings import start_from_readings
-from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
-from truearm.measurement.places import places_of
-from truearm.measurement.rigid_tool import Suspect, Suspicion, fixed_points, suspect
+from truearm.measurement.rigid_tool import Suspect
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.shown import listed
 from truearm.units import from_si
 
-#: A reading is doubted beyond this many median residuals, and at least so far off [m].
-_OUTLIER_RATIO: Final = 20.0
-_LEAST_OUTLIER: Final = 1e-3
-#: Many readings are doubted together beyond so many median residuals, and at least so far off [m]; at least so many
-#: readings, and this share of them.
-_OFTEN_RATIO: Final = 6.0
-_LEAST_OFTEN: Final = 5e-5
-_FEWEST_OFTEN: Final = 4
-_OFTEN_SHARE: Final = 0.05
 #: Two targets are one point if they are nearer each other than this [m], or than so many deviations.
 _SAME_TARGET: Final = 5e-5
 _SAME_DEVIATIONS: Final = 4.0
@@ -53,18 +45,34 @@ _FITTED_WITHIN: Final = 3e-4
 _COMPUTED_WITHIN: Final = 2e-5
 #: Fewer configurations say nothing of that.
 _LEAST_COMPUTED: Final = 10
-#: Configurations whose joint positions are looked for among the others'.
-_MOST_LOOKED_AT: Final = 50
 #: What is said of a fixture is doubted beyond this many deviations.
 _FIXTURE_OUTLIER: Final = 8.0
 #: A joint may be this far beyond its limit by rounding [rad or m].
 _LIMIT_ROUNDING: Final = math.radians(0.05)
 
 
-def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspect], Fit | None]:
-    """Return what is wrong with a dataset if it was measured on this robot, the readings far off, and a robust fit.
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What is said of a dataset if it was measured on a robot.
 
-    The fit is None where none was made, or where it is of no use.
+    Attributes
+    ----------
+    notices, suspects
+        What is wrong with it, and the readings far off.
+    fit
+        A robust one; None where none was made, or where it is of no use.
+    believed
+        The readings without the orientations that are doubted; None without a fit.
+    """
+
+    notices: list[Notice]
+    suspects: list[Suspect] = field(default_factory=list)
+    fit: Fit | None = None
+    believed: Dataset | None = None
+
+
+def check_against(robot: Robot, data: Dataset) -> Comparison:
+    """Compare a dataset with the robot that it was measured on.
 
     Parameters
     ----------
@@ -76,43 +84,52 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
         try:
             start_from_readings(robot, data)
         except InputError as error:
-            return [Notice("fixtures-unlikely", str(error), "error"), *found], [], None
+            return Comparison([Notice("fixtures-unlikely", str(error), "error"), *found])
         slips = slips_in_lengths(robot, data)
         if slips:
-            return [*slips, *found], [], None
+            return Comparison([*slips, *found])
         fit = identify(robot, data, named_model("geometric"), loss="cauchy")
-        unlike, suspects = _far_from_fixtures(fit, data)
-        return [*check_robot(fit, data), *unlike, *found], suspects, fit
+        unlike, off_fixtures = _far_from_fixtures(fit, data)
+        return Comparison([*check_robot(fit, data), *unlike, *found], off_fixtures, fit, data)
     if not data.has_position.any():
-        return found, [], None
+        return Comparison(found)
     slips = slips_in_positions(robot, data)
     if slips and all(slip.code in ORIENTATION_SLIPS for slip in slips):  # the positions are this robot's
-        return [*slips, *found], [], None
+        return Comparison([*slips, *found])
     if slips:
-        return [*(other_robot(robot, data) or slips), *found], [], None
+        return Comparison([*(other_robot(robot, data) or slips), *found])
     fit = identify(robot, data, named_model("geometric"), loss="cauchy")
-    off = off_by(errors_of(fit.robot, data))
+    errors = errors_of(fit.robot, data)
+    off = off_by(errors)
     if np.nanmedian(off) > _FITTED_WITHIN:
         slips = slips_by_fit(robot, data)
         if slips:
-            return [*(other_robot(robot, data) or slips), *found], [], None
+            return Comparison([*(other_robot(robot, data) or slips), *found])
     wrong = check_robot(fit, data)
     unlike_robot = check_plausible(fit, data, wrong)
     if unlike_robot:
-        return [*unlike_robot, *wrong, *found], [], None
-    mistaken, suspects = _far_off(fit, data, off)
-    return (
+        return Comparison([*unlike_robot, *wrong, *found])
+    doubted: list[Notice] = []
+    suspects: list[Suspect] = []
+    turned = np.zeros(len(off), dtype=bool)
+    if not too_few_numbers(fit, data):
+        turned = orientations_off(errors)
+        alone = turned & ~(np.nan_to_num(off) > allowed_off(off))
+        mistaken, suspects = far_off(fit, data, off, turned)
+        doubted = [*mistaken, *check_orientations(fit, data, errors, alone), *often_off(data, off)]
+        turned = alone
+    return Comparison(
         [
             *wrong,
             *found,
-            *mistaken,
-            *_often_off(data, off),
+            *doubted,
             *_one_point(fit, data),
             *check_rounding(fit, data),
             *_computed(robot, data, off),
         ],
         suspects,
         fit,
+        without_orientations(data, turned),
     )
 
 
@@ -169,10 +186,11 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
 
 def _far_from_fixtures(fit: Fit, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
     """Doubt readings against fixtures that a robust geometric fit leaves far off, and what is said of fixtures."""
+    if too_few_numbers(fit, data):
+        return _unlike_its_readings(fit, data), []
     errors = errors_of(fit.robot, data)
     off = off_by(errors)
-    allowed = max(_LEAST_OUTLIER, _OUTLIER_RATIO * float(np.nanmedian(off)))
-    doubted = np.flatnonzero(np.nan_to_num(off) > allowed).tolist()
+    doubted = np.flatnonzero(np.nan_to_num(off) > allowed_off(off)).tolist()
     where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
     suspects = [Suspect("outliers", *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, where, strict=True)]
     return _unlike_its_readings(fit, data), suspects
@@ -201,89 +219,6 @@ def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
             "fixture-misplaced",
             f"Fixtures are not where, or not as far apart, as the file says: {', '.join(found)}. "
             "Check the names, units and numbers of these rows.",
-        )
-    ]
-
-
-def _far_off(fit: Fit, data: Dataset, off: Array) -> tuple[list[Notice], list[Suspect]]:
-    """Doubt readings that a robust geometric fit leaves far off, and joint positions that are another row's.
-
-    Parameters
-    ----------
-    off
-        How far off each reading is [m], ``(readings,)``.
-    """
-    allowed = _allowed(off)
-    doubted = np.flatnonzero(np.nan_to_num(off) > allowed)
-    if len(doubted) == 0:
-        return [], []
-    predicted = np.stack([fit.robot.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
-    points = places_of(data)
-    known = fixed_points(data)
-    mistaken = _joints_of_others(data, predicted, doubted, allowed)
-    suspects = []
-    for c in dict.fromkeys(data.configuration[doubted].tolist()):
-        if c in mistaken:
-            continue
-        mine = [r for r in doubted.tolist() if data.configuration[r] == c]
-        label = data.labels[c]
-        for reading in mine:
-            t = int(data.target[reading])
-            at = data.position[reading]
-            gaps = np.linalg.norm(predicted[c] - at, axis=1)
-            nearest = int(np.argmin(gaps))
-            name = data.targets[t]
-            if nearest != t and gaps[nearest] <= allowed:
-                other = data.targets[nearest]
-                there = points.of(c, nearest)
-                exchanged = there is not None and np.linalg.norm(there - predicted[c, t]) <= allowed
-                code: Suspicion = "targets-swapped" if exchanged else "target-mistaken"
-                suspects.append(Suspect(code, label, name, f"is target {other}"))
-                continue
-            before = points.of(c - 1, t)
-            before_it = {} if before is None else {f"target {name} at the configuration before": before}
-            suspects.append(suspect(at, label, name, float(off[reading]), before_it | known))
-    if not mistaken:
-        return [], suspects
-    words = [f"{data.labels[c]} (those of {data.labels[k]})" for c, k in mistaken.items()]
-    what = "readings of a configuration fit" if len(words) == 1 else "readings of configurations fit"
-    return [
-        Notice(
-            "joints-mistaken",
-            f"The {what} the joint positions of another one: {listed(words)}. Their rows were exchanged or copied: "
-            "mend the joint positions, or leave them out.",
-            at=tuple((data.labels[c], "") for c in mistaken),
-        )
-    ], suspects
-
-
-def _allowed(off: Array) -> float:
-    """Return how far off a reading may be, before it is doubted alone [m]."""
-    return max(_LEAST_OUTLIER, _OUTLIER_RATIO * float(np.nanmedian(off)))
-
-
-def _often_off(data: Dataset, off: Array) -> list[Notice]:
-    """Say if many readings are far off by the measure of the others, though none so far as to be doubted alone.
-
-    Of normal errors one in a billion is six medians off. Where errors of the joints move some targets more than others
-    few are: of the measured IRB 120 two in a hundred, at two configurations that went wrong.
-    """
-    size = np.nan_to_num(off)
-    usual = float(np.nanmedian(off))
-    far = np.flatnonzero((size > max(_OFTEN_RATIO * usual, _LEAST_OFTEN)) & (size <= _allowed(off)))
-    read = int(np.isfinite(off).sum())
-    if len(far) < max(_FEWEST_OFTEN, _OFTEN_SHARE * read):
-        return []
-    at = tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in far.tolist())
-    return [
-        Notice(
-            "outliers",
-            f"{len(far)} of {read} readings ({len(far) / read:.0%}) are more than {_OFTEN_RATIO:g} times farther off "
-            f"than half of all, up to {float(size[far].max()) * 1e3:.2g} mm (configuration/target): "
-            f"{listed(['/'.join(one) for one in at])}. "
-            "Errors of instruments and joints are not so uneven. Look for what these readings have in common; "
-            "`loss=cauchy` lets them count little.",
-            at=at,
         )
     ]
 
@@ -320,25 +255,3 @@ def _like(one: str, other: str) -> bool:
     """Return whether names differ by a slip: not by a number, as those of a row of targets do."""
     same_numbers = re.findall("[0-9]+", one) == re.findall("[0-9]+", other)
     return same_numbers and SequenceMatcher(None, one.casefold(), other.casefold()).ratio() >= _LIKE
-
-
-def _joints_of_others(data: Dataset, predicted: Array, doubted: IntArray, allowed: float) -> dict[int, int]:
-    """Return the configurations all of whose readings fit the joint positions of another one, and which.
-
-    Parameters
-    ----------
-    predicted
-        Places of the targets [m], ``(configurations, targets, 3)``.
-    """
-    off = np.zeros(len(data.target), dtype=bool)
-    off[doubted] = True
-    found = {}
-    for c in np.unique(data.configuration[doubted]).tolist()[:_MOST_LOOKED_AT]:
-        mine = np.flatnonzero((data.configuration == c) & data.has_position)
-        if not off[mine].all():
-            continue
-        gaps = np.linalg.norm(predicted[:, data.target[mine]] - data.position[mine], axis=2).max(axis=1)
-        nearest = int(np.argmin(gaps))
-        if gaps[nearest] <= allowed:
-            found[c] = nearest
-    return found

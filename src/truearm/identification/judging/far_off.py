@@ -1,0 +1,255 @@
+"""Readings that a robust fit leaves far off, and whose fault it is: one reading's, or the joint positions' of a row.
+
+Where all readings of a configuration are off and keep their distances to each other, none of them was taken from a
+wrong point: the tool stood elsewhere than the joint positions say.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.judging.slip_trials import angle_slips, as_noted
+from truearm.identification.solving.fit import Fit
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.places import Places, places_of
+from truearm.measurement.repeats import repeated_joints
+from truearm.measurement.rigid_tool import Suspect, Suspicion, fixed_points, suspect
+from truearm.modeling.chain import Array
+from truearm.notices import Notice
+from truearm.shown import listed, millimetres
+
+#: A reading is doubted beyond this many median residuals, and at least so far off [m].
+OUTLIER_RATIO: Final = 20.0
+_LEAST_OUTLIER: Final = 1e-3
+#: Many readings are doubted together beyond so many median residuals, and at least so far off [m]; at least so many
+#: readings, and this share of them.
+_OFTEN_RATIO: Final = 6.0
+_LEAST_OFTEN: Final = 5e-5
+_FEWEST_OFTEN: Final = 4
+_OFTEN_SHARE: Final = 0.05
+#: Configurations whose joint positions are looked for among the others'.
+_MOST_LOOKED_AT: Final = 50
+#: Another unit explains readings that it brings so many times nearer: a target on the axis of a joint hardly moves.
+_LEAST_IMPROVEMENT: Final = 10.0
+#: Nothing is doubted with fewer numbers for each free parameter.
+_LEAST_NUMBERS: Final = 1.5
+#: Distances tell that readings hang together where some are so many times as long as a reading may be off.
+_LONG: Final = 3.0
+
+
+def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> tuple[list[Notice], list[Suspect]]:
+    """Doubt readings that a robust geometric fit leaves far off, and joint positions that do not belong to theirs.
+
+    Parameters
+    ----------
+    off
+        How far off each reading is [m], ``(readings,)``.
+    turned
+        Which orientations are far off, ``(readings,)``.
+    """
+    allowed = allowed_off(off)
+    doubted = np.flatnonzero(np.nan_to_num(off) > allowed)
+    if len(doubted) == 0:
+        return [], []
+    predicted = np.stack([fit.robot.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
+    mistaken = _joints_of_others(data, predicted, doubted, allowed)
+    angled, slips = _in_another_unit(fit, data, off, doubted, allowed, [*mistaken])
+    points, known = places_of(data), fixed_points(data)
+    repeated = {label for pair in repeated_joints(data) for label in pair}
+    suspects: list[Suspect] = []
+    unlike: dict[int, float] = {}
+    for c in dict.fromkeys(data.configuration[doubted].tolist()):
+        if c in mistaken or c in angled or data.labels[c] in repeated:
+            continue
+        mine = [r for r in doubted.tolist() if data.configuration[r] == c]
+        of_this = [_doubted(data, r, predicted[c], points, known, float(off[r]), allowed) for r in mine]
+        if all(one.code == "outliers" for one in of_this) and _hang_together(data, c, mine, predicted, turned, allowed):
+            unlike[c] = float(off[mine].max())
+        else:
+            suspects += of_this
+    return [*slips, *_joints_mistaken(data, mistaken, unlike)], suspects
+
+
+def _doubted(
+    data: Dataset, reading: int, predicted: Array, points: Places, known: dict[str, Array], size: float, allowed: float
+) -> Suspect:
+    """Say what a single reading is that is far off.
+
+    Parameters
+    ----------
+    predicted
+        Places of the targets at its configuration [m], ``(targets, 3)``.
+    points, known
+        Where targets were read, and other points that could have been.
+    """
+    c, t = int(data.configuration[reading]), int(data.target[reading])
+    label, name, at = data.labels[c], data.targets[t], data.position[reading]
+    gaps = np.linalg.norm(predicted - at, axis=1)
+    nearest = int(np.argmin(gaps))
+    if nearest != t and gaps[nearest] <= allowed:
+        there = points.of(c, nearest)
+        exchanged = there is not None and np.linalg.norm(there - predicted[t]) <= allowed
+        code: Suspicion = "targets-swapped" if exchanged else "target-mistaken"
+        return Suspect(code, label, name, f"is target {data.targets[nearest]}")
+    before = points.of(c - 1, t)
+    before_it = {} if before is None else {f"target {name} at the configuration before": before}
+    return suspect(at, label, name, size, before_it | known)
+
+
+def _hang_together(
+    data: Dataset, c: int, doubted: list[int], predicted: Array, turned: NDArray[np.bool_], allowed: float
+) -> bool:
+    """Return whether all readings of a configuration are far off and keep their distances, or are turned as well.
+
+    Parameters
+    ----------
+    predicted
+        Places of the targets [m], ``(configurations, targets, 3)``.
+    """
+    mine = np.flatnonzero((data.configuration == c) & data.has_position)
+    if len(mine) != len(doubted):
+        return False
+    if turned[mine].all():
+        return True
+    read, there = data.position[mine], predicted[c, data.target[mine]]
+    apart = [np.linalg.norm(points[:, None] - points, axis=2) for points in (read, there)]
+    return bool(apart[1].max() > _LONG * allowed and np.abs(apart[0] - apart[1]).max() <= allowed)
+
+
+def _in_another_unit(
+    fit: Fit, data: Dataset, off: Array, doubted: IntArray, allowed: float, left_out: list[int]
+) -> tuple[set[int], list[Notice]]:
+    """Return the configurations whose readings fit their joint positions in the other unit of angle, and say so.
+
+    Parameters
+    ----------
+    off
+        How far off each reading is [m], ``(readings,)``.
+    doubted
+        The readings that are far off.
+    left_out
+        Configurations that are explained.
+    """
+    read = np.bincount(data.configuration[data.has_position], minlength=data.configurations)
+    wrong = np.bincount(data.configuration[doubted], minlength=data.configurations)
+    some = np.setdiff1d(np.flatnonzero((wrong > 0) & (wrong == read)), left_out)[:_MOST_LOOKED_AT]
+    if not len(some):
+        return set(), []
+    part = data.of_configurations(some)
+    off_most = {c: float(np.nanmax(off[data.configuration == c])) for c in some.tolist()}
+    found: dict[str, list[int]] = {}
+    explained: set[int] = set()
+    for slip in as_noted(fit.robot, part, angle_slips):
+        places = [fit.robot.world_poses(slip.data.postures, name)[0] for name in part.targets]
+        gaps = np.linalg.norm(np.stack(places, axis=1)[part.configuration, part.target] - part.position, axis=1)
+        for index, c in enumerate(some.tolist()):
+            gap = float(gaps[(part.configuration == index) & part.has_position].max())
+            if c not in explained and gap <= min(allowed, off_most[c] / _LEAST_IMPROVEMENT):
+                explained.add(c)
+                found.setdefault(slip.words.partition(".")[0], []).append(c)
+    return explained, [
+        Notice(
+            "unit-angle",
+            f"{words}, at some configurations alone ({listed([data.labels[c] for c in sorted(cs)])}). Mend the numbers "
+            "of these rows.",
+            "error",
+            at=tuple((data.labels[c], "") for c in sorted(cs)),
+        )
+        for words, cs in found.items()
+    ]
+
+
+def _joints_mistaken(data: Dataset, others: dict[int, int], unlike: dict[int, float]) -> list[Notice]:
+    """Say which joint positions do not belong to their readings.
+
+    Parameters
+    ----------
+    others
+        Configurations whose readings fit the joint positions of another one, and which.
+    unlike
+        Those whose readings hang together and are elsewhere, and how far [m].
+    """
+    found = []
+    if others:
+        words = [f"{data.labels[c]} (those of {data.labels[k]})" for c, k in others.items()]
+        what = "readings of a configuration fit" if len(words) == 1 else "readings of configurations fit"
+        found.append(
+            f"The {what} the joint positions of another one: {listed(words)}. Their rows were exchanged or copied: "
+            "mend the joint positions, or leave them out."
+        )
+    if unlike:
+        words = [f"{data.labels[c]} ({millimetres(size)} mm off)" for c, size in unlike.items()]
+        what = f"configuration{'' if len(words) == 1 else 's'} {listed(words)}"
+        found.append(
+            f"The joint positions of {what} do not belong to their readings: all of these are off, and stand to each "
+            "other as they should. The joint positions are wrong, or the row is another one's, or the robot or the "
+            "instrument was moved for it. Mend the joint positions, or leave these rows out."
+        )
+    at = tuple((data.labels[c], "") for c in (*others, *unlike))
+    return [Notice("joints-mistaken", " ".join(found), at=at)] if found else []
+
+
+def too_few_numbers(fit: Fit, data: Dataset) -> bool:
+    """Return whether the readings are hardly more numbers than a fit has free parameters.
+
+    It may then leave a good reading far off: others that are as good agree without it.
+    """
+    numbers = 3 * int(data.has_position.sum()) + 3 * int(data.has_orientation.sum())
+    numbers += sum(int(np.isfinite(lengths).sum()) for lengths in (data.distance, data.height) if lengths is not None)
+    return numbers < _LEAST_NUMBERS * len(fit.free.names)
+
+
+def allowed_off(off: Array) -> float:
+    """Return how far off a reading may be, before it is doubted alone [m]."""
+    return max(_LEAST_OUTLIER, OUTLIER_RATIO * float(np.nanmedian(off)))
+
+
+def often_off(data: Dataset, off: Array) -> list[Notice]:
+    """Say if many readings are far off by the measure of the others, though none so far as to be doubted alone.
+
+    Of normal errors one in a billion is six medians off. Where errors of the joints move some targets more than others
+    few are: of the measured IRB 120 two in a hundred, at two configurations that went wrong.
+    """
+    size = np.nan_to_num(off)
+    usual = float(np.nanmedian(off))
+    far = np.flatnonzero((size > max(_OFTEN_RATIO * usual, _LEAST_OFTEN)) & (size <= allowed_off(off)))
+    read = int(np.isfinite(off).sum())
+    if len(far) < max(_FEWEST_OFTEN, _OFTEN_SHARE * read):
+        return []
+    at = tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in far.tolist())
+    return [
+        Notice(
+            "outliers",
+            f"{len(far)} of {read} readings ({len(far) / read:.0%}) are more than {_OFTEN_RATIO:g} times farther off "
+            f"than half of all, up to {float(size[far].max()) * 1e3:.2g} mm (configuration/target): "
+            f"{listed(['/'.join(one) for one in at])}. "
+            "Errors of instruments and joints are not so uneven. Look for what these readings have in common; "
+            "`loss=cauchy` lets them count little.",
+            at=at,
+        )
+    ]
+
+
+def _joints_of_others(data: Dataset, predicted: Array, doubted: IntArray, allowed: float) -> dict[int, int]:
+    """Return the configurations all of whose readings fit the joint positions of another one, and which.
+
+    Parameters
+    ----------
+    predicted
+        Places of the targets [m], ``(configurations, targets, 3)``.
+    """
+    off = np.zeros(len(data.target), dtype=bool)
+    off[doubted] = True
+    found = {}
+    for c in np.unique(data.configuration[doubted]).tolist()[:_MOST_LOOKED_AT]:
+        mine = np.flatnonzero((data.configuration == c) & data.has_position)
+        if not off[mine].all():
+            continue
+        gaps = np.linalg.norm(predicted[:, data.target[mine]] - data.position[mine], axis=2).max(axis=1)
+        nearest = int(np.argmin(gaps))
+        if gaps[nearest] <= allowed:
+            found[c] = nearest
+    return found

@@ -230,12 +230,15 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         asked.check(robot)
         driven = with_program(replace(planned, made=made, tour=tour, program=None), asked, robot, weighed=False).program
         assert driven is not None
-        codes = [notice.code for notice in driven.warnings]
+        notices = list(driven.warnings)
+        if program == "krl":  # at 1 %, the first move of an arm as fast as any
+            assert notices.pop(0).code == "faster-than-asked"
+        codes = [notice.code for notice in notices]
         assert codes == ["controller-counts-assumed", "tool-assumed", "joint-speed-assumed", "never-apart"]
-        assert [notice.level for notice in driven.warnings] == ["warning", "warning", "note", "note"]
+        assert [notice.level for notice in notices] == ["warning", "warning", "note", "note"]
         assert any("compare joints with the pendant" in text for text in driven.files.values())
-        assert "Nobody said the load of the flange" in driven.warnings[1].message
-        assert "what is assumed, 0 kg at (0, 0, 0) mm. A wrong load" in driven.warnings[1].message
+        assert "Nobody said the load of the flange" in notices[1].message
+        assert "what is assumed, 0 kg at (0, 0, 0) mm. A wrong load" in notices[1].message
         by_hand = {"fanuc": "Payload schedule 1 on", "inform": "Tool file 0 on", "val3": "The tool flange on"}
         assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.lines())
 

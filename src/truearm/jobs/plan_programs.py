@@ -34,7 +34,7 @@ _NAMES: Final = ("rapid", "krl", "fanuc", "urscript", "inform", "val3")
 #: Programs have no more axes.
 _AXES: Final = 6
 #: A speed that is higher by less is the same.
-_CLOSE: Final = 1.005
+_CLOSE: Final = 1.0 + 1e-6
 _BY_ROWS: Final = "Plan without it, and drive the rows of plan-ways.csv."
 #: Characters of the plan's hash by which the program names it.
 _MARK: Final = 12

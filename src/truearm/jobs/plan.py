@@ -49,7 +49,7 @@ from truearm.planning.choosing.observability import INDICES
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.constraints.constraints import Constraints
 from truearm.planning.driving.joint_window import on_principal_turn
-from truearm.planning.driving.touring import tour_of, unreached
+from truearm.planning.driving.touring import tour_of
 from truearm.results.plan import PAGE, Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS
 from truearm.results.tour_files import ways_beside
@@ -250,37 +250,28 @@ def plan(
             choice = driven_candidates(seen, number, rng, finder)
     progress("looking where the robot shall be accurate")
     goal = accuracy_goal(seen, accurate_at, region, tools, frames, np.random.default_rng(seed))
-    left = np.arange(len(choice))
-    while True:
-        progress(f"choosing among {len(left)} configurations")
-        made = plan_measurements(
-            seen,
-            choice.at(left),
-            wanted,
-            poses=count,
-            rng=rng,
-            objective=objective or ("O1" if goal is None else ERROR),
-            accurate_at=None if goal is None else goal.postures,
-            noise=deviation,
-            labels=None if labels is None else tuple(labels[k] for k in left),
-            constraints=rules,
-            where=where,
-            seen_from_the_origin=own,
-            readings=None if readings is None else readings.of_configurations(left),
-            finder=finder,
-            without_way=len(choice) - len(left),
-        )
-        if finder is None:
-            tour = None
-            break
+    made = plan_measurements(
+        seen,
+        choice,
+        wanted,
+        poses=count,
+        rng=rng,
+        objective=objective or ("O1" if goal is None else ERROR),
+        accurate_at=None if goal is None else goal.postures,
+        noise=deviation,
+        labels=labels,
+        constraints=rules,
+        where=where,
+        seen_from_the_origin=own,
+        readings=readings,
+        finder=finder,
+        progress=progress,
+    )
+    tour = None
+    if finder is not None:
         progress("looking for ways that keep clear")
-        lost = unreached(finder, made.joints, made.before)
-        if not lost:
-            stops = made.before if wanted_program is None or wanted_program.approach else None
-            tour = tour_of(finder, made.joints, made.labels, stops)
-            break
-        left = np.delete(left, made.chosen[lost])
-    made = replace(made, chosen=left[made.chosen])
+        stops = made.before if wanted_program is None or wanted_program.approach else None
+        tour = tour_of(finder, made.joints, made.labels, stops)
     words = "" if goal is None else goal.words
     planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
     if wanted_program is not None:

@@ -31,6 +31,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.driving import cell_argument, constraints_argument, finder_argument
+from truearm.jobs.plan_notices import load_notices, targets_notices
 from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
 from truearm.jobs.plans_replaced import plan_files_for, refuse_ways_of_another, replaced_notices
 from truearm.measurement.dataset import Dataset
@@ -135,8 +136,8 @@ def plan(
         not stand, only 0 is taken: the surface on which it is mounted. With a clearance it is kept by all that moves,
         as are the boxes of the constraints and the arm's own links: in every configuration, and on the ways from the
         safe one to the first, on to each other and back. Configurations that are given were reached
-        once: they are checked if one of these four or a program is said, with joints that can turn further than once on
-        the turn from -180 to 180 deg.
+        once: they are checked if one of these four, a program or boxes to keep out of are said, with joints that can
+        turn further than once on the turn from -180 to 180 deg.
     no_floor
         Whether there is no floor and no mounting surface.
     clearance
@@ -226,7 +227,7 @@ def plan(
     cell = cell_argument(carrying, rules, where, floor, no_floor, clearance)
     # What was measured was reached: such configurations are checked where that is asked for.
     driven = candidates_from is None or wanted_program is not None or no_floor
-    driven = driven or any(given is not None for given in (floor, clearance, home))
+    driven = driven or bool(cell.boxes) or any(given is not None for given in (floor, clearance, home))
     if table is not None and not driven:
         refuse_ways_of_another(ways_beside(table))
     labels, readings, own, finder = None, None, bool(carrying.targets), None
@@ -273,10 +274,14 @@ def plan(
         stops = made.before if wanted_program is None or wanted_program.approach else None
         tour = tour_of(finder, made.joints, made.labels, stops)
     words = "" if goal is None else goal.words
-    planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
+    named = "" if instrument is None else instrument.name
+    weighed = payload is not None or carrying.payload != NO_PAYLOAD
+    told = load_notices(made.robot) if weighed else []
+    if tour is not None and wanted_program is None:
+        told += targets_notices(made.robot, carrying, named)
+    planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour, told=tuple(told))
     if wanted_program is not None:
-        weighed = payload is not None or carrying.payload != NO_PAYLOAD
-        planned = with_program(planned, wanted_program, carrying, weighed=weighed)
+        planned = with_program(planned, wanted_program, carrying, named, weighed=weighed)
     if table is not None:
         if planned.program is not None:
             refuse_other_programs(table, planned.program.files, *read)

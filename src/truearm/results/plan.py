@@ -49,6 +49,8 @@ class Plan(Record):
         What drives it; None where no program was asked for.
     replaced
         What to know of another plan that it was written over.
+    told
+        What to know of what it was made with: the load, and targets that nobody said.
     """
 
     made: MeasurementPlan
@@ -60,6 +62,7 @@ class Plan(Record):
     tour: Tour | None = None
     program: PlanProgram | None = None
     replaced: tuple[Notice, ...] = ()
+    told: tuple[Notice, ...] = ()
 
     @property
     def joints(self) -> Array:
@@ -91,11 +94,11 @@ class Plan(Record):
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
-        """What to know of the ways that were checked, and of the program."""
+        """What to know of what it was made with, of the ways that were checked, and of the program."""
         if self.program is not None:
             return self.program.warnings
         robot = self.made.robot
-        return (*(() if self.tour is None else self.tour.notices), *wider_limits_notices(robot))
+        return (*self.told, *(() if self.tour is None else self.tour.notices), *wider_limits_notices(robot))
 
     @property
     def _there(self) -> tuple[str, ...]:

@@ -6,17 +6,20 @@ from typing import Final
 
 import numpy as np
 
+from truearm.modeling.transform import rotation_vector
 from truearm.notices import Notice
 from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.driving.links_beside import beside_notices
 
 #: A box whose sides are all shorter is meant in another unit [m].
 _TINY: Final = 0.01
+#: Base frames that differ by less are the same [m and rad].
+_SAME: Final = 1e-6
 
 
 def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
     """Return what is to be known of what a check keeps clear of."""
-    notices = [*_box_notices(check), *beside_notices(check.robot)]
+    notices = [*_box_notices(check), *_frame_notices(check), *beside_notices(check.robot)]
     if check.left_out:
         notices.append(
             Notice(
@@ -27,6 +30,28 @@ def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
             )
         )
     return tuple(notices)
+
+
+def _frame_notices(check: CollisionCheck) -> list[Notice]:
+    """Return what is to be said of floor and boxes where the pendant shows positions in another base frame."""
+    base, cell = check.robot.controller.base, check.cell
+    moved = np.array(base.translation)
+    turned = float(np.linalg.norm(rotation_vector(base.rotation)))
+    if (cell.floor is None and not cell.boxes) or (np.abs(moved).max() < _SAME and turned < _SAME):
+        return []
+    named = " and ".join(
+        ([f"The {cell.surface}"] if cell.floor is not None else []) + (["boxes"] if cell.boxes else [])
+    )
+    at = ", ".join(f"{round(1e3 * v, 3) + 0.0:g}" for v in moved)
+    also = f", turned by {np.degrees(turned):.4g} deg" if turned >= _SAME else ""
+    return [
+        Notice(
+            "other-base-on-pendant",
+            f"{named[0].upper()}{named[1:]} are kept in the base frame of the robot file. The pendant shows positions "
+            f"in another one, with its origin at ({at}) mm in it{also}: add that to what is read off the pendant.",
+            "note",
+        )
+    ]
 
 
 def _box_notices(check: CollisionCheck) -> list[Notice]:

@@ -53,7 +53,7 @@ from truearm.planning.driving.joint_window import on_principal_turn
 from truearm.planning.driving.touring import tour_of
 from truearm.results.plan import PAGE, Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS
-from truearm.results.tour_files import ways_beside
+from truearm.results.tour_files import sheet_beside, ways_beside
 
 
 def plan(
@@ -97,8 +97,8 @@ def plan(
     poses
         How many configurations to choose; ``auto`` lets O1 decide.
     out
-        CSV file to write, and a page beside it; with a program a folder for both, the program and a sheet. None writes
-        nothing, see :meth:`Plan.save`.
+        CSV file to write, with a page, the ways and a sheet beside it; with a program a folder for all of them and the
+        program. None writes nothing, see :meth:`Plan.save`.
     candidates_from
         Readings, a canonical CSV file, or the table of another plan, among whose configurations to choose; None draws
         them within the limits.
@@ -298,7 +298,8 @@ def _files(out: object, *read: object) -> Path:
     table = file_for(out, *read)
     if table.suffix == PAGE:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
-    plan_files_for((table.name, table.with_suffix(PAGE).name, ways_beside(table).name), table, *read)
+    beside = (table.with_suffix(PAGE), ways_beside(table), sheet_beside(table))
+    plan_files_for((table.name, *(file.name for file in beside)), table, *read)
     return table
 
 

@@ -26,7 +26,7 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.results.plan import Plan
-from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
+from truearm.results.plan_program import MARK, PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.units import as_number
 
 #: What the languages are called as arguments.
@@ -36,8 +36,6 @@ _AXES: Final = 6
 #: A speed that is higher by less is the same.
 _CLOSE: Final = 1.0 + 1e-6
 _BY_ROWS: Final = "Plan without it, and drive the rows of plan-ways.csv."
-#: Characters of the plan's hash by which the program names it.
-_MARK: Final = 12
 #: No lower and no higher speed of a tip is meant [m/s].
 _SPEEDS: Final = (1e-3, 5.0)
 _WAITS: Final = "time; input N or input N,SECONDSs; operator"
@@ -189,7 +187,7 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str
     language, robot, tour = wanted.language, planned.made.robot, planned.tour
     assert tour is not None
     wanted.check_labels([str(stop.label) for stop in tour.measured])
-    mark = hash_of(plan_csv(planned.made, planned.joints_are).encode())[:_MARK]
+    mark = hash_of(plan_csv(planned.made, planned.joints_are).encode())[:MARK]
     program, fastest = plan_program(tour, robot, language.name, wanted.driving, mark)
     assert language.motion is not None
     assert program.carried is not None

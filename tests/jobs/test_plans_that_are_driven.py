@@ -208,6 +208,7 @@ def test_a_pendant_with_another_base_frame_is_told_of(name: str, height: float |
         robot = replace(robot, controller=replace(robot.controller, base=turned))
         (told,) = [n for n in cell_notices(CollisionCheck(robot, cell)) if n.code == "other-base-on-pendant"]
         assert "in it, turned by 180 deg: add" in told.message
+        assert any(n.message.startswith("The floor is kept in") for n in cell_notices(CollisionCheck(robot, Cell())))
         nothing = CollisionCheck(robot, Cell(None))
         assert not [n for n in cell_notices(nothing) if n.code == "other-base-on-pendant"]
 
@@ -399,4 +400,4 @@ def test_a_clearance_in_another_unit_is_refused() -> None:
 def test_a_plan_says_where_links_beside_their_lines_are_kept_clear() -> None:
     planned = truearm.plan("ur5e", poses=10, candidates=60)
     assert any("links-beside" in line for line in planned.lines())
-    assert [one["code"] for one in planned.summary()["warnings"]] == ["links-beside"]
+    assert [one["code"] for one in planned.summary()["warnings"]] == ["tool-assumed", "links-beside"]

@@ -42,13 +42,14 @@ def _frame_notices(check: CollisionCheck) -> list[Notice]:
     named = " and ".join(
         ([f"The {cell.surface}"] if cell.floor is not None else []) + (["boxes"] if cell.boxes else [])
     )
+    kept = "are" if cell.boxes else "is"
     at = ", ".join(f"{round(1e3 * v, 3) + 0.0:g}" for v in moved)
     also = f", turned by {np.degrees(turned):.4g} deg" if turned >= _SAME else ""
     return [
         Notice(
             "other-base-on-pendant",
-            f"{named[0].upper()}{named[1:]} are kept in the base frame of the robot file. The pendant shows positions "
-            f"in another one, with its origin at ({at}) mm in it{also}: add that to what is read off the pendant.",
+            f"{named[0].upper()}{named[1:]} {kept} kept in the base frame of the robot file. The pendant shows "
+            f"positions in another one, with its origin at ({at}) mm in it{also}: add that to what it shows.",
             "note",
         )
     ]

@@ -20,6 +20,6 @@ def a_tour(robot: Robot, count: int = 4, *, approach: bool = False, labels: tupl
         if row == count - 1:
             stops.append(Stop(0.5 * (joints[row] + joints[row - 1]), "via"))
         if approach:
-            stops.append(Stop(np.maximum(joints[row] - 0.01, low), "approach"))
+            stops.append(Stop(np.maximum(joints[row] - np.deg2rad(2.0), low), "approach"))
         stops.append(Stop(joints[row], "measure", label))
     return seen, Tour((*stops, home), None, 0.05, 0.1)

@@ -35,7 +35,7 @@ def test_another_plan_is_replaced_and_that_is_told(tmp_path: Path) -> None:
     assert (notice.code, notice.level) == ("plan-replaced", "warning")
     assert f"Another plan stood in {table}, written by 'truearm plan again', and was replaced." in notice.message
     assert any("plan-replaced" in line for line in other.lines())
-    assert [one["code"] for one in other.summary()["warnings"]] == ["plan-replaced"]
+    assert [one["code"] for one in other.summary()["warnings"]] == ["plan-replaced", "tool-assumed"]
     table.write_text(table.read_text() + "11,0,0,0,0,0,0\n")
     before = table.read_bytes()
     with pytest.raises(InputError, match="written here by truearm and has been changed since") as refusal:

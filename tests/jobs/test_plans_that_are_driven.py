@@ -16,9 +16,12 @@ from tests.simulated import campaign
 import truearm
 from truearm.errors import InputError
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
 from truearm.planning.choosing import prediction
 from truearm.planning.constraints.constraints import Constraints
 from truearm.planning.driving.cell import Cell, boxes_of
+from truearm.planning.driving.collisions import CollisionCheck
+from truearm.planning.driving.said_of_cells import cell_notices
 from truearm.results.plan import Plan
 
 HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
@@ -178,6 +181,56 @@ def test_given_configurations_are_checked_where_that_is_asked_for() -> None:
     assert driven.made.rejected["floor"] > 0
     below = driven.made.robot.forward(data.joints)[0][:, 2] < 0.0
     assert not set(np.array(data.labels)[below]) & set(driven.labels)
+
+
+def test_boxes_to_keep_out_of_switch_the_check_on() -> None:
+    _, data = campaign("irb120", 40, 0.05e-3, 1)
+    rules = Constraints.model_validate({**HEAD, "keep_out": TABLE})
+    planned = truearm.plan("irb120", poses=12, candidates_from=data, constraints=rules)
+    assert planned.tour is not None
+    assert planned.made.rejected["keep_out table"] > 0
+    assert planned.tour.distances["keep_out table"] >= 0.05
+    only = truearm.plan("irb120", poses=12, candidates_from=data, constraints=rules.model_copy(update={"keep_out": {}}))
+    assert only.tour is None
+
+
+@pytest.mark.parametrize(("name", "height"), [("rs007l", 360), ("lrmate200id", 330), ("irb120", None)])
+def test_a_pendant_with_another_base_frame_is_told_of(name: str, height: float | None) -> None:
+    robot = truearm.load_robot(name)
+    cell = Cell(boxes=boxes_of({"table": (np.array([0.4, -0.2, 0.0]), np.array([0.6, 0.2, 0.1]))}))
+    found = [one for one in cell_notices(CollisionCheck(robot, cell)) if one.code == "other-base-on-pendant"]
+    assert len(found) == (height is not None)
+    if height is not None:
+        assert found[0].level == "note"
+        assert found[0].message.startswith("The floor and boxes are kept in the base frame of the robot file.")
+        assert f"its origin at (0, 0, {height}) mm in it: add that" in found[0].message
+        turned = Transform.from_matrix(np.diag([-1.0, -1.0, 1.0]), np.array([0.0, 0.0, 0.33]))
+        robot = replace(robot, controller=replace(robot.controller, base=turned))
+        (told,) = [n for n in cell_notices(CollisionCheck(robot, cell)) if n.code == "other-base-on-pendant"]
+        assert "in it, turned by 180 deg: add" in told.message
+        assert any(n.message.startswith("The floor is kept in") for n in cell_notices(CollisionCheck(robot, Cell())))
+        nothing = CollisionCheck(robot, Cell(None))
+        assert not [n for n in cell_notices(nothing) if n.code == "other-base-on-pendant"]
+
+
+def test_a_plan_without_a_program_says_what_it_assumed_of_the_tool() -> None:
+    quick = {"poses": 10, "candidates": 30, "no_floor": True, "clearance": 0.0}
+    plain = truearm.plan("irb120", **quick)  # type: ignore[arg-type]
+    assert [(one.code, one.level) for one in plain.warnings] == [("tool-assumed", "note")]
+    assert "target 3 at (150, 0, 125) mm (the first tool of the robot file, triangular)" in plain.warnings[0].message
+    assert "Note (tool-assumed): Nobody said the targets of the flange" in "\n".join(plain.lines())
+    assert plain.summary()["warnings"][0]["code"] == "tool-assumed"
+    robot = plain.made.robot
+    said = truearm.plan(robot, **quick, payload="1kg,0mm,0mm,60mm")  # type: ignore[arg-type]
+    assert said.warnings == ()
+    heavy = truearm.plan(robot, **quick, payload="9kg,0mm,0mm,60mm")  # type: ignore[arg-type]
+    assert [(one.code, one.level) for one in heavy.warnings] == [("overload", "warning")]
+    unknown = truearm.plan(replace(robot, rated_load=None), **quick, payload="9kg,0mm,0mm,60mm")  # type: ignore[arg-type]
+    (notice,) = unknown.warnings
+    assert (notice.code, notice.level) == ("rating-unknown", "note")
+    assert "The flange carries 9 kg, and the robot file does not say for how much irb120 is rated" in notice.message
+    ball = truearm.plan("irb120", **quick, device="ballbar")  # type: ignore[arg-type]
+    assert "target ball at (0, 0, 125) mm (as of the device ballbar)" in ball.warnings[0].message
 
 
 def test_configurations_without_a_way_are_left_out_and_counted() -> None:
@@ -359,4 +412,4 @@ def test_a_clearance_in_another_unit_is_refused() -> None:
 def test_a_plan_says_where_links_beside_their_lines_are_kept_clear() -> None:
     planned = truearm.plan("ur5e", poses=10, candidates=60)
     assert any("links-beside" in line for line in planned.lines())
-    assert [one["code"] for one in planned.summary()["warnings"]] == ["links-beside"]
+    assert [one["code"] for one in planned.summary()["warnings"]] == ["tool-assumed", "links-beside"]

@@ -113,7 +113,7 @@ def plan(
         str | None,
         typer.Option(
             metavar="rapid|krl|fanuc|urscript|inform|val3",
-            help="Write a program that drives the plan, and a sheet; --out is then a folder.",
+            help="Write a program that drives the plan; --out is then a folder.",
             show_default=False,
         ),
     ] = None,
@@ -144,8 +144,8 @@ def plan(
 ) -> None:
     """Choose the configurations that tell most, in a measuring order, and say how accurate the result will be.
 
-    Without a device every target on the robot's tool is measured at each of them. Writes a CSV file, its page and the
-    ways between; with --program a folder with these, a program that drives the plan, and a sheet.
+    Without a device every target on the robot's tool is measured at each of them. Writes a CSV file, its page, the
+    ways between and a sheet for the operator; with --program a folder with these and a program that drives the plan.
     """
     from truearm.units import sized_si
 
@@ -222,8 +222,8 @@ def plan(
         return
     print_record(planned)
     if planned.program is None:
-        ways = "" if planned.tour is None else f", {out.with_name(f'{out.stem}-ways.csv')}"
-        print_line(f"Written: {out}, {out.with_suffix('.html')}{ways}")
+        ends = [".html", *([] if planned.tour is None else ["-ways.csv", "-sheet.html"])]
+        print_line(f"Written: {out}, {', '.join(str(out.with_name(out.stem + end)) for end in ends)}")
     else:
         print_line(f"Written to {out}: {', '.join(planned.contents())}")
 

@@ -14,7 +14,7 @@ import numpy as np
 from truearm.compensation.joint_counts import counts_comments
 from truearm.compensation.joint_speeds import (
     fastest_point,
-    first_share,
+    first_shares,
     joint_rates,
     joint_shares,
     known_speeds,
@@ -103,7 +103,8 @@ def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark
         By which the plan is known, for a comment.
     """
     shown = robot.controller.from_model(tour.joints)
-    moves, fastest = [_first_move(robot, language, driving)], driving.speed
+    first, speed = _first_move(robot, language, driving)
+    moves, fastest = [first], max(speed, driving.speed)
     for k in range(len(shown) - 1):
         move, speed = _move(robot, language, driving, tour.joints[k : k + 2], shown[k : k + 2])
         moves.append(move)
@@ -149,12 +150,14 @@ def _stand(label: str, driving: Driving) -> list[ProgramStep]:
     return stands
 
 
-def _first_move(robot: Robot, language: str, driving: Driving) -> _Pace:
-    """Return share, speed, time and angular velocity of the move to the safe configuration, from nobody knows where."""
+def _first_move(robot: Robot, language: str, driving: Driving) -> tuple[_Pace, float]:
+    """Return the pace of the move to the safe configuration, from nobody knows where, and the highest speed in it."""
     far = max(reach(robot, name) for name in (None, *(target.name for target in robot.targets)))
     slow, _ = joint_rates(robot)
     turning = min(driving.share * float(slow.min()), driving.speed / far)
-    return first_share(robot, language, driving.share, driving.speed), driving.speed, None, turning
+    turning = math.radians(math.floor(100.0 * math.degrees(turning)) / 100.0)  # RAPID says two decimals
+    said, speed = first_shares(robot, language, driving.share, driving.speed)
+    return (said, driving.speed, None, turning), speed if language != "RAPID" else 0.0
 
 
 def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: Array) -> tuple[_Pace, float]:

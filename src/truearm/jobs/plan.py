@@ -31,6 +31,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.driving import cell_argument, constraints_argument, finder_argument
+from truearm.jobs.plan_notices import load_notices, targets_notices
 from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
 from truearm.jobs.plans_replaced import plan_files_for, refuse_ways_of_another, replaced_notices
 from truearm.measurement.dataset import Dataset
@@ -49,10 +50,10 @@ from truearm.planning.choosing.observability import INDICES
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.planning.constraints.constraints import Constraints
 from truearm.planning.driving.joint_window import on_principal_turn
-from truearm.planning.driving.touring import tour_of, unreached
+from truearm.planning.driving.touring import tour_of
 from truearm.results.plan import PAGE, Plan
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS
-from truearm.results.tour_files import ways_beside
+from truearm.results.tour_files import sheet_beside, ways_beside
 
 
 def plan(
@@ -96,8 +97,8 @@ def plan(
     poses
         How many configurations to choose; ``auto`` lets O1 decide.
     out
-        CSV file to write, and a page beside it; with a program a folder for both, the program and a sheet. None writes
-        nothing, see :meth:`Plan.save`.
+        CSV file to write, with a page, the ways and a sheet beside it; with a program a folder for all of them and the
+        program. None writes nothing, see :meth:`Plan.save`.
     candidates_from
         Readings, a canonical CSV file, or the table of another plan, among whose configurations to choose; None draws
         them within the limits.
@@ -135,8 +136,8 @@ def plan(
         not stand, only 0 is taken: the surface on which it is mounted. With a clearance it is kept by all that moves,
         as are the boxes of the constraints and the arm's own links: in every configuration, and on the ways from the
         safe one to the first, on to each other and back. Configurations that are given were reached
-        once: they are checked if one of these four or a program is said, with joints that can turn further than once on
-        the turn from -180 to 180 deg.
+        once: they are checked if one of these four, a program or boxes to keep out of are said, with joints that can
+        turn further than once on the turn from -180 to 180 deg.
     no_floor
         Whether there is no floor and no mounting surface.
     clearance
@@ -226,7 +227,7 @@ def plan(
     cell = cell_argument(carrying, rules, where, floor, no_floor, clearance)
     # What was measured was reached: such configurations are checked where that is asked for.
     driven = candidates_from is None or wanted_program is not None or no_floor
-    driven = driven or any(given is not None for given in (floor, clearance, home))
+    driven = driven or bool(cell.boxes) or any(given is not None for given in (floor, clearance, home))
     if table is not None and not driven:
         refuse_ways_of_another(ways_beside(table))
     labels, readings, own, finder, drawn = None, None, bool(carrying.targets), None, None
@@ -250,43 +251,38 @@ def plan(
             choice, drawn = driven_candidates(seen, number, rng, finder)
     progress("looking where the robot shall be accurate")
     goal = accuracy_goal(seen, accurate_at, region, tools, frames, np.random.default_rng(seed))
-    left = np.arange(len(choice))
-    while True:
-        progress(f"choosing among {len(left)} configurations")
-        made = plan_measurements(
-            seen,
-            choice.at(left),
-            wanted,
-            poses=count,
-            rng=rng,
-            objective=objective or ("O1" if goal is None else ERROR),
-            accurate_at=None if goal is None else goal.postures,
-            noise=deviation,
-            labels=None if labels is None else tuple(labels[k] for k in left),
-            constraints=rules,
-            where=where,
-            seen_from_the_origin=own,
-            readings=None if readings is None else readings.of_configurations(left),
-            finder=finder,
-            without_way=len(choice) - len(left),
-            drawn=drawn,
-        )
-        if finder is None:
-            tour = None
-            break
+    made = plan_measurements(
+        seen,
+        choice,
+        wanted,
+        poses=count,
+        rng=rng,
+        objective=objective or ("O1" if goal is None else ERROR),
+        accurate_at=None if goal is None else goal.postures,
+        noise=deviation,
+        labels=labels,
+        constraints=rules,
+        where=where,
+        seen_from_the_origin=own,
+        readings=readings,
+        finder=finder,
+        drawn=drawn,
+        progress=progress,
+    )
+    tour = None
+    if finder is not None:
         progress("looking for ways that keep clear")
-        lost = unreached(finder, made.joints, made.before)
-        if not lost:
-            stops = made.before if wanted_program is None or wanted_program.approach else None
-            tour = tour_of(finder, made.joints, made.labels, stops)
-            break
-        left = np.delete(left, made.chosen[lost])
-    made = replace(made, chosen=left[made.chosen])
+        stops = made.before if wanted_program is None or wanted_program.approach else None
+        tour = tour_of(finder, made.joints, made.labels, stops)
     words = "" if goal is None else goal.words
-    planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour)
+    named = "" if instrument is None else instrument.name
+    weighed = payload is not None or carrying.payload != NO_PAYLOAD
+    told = load_notices(made.robot) if weighed else []
+    if tour is not None and wanted_program is None:
+        told += targets_notices(made.robot, carrying, named)
+    planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour, told=tuple(told))
     if wanted_program is not None:
-        weighed = payload is not None or carrying.payload != NO_PAYLOAD
-        planned = with_program(planned, wanted_program, carrying, weighed=weighed)
+        planned = with_program(planned, wanted_program, carrying, named, weighed=weighed)
     if table is not None:
         if planned.program is not None:
             refuse_other_programs(table, planned.program.files, *read)
@@ -303,7 +299,8 @@ def _files(out: object, *read: object) -> Path:
     table = file_for(out, *read)
     if table.suffix == PAGE:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
-    plan_files_for((table.name, table.with_suffix(PAGE).name, ways_beside(table).name), table, *read)
+    beside = (table.with_suffix(PAGE), ways_beside(table), sheet_beside(table))
+    plan_files_for((table.name, *(file.name for file in beside)), table, *read)
     return table
 
 

@@ -18,6 +18,7 @@ from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.errors import InputError
 from truearm.jobs.arguments import choice_argument, flag_argument, folder_for, numbers_argument
 from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES
+from truearm.jobs.plan_notices import assumed_notices, load_notices
 from truearm.library.wider_limits import wider_limits_notices
 from truearm.manifest import hash_of, sets_in
 from truearm.measurement.dataset import Dataset
@@ -25,8 +26,7 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.results.plan import Plan
-from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
-from truearm.simulation.truths import DEFAULT_TOOL
+from truearm.results.plan_program import MARK, PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.units import as_number
 
 #: What the languages are called as arguments.
@@ -34,10 +34,8 @@ _NAMES: Final = ("rapid", "krl", "fanuc", "urscript", "inform", "val3")
 #: Programs have no more axes.
 _AXES: Final = 6
 #: A speed that is higher by less is the same.
-_CLOSE: Final = 1.005
+_CLOSE: Final = 1.0 + 1e-6
 _BY_ROWS: Final = "Plan without it, and drive the rows of plan-ways.csv."
-#: Characters of the plan's hash by which the program names it.
-_MARK: Final = 12
 #: No lower and no higher speed of a tip is meant [m/s].
 _SPEEDS: Final = (1e-3, 5.0)
 _WAITS: Final = "time; input N or input N,SECONDSs; operator"
@@ -45,8 +43,6 @@ _WAITS: Final = "time; input N or input N,SECONDSs; operator"
 _INPUT: Final = re.compile(r"([0-9]{1,5}|[A-Za-z][A-Za-z0-9_]{0,31})")
 #: Languages whose inputs have names.
 _NAMED_INPUTS: Final = ("RAPID",)
-#: A message names no more targets.
-_MOST_NAMED: Final = 6
 #: Numbers of the digital inputs, where a language has them: standard ones of a UR, as many as KUKA has at most.
 _INPUTS: Final = {"URScript": (0, 7), "KRL": (1, 8192)}
 #: Devices that see the arm, or are fixed to it, while it is driven.
@@ -172,7 +168,7 @@ def program_wanted(program: object, approach: object, speed: Any, dwell: object,
     return ProgramWanted(str(program), language, driving, from_below)
 
 
-def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed: bool) -> Plan:
+def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str = "", *, weighed: bool) -> Plan:
     """Return a plan with the program that drives it.
 
     Parameters
@@ -183,17 +179,19 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, *, weighed:
         What was asked for.
     given
         The robot as the user has it.
+    device
+        What measures, where that was said.
     weighed
         Whether the user said what it carries.
     """
     language, robot, tour = wanted.language, planned.made.robot, planned.tour
     assert tour is not None
     wanted.check_labels([str(stop.label) for stop in tour.measured])
-    mark = hash_of(plan_csv(planned.made, planned.joints_are).encode())[:_MARK]
+    mark = hash_of(plan_csv(planned.made, planned.joints_are).encode())[:MARK]
     program, fastest = plan_program(tour, robot, language.name, wanted.driving, mark)
     assert language.motion is not None
     assert program.carried is not None
-    notices = [*_notices(language, robot, given, weighed=weighed), *tour.notices]
+    notices = [*_notices(language, robot, given, device, weighed=weighed), *tour.notices]
     speeds = known_speeds(robot)
     if fastest > _CLOSE * wanted.driving.speed:
         notices.insert(
@@ -320,51 +318,10 @@ def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "
     return "input", name, longest
 
 
-def _overload(robot: Robot) -> list[Notice]:
-    """Return what to know of a load above that for which the arm is rated."""
-    if robot.rated_load is None or robot.payload.mass <= robot.rated_load:
-        return []
-    return [
-        Notice(
-            "overload",
-            f"The flange carries {robot.payload.mass:g} kg, and {robot.name} is rated for {robot.rated_load:g} kg. "
-            "Check the unit and the tool of `payload` before anything is driven.",
-        )
-    ]
-
-
-def _taken(robot: Robot, given: Robot, *, weighed: bool) -> str:
-    """Say which load and targets a plan has taken for those that nobody said, and whence."""
-    said = [] if weighed else [f"{robot.payload.mass:g} kg at {_at(robot.payload.cog)} mm"]
-    if given.targets:
-        return said[0]
-    there = {one.name: robot.tool_place(one.name).translation for one in robot.targets}
-    name, tool = next(iter(given.tools.items()), ("", DEFAULT_TOOL))
-    said += [f"target {target} at {_at(place)} mm" for target, place in [*there.items()][:_MOST_NAMED]]
-    whence = f"the first tool of the robot file, {name}" if name else "three reflectors about 150 mm apart"
-    if there != dict(tool.targets):
-        whence = "targets where the readings have them"
-    return f"{', '.join(said)}{', and others' if len(there) > _MOST_NAMED else ''} ({whence})"
-
-
-def _at(point: tuple[float, float, float]) -> str:
-    return f"({', '.join(f'{1e3 * v:.4g}' for v in point)})"
-
-
-def _notices(language: Language, robot: Robot, given: Robot, *, weighed: bool) -> list[Notice]:
-    found = [*_overload(robot), *counts_notices(robot)]
+def _notices(language: Language, robot: Robot, given: Robot, device: str, *, weighed: bool) -> list[Notice]:
+    found = [*load_notices(robot), *counts_notices(robot)]
     found += wider_limits_notices(robot)
-    unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
-    if unsaid:
-        cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []
-        cures += [] if given.targets else ["State the targets in the robot file."]
-        found.append(
-            Notice(
-                "tool-assumed",
-                f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is "
-                f"assumed, {_taken(robot, given, weighed=weighed)}. {' '.join(cures)}",
-            )
-        )
+    found += assumed_notices(robot, given, device, weighed=weighed)
     return [*found, *speed_notices(robot, "" if known_speeds(robot) else _assumed(language, robot))]
 
 

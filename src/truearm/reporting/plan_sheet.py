@@ -1,4 +1,4 @@
-"""The sheet that goes with a measuring program: what is measured in which order, and what to write down beside it."""
+"""The sheet that goes with a plan that is driven: what is measured in which order, and what to write down beside it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.programs.numbers import written
+from truearm.manifest import hash_of
 from truearm.notices import worst_first
+from truearm.planning.choosing.plan_table import plan_csv
+from truearm.planning.driving.tour import Tour
 from truearm.reporting.page import page
 from truearm.results.plan import Plan
-from truearm.results.plan_program import PlanProgram
+from truearm.results.plan_program import MARK
 from truearm.units import from_si
 
 #: What a calibration needs to be repeated, and what explains it later.
@@ -38,26 +41,34 @@ class _Row:
 
 
 def plan_sheet(planned: Plan) -> str:
-    """Return the sheet of a plan that has a program: Home, from which it is driven, and every configuration."""
-    program, made = planned.program, planned.made
-    assert program is not None
+    """Return the sheet of a plan that is driven: Home, from which it is driven, and every configuration.
+
+    Joint positions are those that the controller shows, or the model's where nobody said how it counts.
+    """
+    program, made, tour = planned.program, planned.made, planned.tour
+    assert tour is not None
     reads = dict(zip(made.labels, made.reads, strict=True)) if made.reads else {}
+    files = "" if program is None else f", {', '.join(program.files)}"
+    mark = hash_of(plan_csv(made, planned.joints_are).encode())[:MARK] if program is None else program.mark
+    shown = "as the controller shows them"
+    if program is None and not made.robot.controller.counts_known:
+        shown = "of the model: nobody said how the controller counts them. Compare every joint with the pendant first"
     return page(
         "plan-sheet.html.jinja",
         {},
         title=f"Measuring {made.robot.title}",
-        subtitle=f"Plan {program.mark}, {', '.join(program.files)}: {len(program.tour.measured)} configurations, joint "
-        "positions as the controller shows them.",
-        words=(*program.answer, *planned.driving),
-        notices=worst_first(program.warnings),
+        subtitle=f"Plan {mark}{files}: {len(tour.measured)} configurations, joint positions {shown}.",
+        words=(*(() if program is None else program.answer), *planned.driving),
+        notices=worst_first(planned.warnings),
         command=planned.command,
+        followed="plan" if program is None else "program",
         noted=_NOTED,
         headings=[
             f"J{k} [{'deg' if joint.kind == 'revolute' else 'mm'}]" for k, joint in enumerate(made.robot.joints, 1)
         ],
         targets=_ticked([target.name for target in made.robot.targets]),
         reads=bool(reads),
-        rows=_rows(planned, program, reads),
+        rows=_rows(planned, tour, reads),
     )
 
 
@@ -66,9 +77,8 @@ def _ticked(targets: list[str]) -> list[str]:
     return targets if len(targets) <= _MOST_TICKED else [f"all {len(targets)}"]
 
 
-def _rows(planned: Plan, program: PlanProgram, reads: dict[str, str]) -> list[_Row]:
+def _rows(planned: Plan, tour: Tour, reads: dict[str, str]) -> list[_Row]:
     robot = planned.made.robot
-    tour = program.tour
     stops = (tour.stops[0], *tour.measured)
     shown = robot.controller.from_model(np.array([stop.joints for stop in stops]))
     units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]

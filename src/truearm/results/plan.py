@@ -18,7 +18,7 @@ from truearm.planning.driving.tour import Tour
 from truearm.planning.driving.tour_table import tour_csv, tour_words
 from truearm.results.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
 from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
-from truearm.results.tour_files import tour_summary, ways_beside
+from truearm.results.tour_files import sheet_beside, tour_summary, ways_beside
 from truearm.writing import output_file, output_folder, write_files
 
 #: What the page beside a plan ends with.
@@ -49,6 +49,8 @@ class Plan(Record):
         What drives it; None where no program was asked for.
     replaced
         What to know of another plan that it was written over.
+    told
+        What to know of what it was made with: the load, and targets that nobody said.
     """
 
     made: MeasurementPlan
@@ -60,6 +62,7 @@ class Plan(Record):
     tour: Tour | None = None
     program: PlanProgram | None = None
     replaced: tuple[Notice, ...] = ()
+    told: tuple[Notice, ...] = ()
 
     @property
     def joints(self) -> Array:
@@ -91,11 +94,11 @@ class Plan(Record):
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
-        """What to know of the ways that were checked, and of the program."""
+        """What to know of what it was made with, of the ways that were checked, and of the program."""
         if self.program is not None:
             return self.program.warnings
         robot = self.made.robot
-        return (*(() if self.tour is None else self.tour.notices), *wider_limits_notices(robot))
+        return (*self.told, *(() if self.tour is None else self.tour.notices), *wider_limits_notices(robot))
 
     @property
     def _there(self) -> tuple[str, ...]:
@@ -209,15 +212,17 @@ class Plan(Record):
         }
 
     def save(self, file: str | Path) -> tuple[Path, ...]:
-        """Write the plan as CSV, a page with the same name that ends in ``.html``, and the ways if they were checked.
+        """Write the plan as CSV, a page with the same name that ends in ``.html``, and a driven one's ways and sheet.
 
         A plan with a program is written into a folder, with the program and a sheet for the operator.
 
         Returns
         -------
-        The files written; all stops on the ways are in the one that ends in ``-ways.csv``.
+        The files written; all stops on the ways are in the one that ends in ``-ways.csv``, and ``-sheet.html`` is for
+        the operator.
         """
         from truearm.reporting.plan_report import plan_html
+        from truearm.reporting.plan_sheet import plan_sheet
 
         if self.program is not None:
             contents = self.contents()
@@ -232,5 +237,6 @@ class Plan(Record):
         if self.tour is not None:
             ways = output_file(ways_beside(table), self.inputs, ours=True)
             texts[ways.name] = tour_csv(self.tour, self.made.robot, self.joints_are)
+            texts[output_file(sheet_beside(table), self.inputs, ours=True).name] = plan_sheet(self)
         write_files(table.parent, texts, self.command)
         return tuple(table.parent / name for name in texts)

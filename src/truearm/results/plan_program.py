@@ -18,6 +18,8 @@ TABLE: Final = "plan.csv"
 PLAN_PAGE: Final = "plan.html"
 WAYS: Final = "plan-ways.csv"
 SHEET: Final = "sheet.html"
+#: Characters of a plan's hash by which program and sheet name it.
+MARK: Final = 12
 #: What the robot waits for, in words.
 _WAITS: Final = {
     "time": "",

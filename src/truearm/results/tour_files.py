@@ -17,6 +17,11 @@ def ways_beside(table: Path) -> Path:
     return table.with_name(f"{table.stem}-ways.csv")
 
 
+def sheet_beside(table: Path) -> Path:
+    """Return where the sheet for the operator of a plan is written, beside its table."""
+    return table.with_name(f"{table.stem}-sheet.html")
+
+
 def tour_summary(tour: Tour, robot: Robot, joints_are: JointsOf) -> dict[str, Any]:
     """Return a tour as JSON holds it: lengths in mm, joints in deg or mm as the file counts them."""
     return {

@@ -237,5 +237,5 @@ def number(value: float, decimals: int) -> str:
 
 
 def percent(share: float) -> int:
-    """Return a share in whole percent, 1 at least."""
-    return max(1, round(100.0 * share))
+    """Return a share in whole percent, rounded down, 1 at least."""
+    return max(1, math.floor(100.0 * share + 1e-6))

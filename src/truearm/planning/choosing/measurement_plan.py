@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -23,6 +23,7 @@ from truearm.planning.choosing.exchange import FIRST, most_informative, most_inf
 from truearm.planning.choosing.observability import INDICES, OfPredictions, observability
 from truearm.planning.choosing.ordering import short_order
 from truearm.planning.choosing.prediction import Prediction, There, model_error, predict
+from truearm.planning.choosing.reachable import Reachable, chosen_with_ways
 from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
 from truearm.planning.constraints.constraints import Constraints, allowed, refuse_clearance_of
 from truearm.planning.driving.drawing import Drawn, drawn_clear
@@ -195,8 +196,8 @@ def plan_measurements(
     seen_from_the_origin: bool = True,
     readings: Dataset | None = None,
     finder: WayFinder | None = None,
-    without_way: int = 0,
     drawn: Drawn | None = None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> MeasurementPlan:
     """Choose configurations to measure.
 
@@ -228,17 +229,19 @@ def plan_measurements(
         What a device would read at the candidates, see :func:`device_candidates`; None for the positions of all targets
         at each.
     finder
-        What the arm keeps clear of, at the candidates and where its accuracy is predicted; None for nothing.
-    without_way
-        How many candidates were left out because no way to them was found.
+        What the arm keeps clear of, at the candidates, on the ways to those that are chosen and where its accuracy is
+        predicted; None for nothing.
     drawn
         How the candidates were drawn, see :func:`driven_candidates`.
+    progress
+        Called with a few words at each step.
 
     Raises
     ------
     InputError
         If the objective is not known or does not decide on a number, too few candidates keep the constraints, or
-        there are fewer rows than parameters, or candidates that were drawn are all alike.
+        there are fewer rows than parameters, candidates that were drawn are all alike, or there are ways to fewer
+        candidates than are chosen.
     """
     _check_objective(objective, poses, accurate_at)
     seen = model.prepared(robot)
@@ -247,8 +250,7 @@ def plan_measurements(
     if finder is not None:
         kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
-    rejected |= {"ways": without_way} if without_way else {}
-    total = len(candidates) + without_way
+    total = len(candidates)
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
     given = "candidates" if labels is None else "candidates_from"
     count = FIRST if poses is None else poses
@@ -262,7 +264,7 @@ def plan_measurements(
         free, gauge = unanchored(model.free(seen), readings), gauge_freedoms(readings)
         derivatives = sensitivity_of_readings(seen, readings.of_configurations(usable), free, noise)
     among = derivatives.identifiable(count)
-    rows, known = np.ascontiguousarray(derivatives.rows[..., among]), derivatives.known[np.ix_(among, among)]
+    known = derivatives.known[np.ix_(among, among)]
     if not len(among):
         raise InputError(
             "with so much noise nothing can be identified",
@@ -275,22 +277,36 @@ def plan_measurements(
     needed = len(among)
     if readings is None:  # few candidates show less than there is to identify
         needed = max(needed, len(predicted.identifiable(count)))
-    if poses is not None and poses * rows.shape[1] < needed:
+    if poses is not None and poses * derivatives.rows.shape[1] < needed:
         raise InputError(
             "there are fewer equations than parameters",
             parameter="poses",
             came=poses,
-            allowed=f"{-(-needed // rows.shape[1])} or more for the model {model.name}, or auto",
+            allowed=f"{-(-needed // derivatives.rows.shape[1])} or more for the model {model.name}, or auto",
         )
     wanted = None if accurate_at is None else sensitivity(seen, accurate_at, free, noise, gauge)
     goal = INDICES["O1"] if wanted is None else OfPredictions.of(wanted.rows[..., among])
     goal = INDICES.get(objective, goal)
-    started = time.process_time()
-    found = most_informative_number(rows, known) if poses is None else most_informative(rows, poses, known, goal)
-    seconds = time.process_time() - started
-    order = np.array(found, dtype=np.intp)
-    order = order[short_order(candidates.joints[usable[order]])]
-    chosen = usable[order]
+    of_candidate = np.zeros(len(candidates), dtype=np.intp)
+    of_candidate[usable] = np.arange(len(usable))
+    seconds = 0.0
+
+    def rows_of(these: NDArray[np.intp]) -> Array:
+        return np.ascontiguousarray(derivatives.rows[of_candidate[these]][..., among])
+
+    def choose(these: NDArray[np.intp]) -> NDArray[np.intp]:
+        nonlocal seconds
+        rows, started = rows_of(these), time.process_time()
+        found = most_informative_number(rows, known) if poses is None else most_informative(rows, poses, known, goal)
+        seconds += time.process_time() - started
+        return these[np.array(found, dtype=np.intp)]
+
+    stops = before(seen, candidates.joints, None if finder is None else finder.low)
+    reachable = None if finder is None else Reachable(finder, candidates.joints, stops)
+    chosen, cost = chosen_with_ways(choose, usable, reachable, count, progress)
+    rejected |= cost
+    chosen = chosen[short_order(candidates.joints[chosen])]
+    order = of_candidate[chosen]
     joints = candidates.joints[chosen]
     if drawn is not None and len(np.unique(joints, axis=0)) < len(joints):
         raise InputError(
@@ -299,12 +315,14 @@ def plan_measurements(
             came=f"{len(np.unique(joints, axis=0))} different ones of {len(joints)}",
             cure="Widen the limits of the joints; check their unit.",
         )
-    chosen_rows = rows[order].reshape(-1, len(among))
+    chosen_rows = rows_of(chosen).reshape(-1, len(among))
+    left = len(usable) - sum(cost.values())
+    progress("predicting the accuracy")
     there = None
     if wanted is not None and accurate_at is not None:
         alike = None
         if objective != "O1":
-            by_o1 = np.array(most_informative(rows, len(order), known, INDICES["O1"]), dtype=np.intp)
+            by_o1 = np.array(most_informative(rows_of(usable), len(order), known, INDICES["O1"]), dtype=np.intp)
             alike = model_error(derivatives, by_o1, wanted, noise)
         there = There(seen.world_poses(accurate_at)[0], model_error(derivatives, order, wanted, noise), alike)
     at_fixtures = {}
@@ -322,11 +340,11 @@ def plan_measurements(
         labels=tuple(str(k + 1) for k in range(len(chosen))) if labels is None else tuple(labels[k] for k in chosen),
         chosen=chosen,
         joints=joints,
-        before=before(seen, joints, None if finder is None else finder.low),
+        before=stops[chosen],
         indices=observability(known + chosen_rows.T @ chosen_rows, len(chosen)),
         candidates=total,
         rejected=rejected,
-        usable=len(usable),
+        usable=left,
         left_out=tuple(name for k, name in enumerate(derivatives.free.names) if k not in among),
         seconds=seconds,
         prediction=replace(predict(seen, derivatives, order, predicted, elsewhere.joints, noise, rng), there=there),

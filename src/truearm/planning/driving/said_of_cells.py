@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rotation_vector
 from truearm.notices import Notice
 from truearm.planning.driving.collisions import CollisionCheck
 from truearm.planning.driving.links_beside import beside_notices
@@ -17,11 +18,13 @@ from truearm.planning.driving.links_beside import beside_notices
 _TINY: Final = 0.01
 #: A joint of less range may have its limits in another unit: once around is 6.3 rad, and a rail 2 m long [rad; m].
 _NARROW: Final = {"revolute": math.radians(7.0), "prismatic": 5e-3}
+#: Base frames that differ by less are the same [m and rad].
+_SAME: Final = 1e-6
 
 
 def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
     """Return what is to be known of what a check keeps clear of."""
-    notices = [*_box_notices(check), *beside_notices(check.robot)]
+    notices = [*_box_notices(check), *_frame_notices(check), *beside_notices(check.robot)]
     if check.left_out:
         notices.append(
             Notice(
@@ -45,6 +48,29 @@ def limits_notices(robot: Robot, low: Array, high: Array) -> tuple[Notice, ...]:
         return ()
     told = "Hardly any range is left to a joint" if len(narrow) == 1 else "Hardly any range is left to joints"
     return (Notice("limits-tiny", f"{told}: {', '.join(narrow)}. Check the unit of the limits, rad or deg, m or mm."),)
+
+
+def _frame_notices(check: CollisionCheck) -> list[Notice]:
+    """Return what is to be said of floor and boxes where the pendant shows positions in another base frame."""
+    base, cell = check.robot.controller.base, check.cell
+    moved = np.array(base.translation)
+    turned = float(np.linalg.norm(rotation_vector(base.rotation)))
+    if (cell.floor is None and not cell.boxes) or (np.abs(moved).max() < _SAME and turned < _SAME):
+        return []
+    named = " and ".join(
+        ([f"The {cell.surface}"] if cell.floor is not None else []) + (["boxes"] if cell.boxes else [])
+    )
+    kept = "are" if cell.boxes else "is"
+    at = ", ".join(f"{round(1e3 * v, 3) + 0.0:g}" for v in moved)
+    also = f", turned by {np.degrees(turned):.4g} deg" if turned >= _SAME else ""
+    return [
+        Notice(
+            "other-base-on-pendant",
+            f"{named[0].upper()}{named[1:]} {kept} kept in the base frame of the robot file. The pendant shows "
+            f"positions in another one, with its origin at ({at}) mm in it{also}: add that to what it shows.",
+            "note",
+        )
+    ]
 
 
 def _box_notices(check: CollisionCheck) -> list[Notice]:

@@ -34,7 +34,7 @@ def tour_csv(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> str:
 
 def home_shown(home: Array, robot: Robot, joints_are: JointsOf = "model") -> list[float]:
     """Return the safe configuration ``(joints,)`` of the model in deg or mm, as a person reads it."""
-    return [float(cell) for cell in joint_cells(home[None], robot.joints, counting(robot, joints_are))[0]]
+    return [float(cell) + 0.0 for cell in joint_cells(home[None], robot.joints, counting(robot, joints_are))[0]]
 
 
 def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list[str]:

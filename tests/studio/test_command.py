@@ -14,6 +14,7 @@ from tests.cli.conftest import truearm as truearm
 
 from truearm.studio.access import listening_socket
 from truearm.studio.project import PROJECT_FILE
+from truearm.studio.serving import serve
 
 
 def test_a_port_in_use_is_refused_with_a_free_one_and_no_project_made(truearm: Truearm, tmp_path: Path) -> None:
@@ -63,6 +64,14 @@ def test_a_demonstration_replaces_no_measurements(truearm: Truearm, tmp_path: Pa
     assert run.code == 2
     assert "this is another file of that name, and it is not overwritten" in run.err
     assert (tmp_path / "measurements.csv").read_text() == "mine"
+
+
+def test_a_demonstration_that_was_changed_is_opened_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / PROJECT_FILE).write_text("truearm: truearm-studio/1\n")
+    (tmp_path / "measurements.csv").write_text("mine")
+    (tmp_path / "cell.yaml").write_text("mine")
+    serve(tmp_path, port=0, demo=True).stop()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cell.yaml", "measurements.csv", PROJECT_FILE]
 
 
 def test_without_the_extra_it_says_what_to_install(

@@ -18,6 +18,7 @@ from truearm.jobs.compensate import compensate
 from truearm.library import load_robot
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.programs import ProgramsPage
+from truearm.studio.pages.proof import ProofPage
 
 
 def test_a_program_is_drawn_before_and_after_its_correction(
@@ -50,7 +51,13 @@ def test_a_program_is_drawn_before_and_after_its_correction(
 
     _, data = campaign("irb120", 24, 0.02e-3, 4)
     calibrate("irb120", data, model="offsets", out=folder / "result")
-    window.refresh()
+    window.edit(robot="gp25")
+    act(page._run)
+    assert "the result is of another robot than the one that is chosen; got &#x27;irb120&#x27;" in notices(window)
+    (proof,) = (page for page in window.pages if isinstance(page, ProofPage))
+    assert "This result is of the robot irb120, and gp25 is chosen" in proof._notices.content
+    window.edit(robot="irb120")
+    assert "This result is of the robot" not in proof._notices.content
     act(page._run)
     made = compensate(
         folder / "result/calibrated.yaml", [folder / "plate.mod"], taught=["none"], controller_kinematics="nominal"

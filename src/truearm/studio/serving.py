@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from truearm.errors import InputError
+from truearm.files import exists
 from truearm.studio.access import Access, is_loopback, listening_socket, new_token
 from truearm.studio.gate import Gate, start_server
 from truearm.studio.page import Page
@@ -83,7 +84,8 @@ def serve(
     token
         What a browser must bring; None for none on loopback, and for a new one elsewhere.
     demo
-        Fill the folder with what :func:`truearm.demo` writes, and choose it.
+        Fill the folder with what :func:`truearm.demo` writes, and choose it. A folder that was filled so before is
+        opened as it is.
     pages
         Of the window.
     say
@@ -102,7 +104,8 @@ def serve(
     bound = listening_socket(host_argument(host), port_argument(port))
     try:
         project: Project = open_project(folder, DEMONSTRATION if demo else None)
-        if demo:
+        # Where it was filled before, it is opened as it is now: what was changed since stays.
+        if demo and not exists(project.folder / DEMONSTRATION["cell"]):
             from truearm.jobs.demo import demo as job
 
             job(project.folder, progress=progress)

@@ -307,6 +307,29 @@ class Window:
         with confined_reads(self.project.folder):
             return load_robot(folder / "calibrated.yaml")
 
+    def result_of_another(self) -> str:
+        """Return which robot the result is of, where that is not the robot that is chosen; nothing otherwise."""
+        calibrated = self.calibrated()
+        return "" if calibrated is None or calibrated.name == self.robot().name else calibrated.name
+
+    def refuse_result_of_another(self) -> None:
+        """Refuse to go on with the result of another robot than the one that is chosen.
+
+        Raises
+        ------
+        InputError
+            If it is of another.
+        """
+        if other := self.result_of_another():
+            raise InputError(
+                "the result is of another robot than the one that is chosen",
+                parameter="robot",
+                where=self.project.settings.result,
+                came=other,
+                allowed=self.robot().name,
+                cure="Calibrate the robot that is chosen, or choose the one of the result.",
+            )
+
     def refresh(self) -> None:
         """Show what is true now on every page."""
         with self.lock, confined_reads(self.project.folder):

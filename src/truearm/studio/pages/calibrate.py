@@ -102,7 +102,12 @@ class CalibratePage:
 def _train(text: str) -> int | str | None:
     """Return what a text says of the training part: a number, all, or nothing."""
     text = text.strip()
-    return text or None if not text or text == "all" else _whole(text, "train")
+    if not text or text == "all":
+        return text or None
+    allowed = "how many configurations, 1 or more; or all"
+    if not text.isdecimal() or int(text) < 1:
+        raise InputError("a whole number belongs here, or all", parameter="train", came=text, allowed=allowed)
+    return int(text)
 
 
 def _whole(text: str, parameter: str) -> int:

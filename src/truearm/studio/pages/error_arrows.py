@@ -47,6 +47,7 @@ class ErrorArrows:
         folder = window.project.file("result")
         if folder is None or not exists(folder / "result.json"):
             raise InputError("there is no result yet", cure="Calibrate first.")
+        window.refuse_result_of_another()
         window.start(
             "Draw the errors",
             error_vectors,

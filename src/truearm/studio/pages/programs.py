@@ -102,6 +102,7 @@ class ProgramsPage:
         robot = f"{settings.result}/calibrated.yaml"
         if not exists(window.project.path(robot)):
             raise InputError("there is no calibrated robot yet", parameter="robot", cure="Calibrate first.")
+        window.refuse_result_of_another()
         window.start(
             "Correct the program",
             corrected_program,

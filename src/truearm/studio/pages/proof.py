@@ -54,7 +54,8 @@ class ProofPage:
         stat = (folder / "result.json").stat()
         exclude = project.file("exclude")
         rows = exclude.stat().st_mtime_ns if exclude is not None and exists(exclude) else None
-        shown = (folder, stat.st_mtime_ns, stat.st_size, project.settings.data, rows, project.settings.dark)
+        settings = project.settings
+        shown = (folder, stat.st_mtime_ns, stat.st_size, settings.robot, settings.data, rows, settings.dark)
         if shown == self._shown:
             return
         result = _read_result(folder / "result.json")
@@ -77,6 +78,10 @@ class ProofPage:
     def _told(self, result: dict[str, Any]) -> list[Notice]:
         """Return the notices of the result, and one if it is of other data than those that are chosen."""
         found = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
+        other = self._window.result_of_another()
+        if other:
+            text = f"This result is of the robot {other}, and {self._window.robot().name} is chosen: calibrate again."
+            found.append(Notice("other-robot", text, "warning"))
         data = self._window.project.file("data")
         if data is not None and exists(data):
             digest = hashlib.sha256(data.read_bytes()).hexdigest()[:12]

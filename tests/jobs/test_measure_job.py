@@ -309,6 +309,8 @@ def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Pat
         ({"disturbed": 0.95}, "disturbed", "too many"),
         ({"every": 0}, "every", "out of range"),
         ({"nests": [" "]}, "nests", "a name belongs here"),
+        ({"nests": ["n1", "n2", "n1"]}, "nests", "named twice; got 'n1'"),
+        ({"targets": ["1", 1]}, "targets", "named twice; got '1'"),
         ({"targets": ["x"]}, "targets", "no such target"),
     ],
 )

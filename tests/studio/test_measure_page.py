@@ -150,7 +150,7 @@ def test_what_is_next_and_what_came_is_said_and_drawn(page: MeasurePage) -> None
     assert 0 < drawn.kept.sum() < len(drawn.kept)
     said = re.sub("<[^>]*>", " ", page._next.content)
     assert "still to come" in said
-    assert f"{len(session(page).kept)} reading" in said
+    assert going(page).kept_words() in said
     table = page._last.content
     for code, count in session(page).aside_by_reason.items():
         assert f"aside: {code}" in table
@@ -274,6 +274,38 @@ def test_finish_before_the_end_takes_what_is_there(page: MeasurePage) -> None:
         act(page._stop, "finish")
     assert page._window.project.settings.data == "first/measurements.csv"
     assert page._file.value == "first/measurements.csv"
+
+
+def test_readings_of_a_former_folder_are_no_longer_shown_for_another(page: MeasurePage) -> None:
+    ask(page, **ARM)
+    frozen(page, 9)
+    nests = sum(entry.is_nest for entry in session(page).kept)
+    assert 0 < nests < len(session(page).kept)
+    assert re.search(rf" {len(session(page).kept) - nests} readings? kept, {nests} of nests", page._next.content)
+    page._pictures()
+    act(page._stop, "stop")
+    assert page._last.content
+    assert page._quality.place.visible
+    assert scene_of(page)._parts["measured-kept"]
+    page._change("out", "new")
+    page._window.refresh()
+    assert not page._last.content
+    assert not page._notices.content
+    assert not page._quality.place.visible
+    assert not page._drift.place.visible
+    parts = scene_of(page)._parts
+    assert not any(parts[name] for name in ("measured-kept", "measured-aside", "measured-sight", "measured-names"))
+    assert "begins with the first" in page._next.content
+
+
+@pytest.mark.parametrize("every", [0, -3, 10001])
+def test_a_number_of_configurations_between_nests_that_cannot_be_is_refused_where_it_is_typed(
+    page: MeasurePage, every: int
+) -> None:
+    with pytest.raises(InputError, match=r"too (small|large)") as refusal:
+        page._change("every", every)
+    assert refusal.value.came == every
+    assert page._now()["every"] == 10
 
 
 def test_rows_of_a_watched_folder_are_taken_and_broken_ones_named(page: MeasurePage, tmp_path: Path) -> None:

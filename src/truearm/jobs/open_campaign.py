@@ -31,7 +31,7 @@ from truearm.measurement.measuring.about import About, read_about
 from truearm.measurement.measuring.campaign import Campaign
 from truearm.measurement.measuring.reading_log import LOG
 from truearm.measurement.measuring.readings import Quality
-from truearm.measurement.measuring.session import Session
+from truearm.measurement.measuring.session import LONGEST_ROUND, Session
 from truearm.measurement.measuring.sources import Source
 from truearm.measurement.readers.columns import joints_in_file
 from truearm.measurement.readers.rows import Configurations
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
 
 _LONGEST_NAME: Final = 100
 _MOST_DISTURBED: Final = 0.9
-_LONGEST_ROUND: Final = 10_000
 _MOST_SAMPLES: Final = 1_000_000
 
 
@@ -186,7 +185,7 @@ def open_campaign(
         listen={"token": token},
     )
     call = command_argument(command) or f"truearm.measure({str(path)!r}, .., out={str(out)!r})"
-    between = whole_argument(every, "every", 1, _LONGEST_ROUND)
+    between = whole_argument(every, "every", 1, LONGEST_ROUND)
     folder_for((LOG, BEGUN), out, path, robot, truth, mapping, about)
     folder = folder_for((DATA, PAGE), out, path, robot, truth, mapping, about, ours=True)
     nominal = robot_argument(robot)
@@ -344,6 +343,10 @@ def _names(names: object, parameter: str) -> tuple[str, ...] | None:
     if names is None:
         return None
     found = names_argument(names, parameter, "names of points")
+    given = [str(name) for name in names]  # type: ignore[attr-defined]
+    if len(given) > len(found):
+        twice = next(name for name in found if given.count(name) > 1)
+        raise InputError("a point is named twice", parameter=parameter, came=twice, cure="Name each once.")
     for name in found:
         if not is_one_line(name) or len(name) > _LONGEST_NAME or name != name.strip():
             raise InputError(

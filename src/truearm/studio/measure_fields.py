@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.errors import InputError
+from truearm.measurement.measuring.session import LONGEST_ROUND
 from truearm.units import sized_si, to_si
 
 _Text = Annotated[str, Field(min_length=1)]
@@ -49,7 +50,7 @@ class MeasureFields(BaseModel):
     listen: Annotated[_Whole, Field(ge=0, le=65535)] = 0
     targets: _Text | None = None
     nests: _Text | None = None
-    every: _Whole = EVERY
+    every: Annotated[_Whole, Field(ge=1, le=LONGEST_ROUND)] = EVERY
     most_deviation: _Number | None = None
     most_settling: _Number | None = None
     fewest_samples: _Whole | None = None

@@ -195,6 +195,12 @@ class Measuring:
         of = len(session.labels) + session.rounds
         return (of, of) if step is None else (step.number - 1, step.of)
 
+    def kept_words(self) -> str:
+        """Return how many readings are kept, those of nests counted by themselves."""
+        kept = self.campaign.session.kept
+        nests = sum(entry.is_nest for entry in kept)
+        return f"{counted(len(kept) - nests, 'reading')} kept{f', {nests} of nests' if nests else ''}"
+
     def rows(self, most: int) -> list[Sequence[object]]:
         """Return the last entries, the newest first, as the rows of a table."""
         session = self.campaign.session

@@ -118,6 +118,22 @@ def test_what_is_left_out_is_not_asked_for_but_may_come_all_the_same() -> None:
     assert not of.left_out
 
 
+def test_targets_left_out_at_most_configurations_are_told_and_one_of_two_seen_at_each_is_not() -> None:
+    of = session()
+    for label in LABELS:
+        of.add(of.leave_out(label, "b", "the tracker does not see it"))
+    for label in LABELS[:2]:
+        of.add(of.leave_out(label, "a", "the tracker does not see it"))
+    assert "many-left-out" not in {n.code for n in session_notices(of)}
+    of.add(of.leave_out("P3", "a", "the tracker does not see it"))
+    (notice,) = [n for n in session_notices(of) if n.code == "many-left-out"]
+    assert notice.level == "warning"
+    assert "At 3 of 4 configurations" in notice.message
+    assert "7 of 8 readings of targets are missing" in notice.message
+    taken(of, "a", "P3")
+    assert "many-left-out" not in {n.code for n in session_notices(of)}
+
+
 # -- what a reading is worth -----------------------------------------------------------------------------------
 
 

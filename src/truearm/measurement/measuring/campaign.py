@@ -136,6 +136,16 @@ def session_notices(session: Session) -> list[Notice]:
                 "nests over time may be wrong.",
             )
         )
+    none = len(session.without_reading)
+    if 2 * none > len(session.labels):
+        found.append(
+            Notice(
+                "many-left-out",
+                f"At {none} of {len(session.labels)} configurations every target was left out: "
+                f"{len(session.left_out)} of {len(session.labels) * len(session.targets)} readings of targets are "
+                "missing. If the instrument does not see them there, plan for it: `truearm plan` with `device`.",
+            )
+        )
     jumps = _out_of_order(session)
     if jumps:
         found.append(

@@ -18,6 +18,8 @@ Event = Literal["reading", "aside", "left"]
 Kind = Literal["nests", "configuration"]
 #: Kind, number of the round or index of the configuration, and name of a point that is measured there.
 Place = tuple[Kind, int, str]
+#: Configurations between two rounds of the nests, at most.
+LONGEST_ROUND: Final = 10_000
 #: What may be written of a reading by hand.
 _LONGEST_WORDS: Final = 200
 
@@ -205,6 +207,12 @@ class Session:
         """Configuration and name of the targets that were left out."""
         gone = sorted(place for place in self._left - {*self._held} if place[0] == "configuration")
         return tuple((self.labels[k], name) for _, k, name in gone)
+
+    @property
+    def without_reading(self) -> tuple[str, ...]:
+        """Configurations at which every target was left out."""
+        left = Counter(label for label, _ in self.left_out)
+        return tuple(label for label in self.labels if left[label] == len(self.targets))
 
     def reason_of(self, entry: Entry) -> str:
         """Return why a reading is not kept now, empty if it is."""

@@ -11,7 +11,6 @@ from truearm.measurement.measuring.reading_log import LOG
 from truearm.notices import Notice
 from truearm.reporting.measure_figures import drift_figure, quality_figure
 from truearm.results.measured import DATA, PAGE
-from truearm.shown import counted
 from truearm.studio import words
 from truearm.studio.measure_fields import SOURCES
 from truearm.studio.measuring import HEAD, Measuring
@@ -47,6 +46,7 @@ class MeasurePage:
         self._window = window
         self.measuring: Measuring | None = None
         self._written = False
+        self._shown: str | None = None  # the folder whose readings are shown
         self._turn = 0
         self._due = 0.0
         gui = window.gui
@@ -290,10 +290,13 @@ class MeasurePage:
         self._stop.visible = self._bar.visible = self._by_hand.visible = going
         if measuring is None:
             self._next.content = words.paragraph(self._before_start()) + words.paragraph(_RULE)
+            if self._shown not in (None, self._window.project.settings.measure.out):
+                self._clear()
             return
+        self._shown = measuring.fields.out
         session, (done, of) = measuring.campaign.session, measuring.progress()
         self._bar.value = 100.0 * done / of
-        kept = f"{done} of {of} steps done; {counted(len(session.kept), 'reading')} kept."
+        kept = f"{done} of {of} steps done; {measuring.kept_words()}."
         self._next.content = "".join(words.paragraph(text) for text in [*measuring.next_words(), kept])
         reasons = measuring.reasons()
         self._last.content = (
@@ -307,6 +310,13 @@ class MeasurePage:
         points = (NONE,) if step is None else step.names
         offer(self._point, points, self._point.value if self._point.value in points else points[0], None)
         self.scene.show(measuring)
+
+    def _clear(self) -> None:
+        """Show no longer what was measured into another folder."""
+        self._shown = None
+        self._last.content = self._notices.content = ""
+        self._drift.place.visible = self._quality.place.visible = False
+        self.scene.clear()
 
     def _before_start(self) -> str:
         project = self._window.project

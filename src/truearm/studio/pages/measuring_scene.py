@@ -71,6 +71,17 @@ class MeasuringScene:
         names = {} if lines is None else lines.names
         scene.show_names(_NAMES, {words.one_line(name): in_scene(place) for name, place in names.items()})
 
+    def clear(self) -> None:
+        """Draw nothing any more."""
+        self._measuring, self._at = None, -1
+        jog = next((page for page in self._window.pages if isinstance(page, JogPage)), None)
+        if jog is None or jog.scene.solid is None:
+            return
+        jog.scene.show_points(_KEPT, None)
+        jog.scene.show_points(_ASIDE, None)
+        jog.scene.show_lines(_LINES, None)
+        jog.scene.show_names(_NAMES, {})
+
     def _again(self) -> None:
         self._at = -1
         if self._measuring is not None:

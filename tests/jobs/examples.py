@@ -472,7 +472,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "out": folder / "fleet",
         "workers": 1,
     },
-    "new_robot": lambda folder: {"file": _new(folder, "robot.yaml")},
+    "new_robot": lambda folder: {"file": _new(folder, "new_robot.yaml")},
     "example": lambda folder: {"folder": Path(tempfile.mkdtemp(dir=folder))},
     "demo": lambda folder: {"out": folder / "demo"},
 }

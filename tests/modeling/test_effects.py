@@ -258,6 +258,8 @@ NAMED_ELSEWHERE = {
     "results/tilting.py": "what the method with inclinometers finds, in words",
     "reporting/tilting_report.py": "and its pictures",
     "studies/": "a study chooses models as its document does",
+    "studio/cell_rules.py": "what keeps clear of a cell is called like an effect",
+    "studio/plan_fields.py": "and its field",
     "planning/driving/": "a stop of a tour is called like an effect",
     "planning/iso9283/": "a criterion of ISO 9283 is called like an effect",
     "validation/iso9283/": "and its value",

@@ -145,7 +145,7 @@ def test_a_plan_is_written_where_it_is_said(studio: Studio) -> None:
     typed(studio, "out", "plans/first.csv")
     act(page._run)
     assert window.wait(60.0)
-    names = ("plans/first.csv", "plans/first.html", "plans/first-ways.csv")
+    names = ("plans/first.csv", "plans/first.html", "plans/first-ways.csv", "plans/first-sheet.html")
     assert eventually(lambda: page._file.options == names), said(studio)
     assert f"Written: {', '.join(names)}" in page._said.content
     assert [one.name for one in window.project.changes()] == ["plan.csv"]

@@ -50,6 +50,7 @@ OPTIONS: Final[Mapping[str, Callable[[str], Any]]] = {
     "bounds": _text,
     "hold": _names,
     "frames": _text,
+    "exclude": _text,
     "bootstrap": _whole,
     "effects": _names,
     "payload": _text,
@@ -60,7 +61,7 @@ OPTIONS: Final[Mapping[str, Callable[[str], Any]]] = {
     "zones": _whole,
 }
 #: Those that name a file, from the manifest's folder.
-FILES: Final = ("bounds", "frames", "zones")
+FILES: Final = ("bounds", "exclude", "frames", "zones")
 
 _KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
     "model": (*(model.name for model in (FRAMES, *MODELS)), AUTO),

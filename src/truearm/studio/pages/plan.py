@@ -200,7 +200,8 @@ class PlanPage:
         """Return the files of the plan: with a program all of their folder."""
         plan, project = self._window.project.settings.plan, self._window.project
         if plan.program is None:
-            names = [plan.place, f"{plan.place.removesuffix('.csv')}.html", self._ways()]
+            stem = plan.place.removesuffix(".csv")
+            names = [plan.place, f"{stem}.html", self._ways(), f"{stem}-sheet.html"]
             return [name for name in names if project.path(name).is_file()]
         return [name for name in project.names() if name.startswith(f"{plan.place}/")]
 

@@ -81,7 +81,11 @@ def planned(
         files = tuple(f"{fields.place}/{name}" for name in found.contents())
     else:
         stem = fields.place.removesuffix(Path(fields.place).suffix)
-        files = (fields.place, f"{stem}.html", *(() if found.tour is None else (f"{stem}-ways.csv", f"{stem}-sheet.html")))
+        files = (
+            fields.place,
+            f"{stem}.html",
+            *(() if found.tour is None else (f"{stem}-ways.csv", f"{stem}-sheet.html")),
+        )
     return Planned(
         Outcome(tuple(found.lines()), found.warnings, files),
         made.robot.forward(made.joints)[0],

@@ -181,6 +181,6 @@ def test_the_ways_are_driven_from_home_and_shown_after_reopening(
     again = serving(window.project.folder)
     shown = next(page for page in again.window.pages if isinstance(page, JogPage)).scene._parts["chosen"][0].points
     assert np.asarray(shown) == pytest.approx(np.asarray(chosen), abs=1e-6)
-    assert page_of(again)._file.options == ("plan.csv", "plan.html", "plan-ways.csv")
+    assert page_of(again)._file.options == ("plan.csv", "plan.html", "plan-ways.csv", "plan-sheet.html")
     again.window.edit(robot="katana450")
     assert next(p for p in again.window.pages if isinstance(p, JogPage)).scene._parts["chosen"] == []

@@ -53,8 +53,12 @@ def upload(line: Any, button: str, name: str, content: bytes, size: int, parts: 
 
 
 def coming(studio: Studio) -> list[int]:
-    """Return the sizes of files that are coming, as they are on disk."""
-    return [path.stat().st_size for path in studio.window.project.folder.glob(".truearm-upload.*")]
+    """Return the sizes of files that are coming, as they are on disk; the studio may remove one meanwhile."""
+    sizes = []
+    for path in studio.window.project.folder.glob(".truearm-upload.*"):
+        with suppress(FileNotFoundError):
+            sizes.append(path.stat().st_size)
+    return sizes
 
 
 def test_files_are_taken_in_and_those_too_large_are_refused_before_they_come(serving: Serving) -> None:

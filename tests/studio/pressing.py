@@ -47,3 +47,12 @@ def at_once(window: Window, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def notices(window: Window) -> str:
     """Return all that the window says in its notices."""
     return "".join(window._told)
+
+
+def below(window: Window, element: Any) -> str:
+    """Return the refusal that a page shows right below an element; nothing if there is none."""
+    container: Any = window.gui._container_handle_from_uuid[element._impl.parent_container_id]
+    following = [one for one in container._children.values() if getattr(one, "order", -1.0) > element.order]
+    first = min(following, key=lambda one: one.order, default=None)
+    content = getattr(first, "content", "")
+    return content if 'role="alert"' in content else ""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.studio.conftest import Serving
+from tests.studio.pressing import below
 from tests.studio.typing_in import typed
 
 from truearm.errors import InputError
@@ -36,7 +37,7 @@ keep_out:
 
 @pytest.fixture
 def studio(serving: Serving, monkeypatch: pytest.MonkeyPatch) -> Studio:
-    monkeypatch.setattr("truearm.studio.window._REST", 0.01)  # nobody types here
+    monkeypatch.setattr("truearm.studio.typing_at_rest._REST", 0.01)  # nobody types here
     return serving()
 
 
@@ -105,7 +106,7 @@ def test_a_box_that_cannot_be_is_refused_beside_its_field(studio: Studio, field:
     before, row = file.read_text(), boxes._rows["box_1"]
     element = row.name if field == "name" else row.ranges["xyz".index(field)]
     typed(studio, element, text)
-    assert words in row.said.content, row.said.content
+    assert words in below(studio.window, element)
     assert file.read_text() == before
     assert element.value == text
 
@@ -167,9 +168,9 @@ def test_base_targets_and_fixtures_go_into_a_robot_file_of_the_project(studio: S
     typed(studio, places._rows["nest"].kind, "frame")
     assert load_robot(folder / "irb120-cell.yaml").fixtures[0].kind == "frame"
     typed(studio, places._rows["nest"].name, "plane_1")
-    assert "of this name already" in places._rows["nest"].said.content
+    assert "of this name already" in below(window, places._rows["nest"].name)
     typed(studio, places._rows["target_1"].name, "a\tb")
-    assert places._rows["target_1"].said.content != ""
+    assert below(window, places._rows["target_1"].name) != ""
     while window.project.settings.robot != "irb120":
         window._undo_edit()
     assert places._rows == {}
@@ -210,7 +211,7 @@ def test_a_robot_file_of_the_user_and_a_calibrated_robot_are_not_changed(studio:
     file.write_text("# mine\n" + robot_text(load_robot("irb120")))
     window.edit(robot="my-cell.yaml")
     typed(studio, places._base, (1.0, 0.0, 0.0))
-    assert "was not written here" in places._said.content
+    assert "was not written here" in below(window, places._base)
     assert file.read_text().startswith("# mine\n")
 
 

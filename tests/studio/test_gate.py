@@ -226,13 +226,13 @@ def test_a_second_window_reads_until_it_takes_over(serving: Serving) -> None:
     with window(studio) as first, window(studio) as second:
         working(studio, first)
         send(second, **CAMERA)
-        assert eventually(lambda: len(studio.window._banners) == 1)
+        assert eventually(lambda: len(studio.window._windows.banners) == 1)
         (offer,) = studio.window.gate.offers
         send(second, type="GuiUpdateMessage", uuid=robot, updates={"value": "kr5"})
         send(second, type="GuiUpdateMessage", uuid=offer, updates={"value": True})
         assert eventually(lambda: offer not in studio.window.gate.offers)
         assert studio.window.project.settings.robot == "irb120"
-        assert eventually(lambda: len(studio.window._banners) == 1)  # now the first one reads
+        assert eventually(lambda: len(studio.window._windows.banners) == 1)  # now the first one reads
         send(first, type="GuiUpdateMessage", uuid=robot, updates={"value": "ur5"})
         send(second, type="GuiUpdateMessage", uuid=robot, updates={"value": "ur10"})
         assert eventually(lambda: studio.window.project.settings.robot == "ur10")

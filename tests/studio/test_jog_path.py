@@ -20,7 +20,7 @@ _START = (350.0, 0.0, 250.0)
 
 @pytest.fixture
 def studio(serving: Serving, monkeypatch: pytest.MonkeyPatch) -> Studio:
-    monkeypatch.setattr("truearm.studio.window._REST", 0.01)  # nobody types here
+    monkeypatch.setattr("truearm.studio.typing_at_rest._REST", 0.01)  # nobody types here
     return serving()
 
 

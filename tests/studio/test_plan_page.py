@@ -26,7 +26,7 @@ from truearm.studio.serving import Studio
 
 @pytest.fixture
 def studio(serving: Serving, monkeypatch: pytest.MonkeyPatch) -> Studio:
-    monkeypatch.setattr("truearm.studio.window._REST", 0.01)  # nobody types here
+    monkeypatch.setattr("truearm.studio.typing_at_rest._REST", 0.01)  # nobody types here
     return serving()
 
 

@@ -152,7 +152,7 @@ def test_entities_and_too_much_are_refused(project: Project, monkeypatch: pytest
 def test_the_robot_is_drawn_with_its_meshes_and_moves_with_them(
     serving: Serving, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("truearm.studio.window._REST", 0.01)
+    monkeypatch.setattr("truearm.studio.typing_at_rest._REST", 0.01)
     studio = serving()
     window, folder = studio.window, studio.window.project.folder
     (folder / "arm.urdf").write_text(urdf(mesh("part.stl"), mesh("part.stl"), mesh("part.dae"), mesh("part.stl")))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from filecmp import cmp
 from pathlib import Path, PurePosixPath
@@ -38,10 +38,13 @@ class ChangedFile:
         In the folder.
     how
         ``changed``, ``new`` or ``gone``.
+    stamp
+        Size [bytes] and time of its last change [ns]; None if it is gone.
     """
 
     name: str
     how: Literal["changed", "new", "gone"]
+    stamp: tuple[int, int] | None
 
 
 @dataclass(frozen=True)
@@ -74,10 +77,13 @@ class Project:
         Its absolute path, links followed.
     settings
         What holds now; it is what the file says.
+    theirs
+        Files, and folders, into which other programs write as they shall: what they change there is not told.
     """
 
     def __init__(self, folder: Path, settings: Settings, written: str | None) -> None:
         self.folder, self.settings = folder, settings
+        self.theirs: tuple[str, ...] = ()
         self._undone: list[_Edit] = []
         self._before: list[_Edit] = []
         self._written = written
@@ -183,25 +189,33 @@ class Project:
     def look(self, *names: str) -> None:
         """Take note of files as they are now, those of some names and in folders of these; without names, of all.
 
-        The studio itself has written them.
+        The studio itself has written them, with the manifests beside them.
         """
         now = self._stamps()
-
-        def meant(name: str) -> bool:
-            return any(name == one or name.startswith(f"{one}/") for one in names)
-
         if names:
-            stay = {name: stamp for name, stamp in self._seen.items() if not meant(name)}
-            now = stay | {name: stamp for name, stamp in now.items() if meant(name)}
+            meant = (*names, *(str(PurePosixPath(name).parent / MANIFEST) for name in names))
+            stay = {name: stamp for name, stamp in self._seen.items() if not _is_among(name, meant)}
+            now = stay | {name: stamp for name, stamp in now.items() if _is_among(name, meant)}
         self._seen = now
+
+    def seen(self, changes: Iterable[ChangedFile]) -> None:
+        """Take note of changes that are shown; what has been changed once more since they were found is none of them."""
+        for one in changes:
+            if one.stamp is None:
+                self._seen.pop(one.name, None)
+            else:
+                self._seen[one.name] = one.stamp
 
     def changes(self) -> tuple[ChangedFile, ...]:
         """Return which files other programs have changed since the last look."""
         now, seen = self._stamps(), self._seen
-        found = [ChangedFile(name, "new") for name in now if name not in seen]
-        found += [ChangedFile(name, "gone") for name in seen if name not in now]
-        found += [ChangedFile(name, "changed") for name, stamp in now.items() if name in seen and seen[name] != stamp]
-        return tuple(sorted(found, key=lambda one: one.name))
+        found = [ChangedFile(name, "new", stamp) for name, stamp in now.items() if name not in seen]
+        found += [ChangedFile(name, "gone", None) for name in seen if name not in now]
+        found += [
+            ChangedFile(name, "changed", stamp) for name, stamp in now.items() if name in seen and seen[name] != stamp
+        ]
+        told = [one for one in found if not _is_among(one.name, self.theirs)]
+        return tuple(sorted(told, key=lambda one: one.name))
 
     def names(self, *suffixes: str) -> list[str]:
         """Return the names of files of the project, those of some endings, three folders deep."""
@@ -288,6 +302,11 @@ class Project:
                     continue
                 found[self.relative(here / name)] = (known.st_size, known.st_mtime_ns)
         return found
+
+
+def _is_among(name: str, names: Iterable[str]) -> bool:
+    """Return whether a file is one of some, or in a folder that is."""
+    return any(name == one or name.startswith(f"{one}/") for one in names)
 
 
 def open_project(folder: object, first: Mapping[str, Any] | None = None) -> Project:

@@ -1,4 +1,4 @@
-"""The window's frame: its pages, what it says, long actions, and which of several windows works."""
+"""The window's frame: its pages, what is done on them, what is said and refused, and long actions."""
 
 from __future__ import annotations
 
@@ -6,35 +6,32 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import viser
-from viser._messages import FileTransferPartAck, RemoveNotificationMessage
-from websockets.asyncio.server import ServerConnection
 
 from truearm.errors import InputError
-from truearm.files import confined_reads, exists, read_bytes
+from truearm.files import confined_reads, exists
 from truearm.library import load_robot
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.gate import Gate
+from truearm.studio.other_programs import OtherPrograms
 from truearm.studio.page import Page
 from truearm.studio.project import Project
+from truearm.studio.refusals import Refusals
+from truearm.studio.typing_at_rest import TypingAtRest
 from truearm.studio.uploads import Upload
 from truearm.studio.values import fits
+from truearm.studio.windows import Windows
 from truearm.studio.work import Work, unforeseen
 from truearm.writing import put_back_old
 
 #: So much of what was said stays to be read.
 _TOLD: Final = 40
-#: So often the folder is looked at for changes of other programs [s].
-_LOOK: Final = 2.0
-#: A text is taken when nothing was typed for so long [s].
-_REST: Final = 0.6
 #: Width of the pages, and width and height of the notices, which float over a corner of the scene [px].
 _WIDTH: Final = 520
 _NOTICES: Final = (440, 230)
@@ -63,27 +60,22 @@ class Window:
         self.lock = threading.RLock()
         self._told: deque[str] = deque(maxlen=_TOLD)
         self._work: Work | None = None
-        self._windows: dict[int, tuple[viser.ClientHandle, ServerConnection]] = {}
-        self._banners: dict[int, list[Any]] = {}
-        self._changes: tuple[Any, ...] = ()
-        self._typing: dict[object, tuple[threading.Timer, Callable[[], None]]] = {}
+        self._acted: Any = None  # the element whose callback is called now
+        self._refusals = Refusals(self.gui)
+        self._typing = TypingAtRest(self.lock, self._take_typed, lambda field: self._refusals.keep_typed(field, None))
         self._stopped = threading.Event()
         self.pages: list[Page] = []
         self._theme()
         self._frame(pages)
-        gate.blocked = self._say_blocked
-        gate.uploads.told = self._say_came
         gate.fits = self._fits
         gate.say = lambda text: self.tell(Notice("refused", text.removeprefix("refused: "), "warning"))
-        server.on_client_connect(self._arrived)
-        server.on_client_disconnect(self._gone)
-        self._looking = threading.Thread(target=self._look, daemon=True)
-        self._looking.start()
+        self._windows = Windows(server, gate)
+        self._others.start()
 
     # What pages use ----------------------------------------------------------------------------------------------
 
     def action(self, do: Callable[[], None]) -> Callable[[Any], None]:
-        """Return a callback for an element: `do` is called under the lock, and a refusal is shown.
+        """Return a callback for an element: `do` is called under the lock, and a refusal is shown below the element.
 
         It is called for what a user did alone, not where the studio itself sets a value.
         """
@@ -91,24 +83,18 @@ class Window:
         def called(event: Any) -> None:
             if getattr(event, "client", None) is not None:
                 with self.lock:
-                    if self._typed(*self._typing):
-                        self._do(do)
+                    if self._typing.take_all():
+                        self._do(do, getattr(event, "target", None))
 
         return called
 
-    def _do(self, do: Callable[[], None]) -> bool:
-        """Do something for the user, and show what is refused; return whether nothing was."""
-        with self.lock, confined_reads(self.project.folder):
-            try:
-                do()
-            except InputError as error:
-                self.refuse(error)
-                self.refresh()
-            except Exception as error:  # it is told, and its place is on standard error
-                self.refuse(unforeseen(error))
-            else:
-                return True
-        return False
+    def settled(self, do: Callable[[], None]) -> Callable[[Any], None]:
+        """Return a callback as :meth:`action` does, for a text that somebody types.
+
+        It waits for the typing to rest, or for what is done next: that is done with what was typed, or not at all where
+        that is refused. What was refused stays in the field as long as its refusal stands below it.
+        """
+        return self._typing.settled(do)
 
     def receive(self, button: Any, do: Callable[[Upload], None]) -> None:
         """Let a button for uploads take in files: `do` is called as by :meth:`action`, with each that has come whole.
@@ -118,7 +104,7 @@ class Window:
 
         def take(upload: Upload) -> None:
             try:
-                self._do(lambda: do(upload))
+                self._do(lambda: do(upload), button)
             finally:
                 upload.discard()
 
@@ -127,42 +113,36 @@ class Window:
 
         self.gate.uploads.takers[button._impl.uuid] = begin
 
-    def settled(self, do: Callable[[], None]) -> Callable[[Any], None]:
-        """Return a callback as :meth:`action` does, for a text that somebody types.
+    def _do(self, do: Callable[[], None], element: Any, typed: Any = None) -> bool:
+        """Do something for the user, and show what is refused below the element; return whether nothing was.
 
-        It waits for the typing to rest, or for what is done next: that is done with what was typed, or not at all where
-        that is refused.
+        Parameters
+        ----------
+        typed
+            A value of the element that somebody has typed.
         """
-        key = object()
+        with self.lock, confined_reads(self.project.folder):
+            stood, before, self._acted = self._refusals.standing(), self._acted, element
+            try:
+                do()
+            except InputError as error:
+                self.refuse(error)
+                self._refusals.keep_typed(element, typed)
+                self.refresh()
+            except Exception as error:  # it is told, and its place is on standard error
+                self.refuse(unforeseen(error))
+            else:
+                if self._refusals.remove(stood):
+                    self.refresh()  # fields that showed what was refused
+                return True
+            finally:
+                self._acted = before
+        return False
 
-        def called(event: Any) -> None:
-            if getattr(event, "client", None) is None:
-                return
-            with self.lock:
-                if key in self._typing:
-                    self._typing.pop(key)[0].cancel()
-                timer = threading.Timer(_REST, self._typed, (key,))
-                timer.daemon = True
-                self._typing[key] = (timer, partial(self._take_typed, event.target, event.target.value, do))
-                timer.start()
-
-        return called
-
-    def _take_typed(self, field: Any, text: Any, do: Callable[[], None]) -> None:
+    def _take_typed(self, field: Any, value: Any, do: Callable[[], None]) -> bool:
         """Do what follows from a text: a field typed in before may have shown all fields anew meanwhile."""
-        field.value = text
-        do()
-
-    def _typed(self, *keys: object) -> bool:
-        """Take what was typed; return whether nothing of it was refused."""
-        taken = True
-        with self.lock:
-            for key in keys:
-                timer, do = self._typing.pop(key, (None, None))
-                if timer is not None and do is not None:
-                    timer.cancel()
-                    taken = self._do(do) and taken
-        return taken
+        field.value = value
+        return self._do(do, field, value)
 
     def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> None:
         """Change settings of the project, and small files; pages are shown anew where something changed.
@@ -184,22 +164,20 @@ class Window:
         """Show what a command would print, in the notices."""
         self._show(words.paragraph(title) + words.lines(texts))
 
-    def refuse(self, error: InputError) -> None:
-        """Show a refusal where the user acted, in the words of the job, and in the notices."""
+    def refuse(self, error: InputError, element: Any = None) -> None:
+        """Show a refusal where the user acted, in the words of the job, and in the notices.
+
+        It stands below the element that is given, or whose callback is called now, until something else is done. Where
+        there is none, as for keys, it comes up over the window for some seconds.
+        """
         text = words.refusal(error)
         self.tell(Notice("refused", text, "error"))
-        for client, connection in [*self._windows.values()]:
-            if self.gate.is_working(connection):
-                client.add_notification("Refused", text, color="red", auto_close_seconds=20)
+        if not self._refusals.put(self._acted if element is None else element, text):
+            self._windows.notify(text)
 
     def show_once(self, title: str, texts: Sequence[str]) -> None:
         """Show something to the window that works, and nowhere else: it is not kept, and not among the notices."""
-        for client, connection in [*self._windows.values()]:
-            if self.gate.is_working(connection):
-                modal = client.gui.add_modal(title)
-                with modal:
-                    client.gui.add_html(words.lines(texts))
-                    client.gui.add_button("Close").on_click(lambda _, modal=modal: modal.close())  # type: ignore[misc]
+        self._windows.show_once(title, texts)
 
     def start(
         self,
@@ -210,6 +188,8 @@ class Window:
         **arguments: Any,
     ) -> None:
         """Run a function of :mod:`truearm.studio.tasks` in a process of its own, with progress and cancel.
+
+        What it refuses in the end is shown below the element whose callback has begun it.
 
         Parameters
         ----------
@@ -226,6 +206,7 @@ class Window:
         with self.lock:
             if self._work is not None:
                 raise InputError("another action still runs", cure="Wait for it, or cancel it.")
+            element = self._acted
             self._bar.visible = self._cancel.visible = True
             self._doing.content = words.paragraph(f"{title}: starting")
 
@@ -236,7 +217,7 @@ class Window:
 
             def ended(outcome: Any) -> None:
                 with self.lock:
-                    self._work = None
+                    self._work, self._acted = None, element
                     self._bar.visible = self._cancel.visible = False
                     if outcome is None:
                         self._doing.content = words.paragraph(f"{title}: cancelled")
@@ -256,16 +237,14 @@ class Window:
                             done(outcome)
                         except InputError as error:
                             self.refuse(error)
+                    self._acted = None
                     self.refresh()
 
             work = self._work = Work(do, arguments, said, ended)
 
     def download(self, path: Path) -> None:
         """Send a file of the project to the browser of the window that works."""
-        content = read_bytes(path)
-        for client, connection in [*self._windows.values()]:
-            if self.gate.is_working(connection):
-                client.send_file_download(path.name, content, save_immediately=True)
+        self._windows.download(path)
 
     @property
     def busy(self) -> bool:
@@ -332,7 +311,8 @@ class Window:
 
     def refresh(self) -> None:
         """Show what is true now on every page."""
-        with self.lock, confined_reads(self.project.folder):
+        with self.lock, confined_reads(self.project.folder), self.server.atomic():
+            changes, all_shown = self.project.changes(), True
             settings = self.project.settings
             self._where.content = words.paragraph(f"{self.project.folder}")
             if self._dark != settings.dark:
@@ -341,11 +321,16 @@ class Window:
                 try:
                     page.refresh()
                 except InputError as error:
+                    all_shown = False
                     self.tell(Notice("refused", f"{page.title}: {words.refusal(error)}", "error"))
+            self._refusals.shown_anew()
+            if all_shown:
+                self._others.shown(changes)
 
     def stop(self) -> None:
         """End the long action and the server."""
         self._stopped.set()
+        self._others.stop()
         if self._work is not None:
             self._work.cancel()
         self.server.stop()
@@ -362,7 +347,8 @@ class Window:
         self._where = gui.add_html("")
         self._buttons = gui.add_button_group("Project", ("undo", "redo", "reload", "light / dark"))
         self._buttons.on_click(self.action(lambda: self._pressed(self._buttons.value)))
-        self._changed = gui.add_html("", visible=False)
+        changed = gui.add_html("", visible=False)
+        self._others = OtherPrograms(self.project, self.lock, lambda: self.busy, changed, self.tell)
         tabs = gui.add_tab_group()
         for kind in pages:
             with tabs.add_tab(kind.title):
@@ -402,8 +388,7 @@ class Window:
 
     def _reload(self) -> None:
         self.project.reload()
-        self._changes = ()
-        self._changed.visible = False
+        self._others.look()
         self.refresh()
 
     def _cancelled(self) -> None:
@@ -414,73 +399,6 @@ class Window:
         self._told.appendleft(f"{words.paragraph(time.strftime('%H:%M:%S'))}{html}")
         self._notices.content = "".join(self._told)
 
-    # Other programs, other windows -------------------------------------------------------------------------------
-
-    def _look(self) -> None:
-        """Tell of files that other programs change, as long as the window is there."""
-        while not self._stopped.wait(_LOOK):
-            with self.lock:
-                if self._work is not None:
-                    continue
-                changes = self.project.changes()
-                if changes == self._changes:
-                    continue
-                self._changes = changes
-                told = ", ".join(f"{one.name} ({one.how})" for one in changes[:8])
-                more = f" and {len(changes) - 8} more" if len(changes) > 8 else ""
-                text = f"Another program has changed files: {told}{more}. Press reload to see them as they are now."
-                self._changed.content = words.notice(Notice("files-changed", text, "warning"))
-                self._changed.visible = bool(changes)
-
-    def _arrived(self, client: viser.ClientHandle) -> None:
-        connection = self.server._websock_server._live_connections.get(client.client_id)
-        if connection is None:
-            return
-        self._windows[client.client_id] = (client, connection)
-        self.gate.arrived(connection)
-        self._show_who_works()
-
-    def _gone(self, client: viser.ClientHandle) -> None:
-        _, connection = self._windows.pop(client.client_id, (None, None))
-        self._banners.pop(client.client_id, None)
-        if connection is not None:
-            self.gate.gone(connection)
-
-    def _show_who_works(self) -> None:
-        """Let every window that only reads say so, and offer to take over."""
-        for number, (client, connection) in [*self._windows.items()]:
-            working, shown = self.gate.is_working(connection), number in self._banners
-            if working and shown:
-                for element in self._banners.pop(number):
-                    self.gate.offers.discard(element._impl.uuid)
-                    element.remove()
-            elif not working and not shown:
-                text = Notice("read-only", "Another window works on this project; this one only reads.", "warning")
-                said = client.gui.add_html(words.notice(text), order=-2.0)
-                button = client.gui.add_button("Take over", order=-1.0, color="orange")
-                self.gate.offers.add(button._impl.uuid)
-                button.on_click(partial(self._take_over, connection))
-                self._banners[number] = [said, button]
-
-    def _take_over(self, connection: ServerConnection, _: Any) -> None:
-        self.gate.take_over(connection)
-        self._show_who_works()
-
-    def _say_blocked(self, connection: ServerConnection, why: str) -> None:
-        for client, mine in [*self._windows.values()]:
-            if mine is connection:
-                client.add_notification("Refused", why, color="orange", auto_close_seconds=10)
-
     def _fits(self, number: str, value: object) -> bool:
         element = self.gui._gui_input_handle_from_uuid.get(number)
         return element is None or fits(element, value)  # viser drops what is for an element that is gone
-
-    def _say_came(self, connection: object, number: str, element: str, upload: Upload | None) -> None:
-        """Tell a window how much of its file has come; None lets it forget the file."""
-        came, size = (0, 0) if upload is None else (upload.came, upload.size)
-        for client, mine in [*self._windows.values()]:
-            if mine is connection:
-                line = client.gui._websock_interface
-                line.queue_message(FileTransferPartAck(element, number, came, size))
-                if upload is None:
-                    line.queue_message(RemoveNotificationMessage(f"upload-{number}"))

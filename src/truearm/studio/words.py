@@ -57,6 +57,12 @@ def notice(one: Notice) -> str:
     )
 
 
+def refused(text: str) -> str:
+    """Return the words of a refusal, as they stand below an element of a page."""
+    edge = f"border-left:3px solid {_COLOURS['error']};padding-left:0.5em"
+    return f'<p role="alert" style="{_STYLE};{edge}">{plain(text)}</p>'
+
+
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a table; cells of numbers stand to the right, as those do whose heads have a unit in brackets."""
     right = ["[" in name for name in head]

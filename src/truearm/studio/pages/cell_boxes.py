@@ -24,12 +24,11 @@ _FIRST: Final = ((500.0, 700.0), (-200.0, 200.0), (-100.0, 100.0))
 
 @dataclass(frozen=True)
 class _Row:
-    """Fields of a box: its folder, its name, three ranges, and where a refusal is said."""
+    """Fields of a box: its folder, its name, three ranges."""
 
     folder: Any
     name: Any
     ranges: tuple[Any, Any, Any]
-    said: Any
 
 
 class CellBoxes:
@@ -86,7 +85,6 @@ class CellBoxes:
             for element, text in zip((row.name, *row.ranges), (name, *ranges), strict=True):
                 if element.value != text:
                     element.value = text
-            row.said.content = ""
 
     def _row(self, name: str) -> _Row:
         gui = self._window.gui
@@ -98,9 +96,8 @@ class CellBoxes:
                     gui.add_text(f"{axis} [mm]", "", hint="from..to in the base frame, nothing: without end")
                     for axis in "xyz"
                 )
-                said = gui.add_html("")
                 remove = gui.add_button("Remove the box")
-        row = self._rows[name] = _Row(folder, called, (x, y, z), said)
+        row = self._rows[name] = _Row(folder, called, (x, y, z))
         for element in (called, x, y, z):
             element.on_update(self._window.settled(partial(self._changed, name)))
         remove.on_click(self._window.action(partial(self._write, without_box(name))))
@@ -111,10 +108,7 @@ class CellBoxes:
         if row is None:
             return
         x, y, z = (str(element.value).strip() for element in row.ranges)
-        try:
-            self._write(with_box(str(row.name.value).strip(), (x, y, z), name))
-        except InputError as error:
-            row.said.content = words.paragraph(words.refusal(error))
+        self._write(with_box(str(row.name.value).strip(), (x, y, z), name))
 
     def _added(self) -> None:
         taken = self._rows

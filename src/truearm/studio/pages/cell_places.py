@@ -31,14 +31,13 @@ _PLACE, _TURNS = "x, y, z [mm]", "rx, ry, rz [deg]"
 
 @dataclass(frozen=True)
 class _Row:
-    """Fields of a target or fixture: its folder, name, kind, place and turns, and where a refusal is said."""
+    """Fields of a target or fixture: its folder, name, kind, place and turns."""
 
     folder: Any
     name: Any
     kind: Any
     place: Any
     turns: Any
-    said: Any
 
 
 class CellPlaces:
@@ -59,7 +58,6 @@ class CellPlaces:
             with gui.add_folder("Base in the instrument's frame"):
                 self._base: Any = gui.add_vector3(_PLACE, zeros, step=0.1)
                 self._turns: Any = gui.add_vector3(_TURNS, zeros, step=0.1, hint="about the fixed axes, in turn")
-                self._said = gui.add_html("")
             self._add: Any = gui.add_button_group("Add", ("target", "point", "plane", "frame"))
         for element in (self._base, self._turns):
             element.on_update(window.settled(self._moved))
@@ -74,7 +72,6 @@ class CellPlaces:
         place, turns = numbers_of(robot.base)
         _show(self._base, place)
         _show(self._turns, turns)
-        self._said.content = ""
         things = {thing.name: thing for thing in things_of(robot)}
         for name in [name for name in self._rows if name not in things]:
             self._rows.pop(name).folder.remove()
@@ -85,7 +82,6 @@ class CellPlaces:
             ):
                 _show(element, value)
             row.turns.visible = thing.turned
-            row.said.content = ""
 
     def _row(self, thing: Thing) -> _Row:
         gui, name = self._window.gui, thing.name
@@ -96,9 +92,8 @@ class CellPlaces:
                 kind = gui.add_dropdown("Kind", THINGS, initial_value=thing.kind)
                 place = gui.add_vector3(_PLACE, thing.place, step=0.1)
                 turns = gui.add_vector3(_TURNS, thing.turns, step=0.1, hint="about the fixed axes, in turn")
-                said = gui.add_html("")
                 remove = gui.add_button(f"Remove {words.one_line(name)}")
-        row = self._rows[name] = _Row(folder, called, kind, place, turns, said)
+        row = self._rows[name] = _Row(folder, called, kind, place, turns)
         for element in (called, place, turns):
             element.on_update(self._window.settled(partial(self._changed, name)))
         kind.on_update(self._window.action(partial(self._changed, name)))
@@ -112,10 +107,7 @@ class CellPlaces:
         thing = Thing(str(row.name.value).strip(), row.kind.value, tuple(row.place.value), tuple(row.turns.value))
         if thing == next((one for one in things_of(self._robot()) if one.name == name), None):
             return
-        try:
-            self._write(with_thing(self._robot(), thing, name))
-        except InputError as error:
-            row.said.content = words.paragraph(words.refusal(error))
+        self._write(with_thing(self._robot(), thing, name))
 
     def _added(self) -> None:
         kind, robot = self._add.value, self._robot()
@@ -130,10 +122,7 @@ class CellPlaces:
         robot = self._robot()
         if (place, turns) == numbers_of(robot.base):
             return
-        try:
-            self._write(with_base(robot, place, turns))
-        except InputError as error:
-            self._said.content = words.paragraph(words.refusal(error))
+        self._write(with_base(robot, place, turns))
 
     def _robot(self) -> Robot:
         """Return the robot without what it carries, which the project says."""

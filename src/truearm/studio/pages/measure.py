@@ -182,7 +182,7 @@ class MeasurePage:
 
     def _given_up(self, error: InputError) -> None:
         self._close()
-        self._window.refuse(error)
+        self._window.refuse(error, self._begin)
         self._window.refresh()
 
     def _taken(self, measuring: Measuring) -> None:
@@ -242,14 +242,16 @@ class MeasurePage:
     def _close(self) -> None:
         if self.measuring is not None:
             self._noted()
+            self._window.project.theirs = ()
             self.measuring.campaign.close()
             self.measuring = None
 
     def _noted(self) -> None:
         """Take note of what was written: by the measuring, and by the software whose folder is watched."""
-        fields = self._window.project.settings.measure if self.measuring is None else self.measuring.fields
-        watched = (fields.watch,) if fields.watch is not None and fields.source == "watched folder" else ()
-        self._window.project.look(fields.out, *watched)
+        project = self._window.project
+        fields = project.settings.measure if self.measuring is None else self.measuring.fields
+        project.theirs = (fields.watch,) if fields.watch is not None and fields.source == "watched folder" else ()
+        project.look(fields.out, *project.theirs)
 
     def _said_by_hand(self) -> None:
         measuring, why = self._going(), str(self._why.value).strip()

@@ -104,7 +104,7 @@ def replace_all(
                 synchronise(contents)
         for target, value in known.items():  # as late as can be: editors know nothing of locks
             with writing_refused_at(target):
-                _refuse_others(target, value)
+                refuse_others(target, value)
         try:
             if mark in staged:
                 with writing_refused_at(mark):
@@ -113,7 +113,10 @@ def replace_all(
                     synchronise([mark])
             for target, temporary in staged.items():
                 with writing_refused_at(target):
-                    temporary.replace(target)
+                    if known.get(target, "") is None:
+                        _name_first(temporary, target)
+                    else:
+                        temporary.replace(target)
             synchronise(contents)
             with writing_refused_at(mark):
                 mark.unlink(missing_ok=True)
@@ -128,14 +131,46 @@ def replace_all(
                 temporary.unlink(missing_ok=True)
 
 
-def _refuse_others(target: Path, known: str | None) -> None:
+def refuse_others(target: Path, known: str | None) -> None:
     """Refuse to replace another file than the one that is known."""
     if (hash_of(target.read_bytes()) if target.is_file() else None) != known:
-        raise InputError(
-            "another program has changed this file, and it is not overwritten",
-            where=target.name,
-            cure="Read it again, and make the change anew.",
-        )
+        raise _changed(target)
+
+
+def name_anew(source: Path, target: Path) -> None:
+    """Give a file another name in its folder, at once and only if nothing has that name.
+
+    Raises
+    ------
+    FileExistsError
+        If something has.
+    """
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except FileExistsError:
+        raise
+    except OSError as error:  # where files cannot have two names
+        if os.path.lexists(target):
+            raise FileExistsError(target) from error
+        source.replace(target)
+    else:
+        source.unlink()
+
+
+def _name_first(source: Path, target: Path) -> None:
+    """Give a file its name, and refuse where another has got it meanwhile."""
+    try:
+        name_anew(source, target)
+    except FileExistsError as error:
+        raise _changed(target) from error
+
+
+def _changed(target: Path) -> InputError:
+    return InputError(
+        "another program has changed this file, and it is not overwritten",
+        where=target.name,
+        cure="Read it again, and make the change anew.",
+    )
 
 
 def undo_unfinished(folder: Path) -> None:

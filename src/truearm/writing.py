@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -17,6 +16,8 @@ from truearm.replacing import (
     clear_temporary,
     file_set,
     is_the_known,
+    name_anew,
+    refuse_others,
     replace_all,
     synchronise,
     undo_unfinished,
@@ -106,6 +107,14 @@ def write_text_over(path: Path, text: str, known: str | None) -> None:
     write_files(path.parent, {path.name: text}, standing={path.name: known})
 
 
+def remove_known(path: Path, known: str | None) -> None:
+    """Remove the file that is known by its hash, and refuse to where another stands there by now."""
+    with writing_refused_at(path), alone_in([path.parent]):
+        refuse_others(path, known)
+        path.unlink(missing_ok=True)
+        synchronise([path])
+
+
 def put_in_place(source: Path, target: Path) -> None:
     """Give a file beside its place its name there, once it is on disk; nothing is overwritten.
 
@@ -123,15 +132,10 @@ def put_in_place(source: Path, target: Path) -> None:
     with writing_refused_at(target), alone_in([target.parent]):
         write_through(source)
         try:
-            os.link(source, target, follow_symlinks=False)
+            name_anew(source, target)
         except FileExistsError:
             new_file(target)
             raise
-        except OSError:  # where files cannot have two names
-            new_file(target)
-            source.replace(target)
-        else:
-            source.unlink()
         synchronise([target])
 
 

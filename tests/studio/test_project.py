@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from truearm.errors import InputError
 from truearm.files import confined_reads, read_bytes, read_yaml
 from truearm.studio.project import PROJECT_FILE, Project, open_project
 from truearm.studio.settings import Settings
+from truearm.writing import remove_known, write_text_over
 
 
 @pytest.fixture
@@ -181,6 +183,78 @@ def test_the_studios_own_writing_hides_no_change_of_another_program(project: Pro
     assert [(one.name, one.how) for one in project.changes()] == [("a.csv", "new")]
     project.look()
     assert project.changes() == ()
+
+
+def test_what_another_program_writes_between_looking_and_writing_is_not_overwritten(
+    project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It writes as late as can be: once the studio has compared the file with what it knows."""
+    file, theirs = project.folder / "list.csv", b"theirs\n"
+
+    def late(do: Any) -> Any:
+        def called(path: Path, *arguments: Any) -> None:
+            if path == file:
+                file.write_bytes(theirs)
+            do(path, *arguments)
+
+        return called
+
+    with monkeypatch.context() as there:
+        there.setattr("truearm.studio.project.write_text_over", late(write_text_over))
+        with pytest.raises(InputError, match="another program has changed this file"):
+            project.edit({"list.csv": "mine\n"}, exclude="list.csv")
+    assert (file.read_bytes(), project.settings.exclude, project.undoable) == (theirs, None, False)
+    file.unlink()
+    project.edit({"list.csv": "mine\n"}, exclude="list.csv")
+    with monkeypatch.context() as there:
+        there.setattr("truearm.studio.project.remove_known", late(remove_known))
+        with pytest.raises(InputError, match="another program has changed this file"):
+            project.undo()
+    assert (file.read_bytes(), project.settings.exclude, project.undoable) == (theirs, "list.csv", True)
+
+
+def test_an_edit_that_was_made_of_a_text_is_refused_where_another_stands(project: Project) -> None:
+    file = project.folder / "list.csv"
+    for there, known in (("theirs\n", "one\n"), ("theirs\n", None), (None, "one\n")):
+        file.unlink(missing_ok=True)
+        if there is not None:
+            file.write_text(there)
+        with pytest.raises(InputError, match="another program has changed this file"):
+            project.edit({"list.csv": "one\ntwo\n"}, known={"list.csv": known})
+        assert (file.read_text() if file.exists() else None) == there
+
+
+def test_of_two_files_of_an_edit_both_are_written_or_none(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
+    project.edit({"a.csv": "one\n"})
+
+    def late(path: Path, *arguments: Any) -> None:
+        if path.name == "b.csv":
+            path.write_text("theirs\n")
+        write_text_over(path, *arguments)
+
+    monkeypatch.setattr("truearm.studio.project.write_text_over", late)
+    with pytest.raises(InputError, match="another program has changed this file"):
+        project.edit({"a.csv": "two\n", "b.csv": "two\n"})
+    assert (project.folder / "a.csv").read_text() == "one\n"
+    assert (project.folder / "b.csv").read_text() == "theirs\n"
+
+
+def test_of_two_that_add_to_a_small_file_at_the_same_time_no_line_is_lost(project: Project) -> None:
+    file = project.folder / "list.csv"
+
+    def add(whose: str) -> None:
+        mine, done = open_project(project.folder), 0
+        while done < 15:
+            text = file.read_text() if file.exists() else None
+            try:
+                done += mine.edit({"list.csv": f"{text or ''}{whose} {done}\n"}, known={"list.csv": text})
+            except InputError as error:
+                assert "another program has changed this file" in str(error)
+
+    with ThreadPoolExecutor(3) as threads:
+        list(threads.map(add, "abc"))
+    lines = file.read_text().splitlines()
+    assert sorted(lines) == sorted(f"{whose} {k}" for whose in "abc" for k in range(15))
 
 
 def sent(project: Project, content: bytes) -> Path:

@@ -22,7 +22,6 @@ from truearm.studio.pages.check import CheckPage
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.serving import Studio
 
-
 Kind = TypeVar("Kind")
 
 

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import os
+from codecs import BOM_UTF8
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from filecmp import cmp
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal
 
 from truearm.errors import InputError, refusals_at, refusals_of
-from truearm.files import exists, path_argument, read_text, read_yaml
+from truearm.files import exists, path_argument, read_bytes, read_text, read_yaml
 from truearm.limits import refuse_beyond
 from truearm.manifest import MANIFEST, hash_of
 from truearm.printable import is_one_line
 from truearm.schemas import validated
 from truearm.studio.settings import Settings
 from truearm.studio.uploads import clear_uploads
-from truearm.writing import put_back_old, put_in_place, writable_folder, write_text, write_text_over
+from truearm.writing import put_back_old, put_in_place, remove_known, writable_folder, write_text_over
 
 #: What makes a folder a project.
 PROJECT_FILE: Final = "truearm-studio.yaml"
@@ -129,13 +131,22 @@ class Project:
         name = getattr(self.settings, setting)
         return None if name is None else self.path(name, setting)
 
-    def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> bool:
+    def edit(
+        self,
+        files: Mapping[str, str] | None = None,
+        *,
+        known: Mapping[str, str | None] | None = None,
+        **changes: Any,
+    ) -> bool:
         """Change settings and write the file; return whether anything changed.
 
         Parameters
         ----------
         files
             Texts of other small files of the project that are part of the edit, by their names: they are undone too.
+        known
+            Texts that some of these files have had when the edit was made of them, None for no file; otherwise those
+            that they have now.
 
         Raises
         ------
@@ -145,7 +156,8 @@ class Project:
         content = {**self.settings.model_dump(mode="json"), **changes}
         new = validated(content, Settings, PROJECT_FILE)
         _check_paths(self, new)
-        before = {name: self._text_of(name) for name in files or {}}
+        texts = known or {}
+        before = {name: texts[name] if name in texts else self._text_of(name) for name in files or {}}
         edit = _Edit(self.settings, new, before, dict(files or {}))
         if new == self.settings and edit.files == before:
             return False
@@ -199,7 +211,7 @@ class Project:
         self._seen = now
 
     def seen(self, changes: Iterable[ChangedFile]) -> None:
-        """Take note of changes that are shown; what has been changed once more since they were found is none of them."""
+        """Take note of changes that are shown; what has been changed once more since is not among them."""
         for one in changes:
             if one.stamp is None:
                 self._seen.pop(one.name, None)
@@ -249,31 +261,42 @@ class Project:
         return name
 
     def _make(self, edit: _Edit) -> None:
-        """Write what an edit changes: files first, for the settings may name them."""
-        for name, text in edit.files_before.items():
-            if self._text_of(name) != text:
-                raise InputError(
-                    "another program has changed this file, and it is not overwritten",
-                    where=name,
-                    cure="Reload the project, and make the edit again.",
-                )
-        self._put(edit.files)
-        if edit.settings != self.settings:
-            try:
+        """Write what an edit changes, all or nothing: files first, for the settings may name them."""
+        standing = {name: self._standing(name, text) for name, text in edit.files_before.items()}
+        done: list[str] = []
+        try:
+            for name, text in edit.files.items():
+                self._put(name, text, standing[name])
+                done.append(name)
+            if edit.settings != self.settings:
                 self._write(edit.settings)
-            except InputError:
-                self._put(edit.files_before)
-                raise
+        except InputError:
+            for name in reversed(done):
+                with suppress(InputError):  # another program has changed it since, and that stays
+                    self._put(name, edit.files_before[name], _hash_of_text(edit.files[name]))
+            raise
         self.settings = edit.settings
 
-    def _put(self, files: Mapping[str, str | None]) -> None:
-        for name, text in files.items():
-            if text is None:
-                self.path(name).unlink(missing_ok=True)
-            else:
-                write_text(self.path(name), text)
-        if files:
-            self.look(*files)
+    def _standing(self, name: str, text: str | None) -> str | None:
+        """Return the hash of the file of a name, or refuse one that holds another text; None if there shall be none."""
+        path = self.path(name)
+        content = read_bytes(path) if exists(path) else None
+        if (None if content is None else content.removeprefix(BOM_UTF8)) != (None if text is None else text.encode()):
+            raise InputError(
+                "another program has changed this file, and it is not overwritten",
+                where=name,
+                cure="Reload the project, and make the edit again.",
+            )
+        return None if content is None else hash_of(content)
+
+    def _put(self, name: str, text: str | None, standing: str | None) -> None:
+        """Write or remove a file, unless another stands there by now than the one of a hash."""
+        path = self.path(name)
+        if text is not None:
+            write_text_over(path, text, standing)
+        elif standing is not None:
+            remove_known(path, standing)
+        self.look(name)
 
     def _text_of(self, name: str) -> str | None:
         path = self.path(name)
@@ -343,6 +366,10 @@ def open_project(folder: object, first: Mapping[str, Any] | None = None) -> Proj
         with refusals_at(str(path / PROJECT_FILE)):
             _check_paths(project, settings)
         return project
+
+
+def _hash_of_text(text: str | None) -> str | None:
+    return None if text is None else hash_of(text.encode())
 
 
 def _hash_of_file(folder: Path) -> str | None:

@@ -53,7 +53,8 @@ class TypingAtRest:
 
     def take_all(self) -> bool:
         """Take everything that was typed; return whether nothing of it was refused."""
-        return all([self._rested(key) for key in [*self._typing]])
+        taken = [self._rested(key) for key in [*self._typing]]  # each, whatever became of those before
+        return all(taken)
 
     def _rested(self, key: object) -> bool:
         with self._lock:

@@ -144,8 +144,19 @@ class Window:
         field.value = value
         return self._do(do, field, value)
 
-    def edit(self, files: Mapping[str, str] | None = None, **changes: Any) -> None:
+    def edit(
+        self,
+        files: Mapping[str, str] | None = None,
+        *,
+        known: Mapping[str, str | None] | None = None,
+        **changes: Any,
+    ) -> None:
         """Change settings of the project, and small files; pages are shown anew where something changed.
+
+        Parameters
+        ----------
+        files, known
+            As for :meth:`truearm.studio.project.Project.edit`.
 
         Raises
         ------
@@ -153,7 +164,7 @@ class Window:
             If a value cannot be.
         """
         with self.lock:
-            if self.project.edit(files, **changes):
+            if self.project.edit(files, known=known, **changes):
                 self.refresh()
 
     def tell(self, notice: Notice) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 from truearm.errors import InputError
@@ -138,15 +137,8 @@ class CellBoxes:
         window = self._window
         name = window.project.settings.constraints or CONSTRAINTS
         path = window.project.path(name)
-        self._refuse_changed(path)
+        known = read_text(path) if exists(path) else None
+        if self._rules is not None and known is not None:
+            known = self._rules.text  # as it is shown
         rules = changed_rules(path, window.robot(), change)
-        window.edit(files={name: rules.text}, constraints=name)
-
-    def _refuse_changed(self, path: Path) -> None:
-        known = None if self._rules is None else self._rules.text
-        if exists(path) and known is not None and read_text(path) != known:
-            raise InputError(
-                "another program has changed this file, and it is not overwritten",
-                where=path.name,
-                cure="Reload the project, and make the edit again.",
-            )
+        window.edit({name: rules.text}, known={name: known}, constraints=name)

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from truearm.errors import InputError
-from truearm.files import exists
+from truearm.files import exists, read_text
 from truearm.library import load_robot, urdf_source
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
@@ -134,14 +134,15 @@ class CellPlaces:
         settings = window.project.settings
         name = file_for_places(settings.robot, robot.name, window.project.names(".yaml"))
         path, text = window.project.path(name), placed_text(robot, name)
-        if exists(path) and path.read_text(encoding="utf-8") != robot_text(load_robot(path)):
+        known = read_text(path) if exists(path) else None
+        if known is not None and known != robot_text(load_robot(path)):
             raise InputError(
                 "this file was not written here, and is not changed",
                 where=name,
                 cure="Edit it yourself, or give it a name that does not end in -cell.yaml.",
             )
         looks = settings.meshes if urdf_source(settings.robot) is None else settings.robot
-        window.edit(files={name: text}, robot=name, meshes=looks)
+        window.edit({name: text}, known={name: known}, robot=name, meshes=looks)
 
 
 def _show(element: Any, value: Any) -> None:

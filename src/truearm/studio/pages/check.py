@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import exists
+from truearm.files import exists, read_text
 from truearm.measurement.excluded import Exclusion, exclusions_text, read_exclusions
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
@@ -49,6 +49,7 @@ class CheckPage:
         self._of: tuple[Any, ...] = ()
         self._shown: tuple[Any, ...] = ()
         self._excluded: tuple[Exclusion, ...] = ()
+        self._text: str | None = None  # of their file
         gui = window.gui
         self._data: Any = gui.add_dropdown("Measurements", (NONE,), hint="a CSV file of the project")
         self._file: Any = gui.add_dropdown("Exclude", (NONE,), hint="a file of readings that are excluded")
@@ -200,11 +201,19 @@ class CheckPage:
 
     def _write(self, excluded: tuple[Exclusion, ...]) -> None:
         name = self._window.project.settings.exclude or _FILE
-        self._window.edit({name: exclusions_text(excluded)}, exclude=name)
+        if self._window.project.settings.exclude is None and exists(self._window.project.path(name)):
+            raise InputError(
+                "a file of this name stands in the project, and is not overwritten",
+                where=name,
+                cure="Choose it as the file of excluded readings, or rename it.",
+            )
+        self._window.edit({name: exclusions_text(excluded)}, known={name: self._text}, exclude=name)
 
     def _show_excluded(self) -> None:
         path = self._window.project.file("exclude")
-        self._excluded = read_exclusions(path) if path is not None and exists(path) else ()
+        there = path is not None and exists(path)
+        self._text = read_text(path) if path is not None and there else None
+        self._excluded = read_exclusions(path) if path is not None and there else ()
         rows = [[_reading(one.configuration, one.target), one.reason] for one in self._excluded]
         self._table.content = words.table(["reading", "reason"], rows) if rows else words.paragraph("None.")
         self._back.visible = self._restore.visible = bool(rows)
@@ -215,8 +224,10 @@ class CheckPage:
     # -- what is shown is of what --------------------------------------------------------------------------
 
     def _now(self) -> tuple[Any, ...]:
-        settings = self._window.project.settings
-        return settings.robot, settings.data, self._excluded
+        settings, data = self._window.project.settings, self._window.project.file("data")
+        stat = None if data is None or not exists(data) else data.stat()
+        stamp = stat and (stat.st_size, stat.st_mtime_ns)
+        return settings.robot, (settings.data, stamp), self._excluded
 
 
 def data_of(window: Window) -> str:

@@ -11,7 +11,8 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import exists
+from truearm.files import exists, read_bytes
+from truearm.manifest import hash_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
@@ -24,7 +25,7 @@ from truearm.studio.pages.robot_looks import RobotLooks
 from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
-from truearm.writing import write_text
+from truearm.writing import write_text_over
 
 #: What the flange is called among the targets, and the branch that is taken if none is chosen.
 _FLANGE: Final = "flange"
@@ -286,8 +287,9 @@ class JogPage:
 
     def _recording(self, what: str) -> None:
         arm, file = self._jogged(), self._file()
+        before = read_bytes(file) if exists(file) else None
         known = self._read() or Recorded((), np.zeros((0, len(arm.joints))), arm.whose)
-        if exists(file) and file.read_text(encoding="utf-8") != known.text(arm.robot):
+        if before is not None and before != known.text(arm.robot).encode():
             raise InputError(
                 "this file was not recorded here, and is not changed", where=file.name, cure="Record into another one."
             )
@@ -297,8 +299,8 @@ class JogPage:
             known = known.without_last()
         else:
             raise InputError("the only configuration of a file is not removed", where=file.name)
-        write_text(file, known.text(arm.robot))
-        self._window.project.look()
+        write_text_over(file, known.text(arm.robot), None if before is None else hash_of(before))
+        self._window.project.look(self._window.project.relative(file))
         self._show_recorded()
 
     def _show_recorded(self) -> None:

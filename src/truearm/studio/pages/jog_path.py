@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import exists, read_text
+from truearm.manifest import hash_of
 from truearm.modeling.chain import Array
 from truearm.planning.paths.path_file import PlannedPath, read_path
 from truearm.studio import words
@@ -28,7 +29,7 @@ from truearm.studio.path_points import (
 from truearm.studio.recorded import Motion
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
-from truearm.writing import write_text
+from truearm.writing import remove_known, write_text_over
 
 #: The file that is written where none is named.
 PATH: Final = "path.yaml"
@@ -148,10 +149,10 @@ class JogPath:
 
     def _other_speed(self) -> None:
         path = self._path
-        if path is not None:
+        if path is not None and path["sections"]:
+            self._write(with_speed(path, float(self._speed.value)))
+        elif path is not None:
             self._path = with_speed(path, float(self._speed.value))
-            if path["sections"]:
-                self._write(self._path)
 
     def _start(self) -> None:
         window, arm = self._window, self._arm()
@@ -191,15 +192,16 @@ class JogPath:
         """Write the file, if it can be read again: a circle through points of a line is none."""
         window, name = self._window, self._name()
         file = window.project.path(name, "path")
-        before = read_text(file) if exists(file) else None
-        write_text(file, path_text(path))
+        before = path_text(self._path) if self._path is not None and exists(file) else None
+        text, known = path_text(path), None if before is None else hash_of(before.encode())
+        write_text_over(file, text, known)
         try:
             read_path(file)
         except InputError:
             if before is None:
-                file.unlink()
+                remove_known(file, hash_of(text.encode()))
             else:
-                write_text(file, before)
+                write_text_over(file, before, hash_of(text.encode()))
             raise
         finally:
             window.project.look(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from truearm.errors import InputError
-from truearm.files import exists
+from truearm.files import exists, read_text
 from truearm.measurement.measuring.about import About, read_about
 from truearm.studio import words
 from truearm.studio.about_file import AIR, ENTRIES, changed_about, with_air, with_entry
@@ -99,5 +99,7 @@ class MeasuredWith:
     def _write(self, change: Any) -> None:
         said = self._window.project.settings.measure
         name = said.about or _FILE
-        text = changed_about(self._window.project.path(name, "about"), change)
-        self._window.edit({name: text}, measure={**said.model_dump(mode="json"), "about": name})
+        path = self._window.project.path(name, "about")
+        known = read_text(path) if exists(path) else None
+        text = changed_about(path, change)
+        self._window.edit({name: text}, known={name: known}, measure={**said.model_dump(mode="json"), "about": name})

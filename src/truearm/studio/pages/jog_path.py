@@ -71,11 +71,13 @@ class JogPath:
                 "From here", ("start", "line", "circle", "waypoint"), hint="where the tip is now; a circle takes two"
             )
             self._do: Any = gui.add_button_group("Path", ("play", "stop", "remove last"))
+            self._draws: Any = gui.add_checkbox("Draw the path", True)
             self._said = gui.add_html(words.paragraph(_NONE))
         self._file.on_update(window.settled(lambda: window.edit(path=self._file.value.strip() or None)))
         self._speed.on_update(window.settled(self._other_speed))
         self._add.on_click(window.action(lambda: self._added(self._add.value)))
         self._do.on_click(window.action(self._done))
+        self._draws.on_update(window.action(self._drawn_or_not))
 
     def refresh(self) -> None:
         """Show the path of the file, in words and in the scene."""
@@ -209,13 +211,17 @@ class JogPath:
         window.edit(path=name)
         window.refresh()
 
+    def _drawn_or_not(self) -> None:
+        self._drawn = ()
+        self.refresh()
+
     def _show(self, planned: PlannedPath) -> None:
         if self._path is None:
             self._said.content = words.paragraph(f"Of another program: {', '.join(planned.kinds)}. It can be played.")
         else:
             self._say(self._path)
         solid = self._scene.solid
-        if solid is not None:
+        if solid is not None and self._draws.value:
             at: Array = planned.trajectory.position
             if planned.frame != "world":
                 at = at @ solid.robot.base.rotation.T + solid.robot.base.translation

@@ -34,6 +34,11 @@ _RULE: Final = (
     "A reading is kept or set aside for reasons of the instrument alone. How well readings fit is not shown here: "
     "whoever repeats what fits badly falsifies the proof."
 )
+_FINISH: Final = "closes the measuring; the settings come back"
+_ALL: Final = (
+    "All is measured: the measurements are written, and are those of the project. Press Finish to end. Until then a "
+    "reading can be set aside, and is then asked for again; and the air can be read."
+)
 _DONE: Final = "Measured: the page Check tells whether the measurements can be believed."
 
 
@@ -75,6 +80,7 @@ class MeasurePage:
         self.about = MeasuredWith(window, fields)
         self._begin = gui.add_button("Start")
         self._stop: Any = gui.add_button_group("Measuring", ("stop", "finish"), visible=False)
+        self._end_all = gui.add_button("Finish", visible=False, color="green", hint=_FINISH)
         self._bar: Any = gui.add_progress_bar(0.0, visible=False)
         self._next = gui.add_html("")
         self._last = gui.add_html("")
@@ -115,6 +121,7 @@ class MeasurePage:
         window = self._window
         self._begin.on_click(window.action(self._start))
         self._stop.on_click(window.action(lambda: self._end() if self._stop.value == "stop" else self._finish()))
+        self._end_all.on_click(window.action(self._finish))
         self._act.on_click(window.action(self._said_by_hand))
         self._download.on_click(window.action(lambda: window.download(window.project.path(self._file.value))))
 
@@ -289,7 +296,9 @@ class MeasurePage:
         measuring = self.measuring
         going = measuring is not None
         self.settings.visible = self._begin.visible = not going
-        self._stop.visible = self._bar.visible = self._by_hand.visible = going
+        self._bar.visible = self._by_hand.visible = going
+        all_done = measuring is not None and measuring.campaign.session.done
+        self._stop.visible, self._end_all.visible = going and not all_done, all_done
         if measuring is None:
             self._next.content = words.paragraph(self._before_start()) + words.paragraph(_RULE)
             if self._shown not in (None, self._window.project.settings.measure.out):
@@ -299,7 +308,8 @@ class MeasurePage:
         session, (done, of) = measuring.campaign.session, measuring.progress()
         self._bar.value = 100.0 * done / of
         kept = f"{done} of {of} steps done; {measuring.kept_words()}."
-        self._next.content = "".join(words.paragraph(text) for text in [*measuring.next_words(), kept])
+        said = [_ALL, kept] if all_done else [*measuring.next_words(), kept]
+        self._next.content = "".join(words.paragraph(text) for text in said)
         reasons = measuring.reasons()
         self._last.content = (
             words.paragraph(measuring.last_words())

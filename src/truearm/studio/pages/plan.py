@@ -42,8 +42,9 @@ class PlanPage:
     def __init__(self, window: Window) -> None:
         self._window = window
         self._planned: Planned | None = None
-        self._of = ""
+        self._of: tuple[Any, ...] = ()
         self._drawn: tuple[Any, ...] = ()
+        self._driven_ways: Array | None = None  # in the world [m], (n, 3)
         gui = window.gui
         self.fields = fields = Fields(window, self._now, self._change)
         fields.text("poses", "Poses", "how many to choose, or auto")
@@ -81,11 +82,13 @@ class PlanPage:
             self._among: Any = gui.add_checkbox(
                 "All candidates", False, hint="where the flange is at those that are usable"
             )
+            self._line: Any = gui.add_checkbox("Ways that were driven", True)
             self._speed: Any = gui.add_number("Speed [deg/s, mm/s]", 60.0, min=0.1, max=1000.0, step=1.0)
             self._tour: Any = gui.add_button_group("Ways", ("drive", "stop"))
         self._run.on_click(window.action(self._plan))
         self._cloud.on_update(window.action(self._draw))
         self._among.on_update(window.action(self._draw))
+        self._line.on_update(window.action(self._draw_ways))
         self._tour.on_click(window.action(self._driven))
         self._download.on_click(window.action(self._downloaded))
 
@@ -102,7 +105,8 @@ class PlanPage:
         seen = self._seen()
         if seen != self._drawn:
             self._drawn = seen
-            self._jog().scene.show_line("ways", None)
+            self._driven_ways = None
+            self._draw_ways()
             self._draw()
 
     # The fields --------------------------------------------------------------------------------------------------
@@ -133,7 +137,7 @@ class PlanPage:
         )
 
     def _done(self, found: Planned) -> None:
-        self._planned, self._of = found, self._window.project.settings.robot
+        self._planned, self._of = found, self._whose()
         place = PurePosixPath(found.outcome.files[0])
         self._window.project.look(*found.outcome.files, str(place.parent / MANIFEST))
         self._said.content = words.lines([*found.outcome.lines, f"Written: {', '.join(found.outcome.files)}"])
@@ -144,7 +148,7 @@ class PlanPage:
     def _draw(self) -> None:
         scene = self._jog().scene
         self._scale.visible = False
-        found = self._planned if self._of == self._window.project.settings.robot else None
+        found = self._planned if self._of == self._whose() else None
         files = self._written()
         for name in ("predicted", "chosen", "candidates"):
             scene.show_points(name, None)
@@ -182,7 +186,11 @@ class PlanPage:
         joints = jog.play_file(name, float(self._speed.value), from_its_start=True)
         solid = jog.scene.solid
         if solid is not None:
-            jog.scene.show_line("ways", solid.robot.forward(joints, frame="world")[0], _WAYS)
+            self._driven_ways = solid.robot.forward(joints, frame="world")[0]
+            self._draw_ways()
+
+    def _draw_ways(self) -> None:
+        self._jog().scene.show_line("ways", self._driven_ways if self._line.value else None, _WAYS)
 
     def _jog(self) -> JogPage:
         return next(page for page in self._window.pages if isinstance(page, JogPage))
@@ -204,6 +212,11 @@ class PlanPage:
             names = [plan.place, f"{stem}.html", self._ways(), f"{stem}-sheet.html"]
             return [name for name in names if project.path(name).is_file()]
         return [name for name in project.names() if name.startswith(f"{plan.place}/")]
+
+    def _whose(self) -> tuple[Any, ...]:
+        """Return what was planned: of which robot, and the table as it is now."""
+        path = self._window.project.path(self._table())
+        return self._window.project.settings.robot, path.stat().st_mtime_ns if path.is_file() else None
 
     def _seen(self) -> tuple[Any, ...]:
         """Return what is drawn: of which plan and which robot."""

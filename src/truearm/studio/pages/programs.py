@@ -64,7 +64,7 @@ class ProgramsPage:
         offer(self._kinematics, STATED, settings.controller_kinematics, _UNSAID)
         folder = project.file("corrected")
         self._downloads.visible = folder is not None and exists(folder / REPORT)
-        if self._of and self._of != (settings.robot, settings.program):
+        if self._of and self._of != self._now():
             self._of = ()
             self._space.take(None)
         else:
@@ -86,9 +86,14 @@ class ProgramsPage:
         )
 
     def _take(self, drawn: DrawnProgram) -> None:
-        settings = self._window.project.settings
-        self._of = (settings.robot, settings.program)
+        self._of = self._now()
         self._space.take(drawn)
+
+    def _now(self) -> tuple[Any, ...]:
+        """Return what is drawn: of which robot and which program, as it is now."""
+        project, file = self._window.project, self._window.project.file("program")
+        stat = None if file is None or not exists(file) else file.stat()
+        return project.settings.robot, project.settings.program, stat and (stat.st_size, stat.st_mtime_ns)
 
     def _chosen(self) -> str:
         program = self._window.project.settings.program

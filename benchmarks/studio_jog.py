@@ -1,9 +1,10 @@
 """Jogging in the studio: from the event that a window sends to the pose that comes back, over its own connection.
 
-``python benchmarks/studio_jog.py [--moves N] [--out FILE]`` starts ``truearm studio`` in a process of its own with a
-rigid, an elastic and a redundant elastic arm, opens a window without a browser beside it, and drags sliders and the
-handle. It prints the time from sending the event to having the flange's new pose, in ms, the browser's share left out,
-and how much comes with each move.
+``python benchmarks/studio_jog.py [--moves N] [--runs N] [--out FILE]`` starts ``truearm studio`` in a process of its
+own with a rigid, an elastic and a redundant elastic arm, opens a window without a browser beside it, and drags sliders
+and the handle. It prints the time from sending the event to having the flange's new pose, in ms, the browser's share
+left out, and how much comes with each move. What counts is the median over the runs of the 95th percentile, with its
+range; a machine that does something else meanwhile slows the moves, so the load before each run is kept.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import statistics
 import tempfile
 import time
 from collections.abc import Iterator
@@ -26,6 +28,8 @@ from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation
 from truearm.studio.jogging import Jogging
+
+_KINDS = ("joint", "handle")
 
 
 def elastic(name: str) -> Robot:
@@ -94,18 +98,34 @@ def measure(robot: Robot, moves: int) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--moves", type=int, default=60)
+    parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
     arms = {"irb120": load_robot("irb120"), "irb120 elastic": elastic("irb120"), "fr3 elastic": elastic("fr3")}
-    found = {}
-    for name, robot in arms.items():
-        busy = os.getloadavg()[0]
-        found[name] = {**measure(robot, given.moves), "load_before": round(busy, 1)}
-        for kind in ("joint", "handle"):
-            print(f"{name:16} {kind:8} {found[name][kind]}", flush=True)  # noqa: T201
+    runs = []
+    for number in range(given.runs):
+        run = {}
+        for name, robot in arms.items():
+            busy = os.getloadavg()[0]
+            run[name] = {**measure(robot, given.moves), "load_before": round(busy, 1)}
+            for kind in _KINDS:
+                print(f"run {number + 1} {name:16} {kind:8} {run[name][kind]}", flush=True)  # noqa: T201
+        runs.append(run)
+    found = summary(runs)
+    print(json.dumps(found, indent=1))  # noqa: T201
     if given.out:
-        content = {"truearm": truearm.__version__, "processors": os.cpu_count(), "arms": found}
+        content = {"truearm": truearm.__version__, "processors": os.cpu_count(), "p95_ms": found, "runs": runs}
         given.out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def summary(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the median and the range over runs of the 95th percentile, by arm and by what is dragged [ms]."""
+    found: dict[str, Any] = {}
+    for name in runs[0]:
+        for kind in _KINDS:
+            p95 = sorted(run[name][kind]["p95_ms"] for run in runs)
+            found[f"{name} {kind}"] = {"median": statistics.median(p95), "range": [p95[0], p95[-1]]}
+    return found
 
 
 if __name__ == "__main__":

@@ -98,6 +98,18 @@ def test_a_slider_moves_the_arm_its_numbers_and_its_handle(page: JogPage) -> Non
     assert page._place.value == pytest.approx((p[0] * 1e3).tolist(), abs=1e-5)
 
 
+def test_a_slider_that_is_moved_while_the_arm_moves_is_not_set_back(page: JogPage) -> None:
+    page._sliders[1]._impl.value = 25.0  # has come, and waits for what the other slider does
+    act(page._sliders[0], 40.0)
+    assert page._sliders[1].value == 25.0
+    page._sliders[0]._impl.value = 41.0
+    act(page._sliders[1])
+    assert page._sliders[0].value == 41.0
+    act(page._sliders[0])
+    assert page.jogging is not None
+    assert np.rad2deg(page.jogging.joints[:2]) == pytest.approx([41.0, 25.0])
+
+
 def test_meshes_are_sent_once(page: JogPage, studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     sent: list[str] = []
     monkeypatch.setattr(

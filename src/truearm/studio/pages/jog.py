@@ -64,6 +64,7 @@ class JogPage:
         )
         self._joints = gui.add_folder("Joints")
         self._sliders: list[Any] = []
+        self._taken: list[float] = []  # of each slider: what it was set to here, or what was done with it last
         self._said = gui.add_html("")
         with gui.add_folder("Pose"):
             self._tip: Any = gui.add_dropdown("Tip", (_FLANGE,))
@@ -167,6 +168,7 @@ class JogPage:
                 slider = self._window.gui.add_slider(f"{joint.name} [{unit}]", low, max(high, low + 0.01), 0.01, low)
                 slider.on_update(self._newest(f"joint {k}", partial(self._slid, k)))
                 self._sliders.append(slider)
+        self._taken = [slider.value for slider in self._sliders]
         if self._handle is not None:
             self._handle.remove()
         self._handle = self._window.server.scene.add_transform_controls(
@@ -177,7 +179,8 @@ class JogPage:
 
     def _slid(self, joint: int) -> None:
         arm = self._jogged()
-        arm.set_number(joint, float(self._sliders[joint].value))
+        self._taken[joint] = self._sliders[joint].value
+        arm.set_number(joint, float(self._taken[joint]))
         self._moved()
 
     def _dragged(self) -> None:
@@ -253,7 +256,11 @@ class JogPage:
             self.scene.show_tip(position, rotation)
             if handle and self._handle is not None:
                 self._handle.position, self._handle.wxyz = position, quaternion_from_rotation(rotation)
-            for slider, number, (low, high) in zip(self._sliders, arm.numbers, arm.ranges(), strict=True):
+            for k, (slider, number, (low, high)) in enumerate(
+                zip(self._sliders, arm.numbers, arm.ranges(), strict=True)
+            ):
+                if slider.value != self._taken[k]:
+                    continue  # somebody has moved it meanwhile, and that is done next
                 high = max(high, low + 0.01)
                 if abs(slider.min - low) > _ROUNDING or abs(slider.max - high) > _ROUNDING:
                     slider.min, slider.max = min(low, slider.value), max(high, slider.value)
@@ -261,6 +268,7 @@ class JogPage:
                     slider.min, slider.max = low, high
                 elif slider.value != number:
                     slider.value = min(max(number, low), high)
+                self._taken[k] = slider.value
             self._place.value, self._turns.value = arm.pose_numbers(self._frame.value)
             self._said.content = "".join(words.paragraph(text) for text in arm.words())
             self.views.moved(arm)

@@ -12,6 +12,7 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.cli.conftest import truearm as truearm
 from tests.studio.conftest import Serving
+from tests.studio.pressing import below
 from tests.studio.test_jog_page import act, eventually
 from tests.studio.typing_in import typed as type_in
 
@@ -103,14 +104,17 @@ def test_fields_are_kept_are_undone_and_shown_again(studio: Studio) -> None:
         ("candidates", "0", "too small"),
     ],
 )
-def test_what_is_no_number_is_refused_and_the_field_shows_what_holds(
+def test_what_is_no_number_is_refused_below_its_field_and_stays_there_to_be_mended(
     studio: Studio, name: str, value: str, words: str
 ) -> None:
     before = studio.window.project.settings
     typed(studio, name, value)
-    assert words in said(studio)
+    field = page_of(studio).fields.element(name)
+    assert words in below(studio.window, field)
     assert studio.window.project.settings == before
-    assert page_of(studio).fields.element(name).value != value
+    assert field.value == value
+    act(page_of(studio)._cloud, False)
+    assert (field.value != value, below(studio.window, field)) == (True, "")
 
 
 @pytest.mark.parametrize(
@@ -148,7 +152,8 @@ def test_a_plan_is_written_where_it_is_said(studio: Studio) -> None:
     names = ("plans/first.csv", "plans/first.html", "plans/first-ways.csv", "plans/first-sheet.html")
     assert eventually(lambda: page._file.options == names), said(studio)
     assert f"Written: {', '.join(names)}" in page._said.content
-    assert [one.name for one in window.project.changes()] == ["plan.csv"]
+    assert window.project.changes() == ()
+    assert "Another program has changed files: plan.csv (new). The pages show them as they are now." in said(studio)
 
 
 def test_the_ways_are_driven_from_home_and_shown_after_reopening(

@@ -238,15 +238,28 @@ def refusals_stand_where_one_acts_and_edits_are_undone(person: Person) -> None:
     person.turn_to("Calibrate")
     person.write("Seed", "x")
     person.wait_for("seed: a whole number belongs here; got 'x'.")
+    stands_below_the_field_within_the_panel(person, "Seed")
+    person.picture("calibrate-refused")
     assert project.settings.seed == 0
     person.write("Seed", "7")
     assert eventually(lambda: project.settings.seed == 7)
+    person.page.get_by_role("alert").wait_for(state="detached")
     person.press("undo")
     assert eventually(lambda: project.settings.seed == 0)
     person.page.keyboard.press("Control+Shift+Z")
     assert eventually(lambda: project.settings.seed == 7)
     person.press("undo")
     assert eventually(lambda: project.settings.seed == 0)
+
+
+def stands_below_the_field_within_the_panel(person: Person, label: str) -> None:
+    """The refusal begins where the field ends, and is as wide as the page at most."""
+    refusal, panel = person.page.get_by_role("alert"), person.page.get_by_role("tab", name="Cell", exact=True)
+    field = person.page.locator(f"xpath=//*[normalize-space(text())='{label}']").locator("visible=true").first
+    refused, named, left = refusal.bounding_box(), field.bounding_box(), panel.bounding_box()["x"]
+    assert 0.0 < refused["y"] - named["y"] < 60.0, (refused, named)
+    assert left - 20.0 < refused["x"], (refused, left)
+    assert refused["x"] + refused["width"] <= _SIZES[0][0], refused
 
 
 def what_another_program_changes_is_told_and_taken_on_request(person: Person) -> None:

@@ -1,4 +1,4 @@
-"""The page as it is served: viser's, with room for tabs, numbers and pictures, and what a browser without WebGL needs to show anything."""
+"""The page as it is served: viser's, with a few styles, and what a browser without WebGL needs to show anything."""
 
 from __future__ import annotations
 

@@ -250,6 +250,8 @@ def a_plan_is_measured_and_checked(person: Person, truearm: Truearm, tmp_path: P
     person.press("Start")
     person.wait_for("Measured: the page Check tells whether the measurements can be believed.")
     person.picture("measure")
+    person.press("Finish")
+    person.page.get_by_role("button", name="Start", exact=True).wait_for()
     words = ["measure", "plan.csv", "irb120", "--device", "measurement-arm", "--payload", "2.7kg,50mm,25mm,100mm"]
     assert truearm(*words, "--out", tmp_path / "measured").code == 0
     measured = (project.folder / "measured" / "measurements.csv").read_bytes()

@@ -77,14 +77,19 @@ class Window:
     def action(self, do: Callable[[], None]) -> Callable[[Any], None]:
         """Return a callback for an element: `do` is called under the lock, and a refusal is shown below the element.
 
-        It is called for what a user did alone, not where the studio itself sets a value.
+        It is called for what a user did alone, not where the studio itself sets a value. What the user has chosen
+        holds, also where the studio shows the page anew while this waits for the lock.
         """
 
         def called(event: Any) -> None:
             if getattr(event, "client", None) is not None:
+                element = getattr(event, "target", None)
+                chosen = getattr(element, "value", None)
                 with self.lock:
                     if self._typing.take_all():
-                        self._do(do, getattr(event, "target", None))
+                        if element is not None and chosen is not None and element.value != chosen:
+                            element.value = chosen
+                        self._do(do, element)
 
         return called
 

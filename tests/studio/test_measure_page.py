@@ -127,8 +127,11 @@ def test_files_of_a_virtual_instrument_are_those_of_the_command(
         assert quality is not None
         assert [one.y for one in page._quality._plot.figure.data] == [tuple(one["y"]) for one in quality["data"]]
         assert len(page._drift._plot.figure.data) == len(drift["data"])
-    act(page._stop, "finish")
+    assert "All is measured" in page._next.content
+    assert (page._stop.visible, page._end_all.visible, page.settings.visible) == (False, True, False)
+    act(page._end_all)
     assert page.measuring is None
+    assert (page._stop.visible, page._end_all.visible, page.settings.visible) == (False, False, True)
     assert studio.window.project.changes() == ()
     other = tmp_path / "other"
     other.mkdir()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice, takewhile
 from typing import Final
@@ -70,6 +71,11 @@ class VirtualInstrument:
         How far the instrument has moved at the last configuration [m], evenly over the plan.
     sigma
         Standard deviation of a coordinate of a reading [m]; the device's if None.
+
+    Attributes
+    ----------
+    hides
+        What stands between it and each nest, in words, at each configuration: a nest that is not named is seen.
     """
 
     kind: Final = "virtual"
@@ -89,14 +95,22 @@ class VirtualInstrument:
         self.device, self.placed = device, placed
         self.sigma = device.sigma if sigma is None else sigma
         self._joints, self._seed, self._disturbed = joints, seed, disturbed
+        self.hides: Sequence[Mapping[str, str]] = [{} for _ in joints]
         self._frames = twin.frames(joints, number=np.arange(float(len(joints))))
         rng = np.random.default_rng([seed, 0])
         way = rng.standard_normal(3)
         self._drift = drift * way / np.linalg.norm(way)
-        turn = 2 * np.pi * np.arange(len(nests)) / max(len(nests), 1)
-        around = _NEST_CIRCLE * np.column_stack([np.cos(turn), np.sin(turn), 0.1 * np.arange(len(nests))])
         base = twin.robot.base
-        self._nests = dict(zip(nests, around @ base.rotation.T + base.translation, strict=True))
+        # From a quarter of a step beside the instrument on, so that none of a few is behind the base.
+        x, y, _ = -base.rotation.T @ np.array(base.translation)
+        turn = np.arctan2(y, x) + 2 * np.pi * (np.arange(len(nests)) + 0.25) / max(len(nests), 1)
+        around = _NEST_CIRCLE * np.column_stack([np.cos(turn), np.sin(turn), 0.1 * np.arange(len(nests))])
+        self.nests = dict(zip(nests, around @ base.rotation.T + base.translation, strict=True))
+
+    @property
+    def looks(self) -> bool:
+        """Whether it needs a line of sight; a measurement arm needs none."""
+        return not isinstance(self.device, MeasurementArm)
 
     @property
     def waiting(self) -> str:
@@ -129,6 +143,8 @@ class VirtualInstrument:
             index = [target.name for target in self.placed.targets].index(name)
             if not self.visible(k)[index]:
                 return [Incoming(left=(step.label, name, f"the {self.device.name} does not see it"))]
+        elif name in self.hides[k]:
+            return [Incoming(left=(step.label, name, f"{self.hides[k][name]} is in the line of sight"))]
         tries = takewhile(lambda entry: (entry.label, entry.name) == (step.label, name), reversed(session.entries))
         if sum(1 for _ in islice(tries, _MOST_TRIES)) == _MOST_TRIES:
             return [Incoming(left=(step.label, name, f"{_MOST_TRIES} readings in a row were set aside"))]
@@ -139,8 +155,8 @@ class VirtualInstrument:
 
     def _read(self, name: str, k: int, rng: np.random.Generator, mishap: int, time: float) -> Reading:
         turned = None
-        if name in self._nests:
-            place = self._nests[name]
+        if name in self.nests:
+            place = self.nests[name]
         else:
             place, turned = self._frames[name][k, :3, 3], self._frames[name][k, :3, :3]
         place = place + self._drift * (k / max(len(self._joints) - 1, 1))

@@ -84,7 +84,7 @@ class MeasurePage:
             self._why: Any = gui.add_text("Why", "", hint="words for the log: the nest was not clean")
             self._act: Any = gui.add_button_group("Do", ("set the reading aside", "leave the point out"))
         self._notices = gui.add_html("")
-        self._drift = Picture(window, "How the nests moved")
+        self._drift = Picture(window, "How the nests moved (no reading is corrected for it)")
         self._quality = Picture(window, "How the readings were taken")
         self.scene = MeasuringScene(window)
         self._file: Any = gui.add_dropdown("File", (NONE,), visible=False)

@@ -22,6 +22,7 @@ from truearm.measurement.measuring.reading_log import LOG
 from truearm.measurement.measuring.readings import Reading
 from truearm.measurement.readers.canonical import read_csv
 from truearm.results.measured import DATA, PAGE
+from truearm.simulation.devices import DEVICES, Device
 from truearm.simulation.virtual_instrument import VIRTUAL, VirtualInstrument
 
 MAPPING = """\
@@ -407,7 +408,6 @@ def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Pat
     [
         ({"device": None}, "device, watch, listen", "nobody says"),
         ({"listen": 0}, "device, listen", "one source"),
-        ({"device": "ballbar"}, "device", "brought by hand"),
         ({"device": "traker"}, "device", "Did you mean tracker"),
         ({"mapping": "m.yaml"}, "mapping", "belongs to `watch`"),
         ({"token": "x" * 20}, "token", "belongs to `listen`"),
@@ -431,6 +431,15 @@ def test_what_cannot_be_measured_is_refused(
     with pytest.raises(InputError, match=word) as refusal:
         arm(plan, tmp_path / "out", **given)
     assert refusal.value.parameter == parameter
+
+
+@pytest.mark.parametrize("device", [device for device in DEVICES if device.name not in VIRTUAL], ids=lambda d: d.name)
+def test_a_device_that_goes_through_no_plan_says_why_and_what_to_do(device: Device, plan: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=device.no_plan) as refusal:
+        arm(plan, tmp_path / "out", device=device.name)
+    assert refusal.value.parameter == "device"
+    assert f"'truearm simulate' finds the postures of {device.name}" in str(refusal.value)
+    assert not (tmp_path / "out").exists()
 
 
 def test_folders_that_cannot_be_watched_are_refused(plan: Path, tmp_path: Path) -> None:

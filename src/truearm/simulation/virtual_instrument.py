@@ -21,7 +21,7 @@ from truearm.notices import Notice
 from truearm.simulation.devices import DEVICES
 from truearm.simulation.devices.artefacts import Artefact
 from truearm.simulation.devices.device import Device
-from truearm.simulation.devices.tracker import MeasurementArm, Tracker
+from truearm.simulation.devices.tracker import MeasurementArm
 from truearm.simulation.twin import Twin
 
 #: Samples of a dwell, and how long it takes [s].
@@ -37,10 +37,8 @@ _SCATTER: Final = 8.0
 #: So often a point is read in a row; then it is left out.
 _MOST_TRIES: Final = 20
 
-#: Instruments that read where targets are, without touching them: by name.
-VIRTUAL: Final[dict[str, Device]] = {
-    device.name: device for device in DEVICES if isinstance(device, Tracker | MeasurementArm | Artefact)
-}
+#: Instruments that read where targets are, at whatever configurations the robot comes to: by name.
+VIRTUAL: Final[dict[str, Device]] = {device.name: device for device in DEVICES if not device.no_plan}
 
 
 class VirtualInstrument:
@@ -195,17 +193,17 @@ def virtual_device(name: str) -> Device:
     Raises
     ------
     InputError
-        If there is none of this name, or it touches what it measures: then the postures are its own.
+        If there is none of this name, or it does not go through a plan: then the postures are its own.
     """
     if name in VIRTUAL:
         return VIRTUAL[name]
-    touches = any(device.name == name for device in DEVICES)
+    why = next((device.no_plan for device in DEVICES if device.name == name), "")
     raise InputError(
-        "the arm is brought by hand to what this device reads, so it does not measure a plan by itself"
-        if touches
-        else "there is no device of this name",
+        why or "there is no device of this name",
         parameter="device",
         came=name,
         allowed=", ".join(VIRTUAL),
-        cure="Measure a twin with it by 'truearm simulate'." if touches else did_you_mean(name, VIRTUAL),
+        cure=f"'truearm simulate' finds the postures of {name}, and measures a twin with it."
+        if why
+        else did_you_mean(name, VIRTUAL),
     )

@@ -84,7 +84,7 @@ def test_one_robot_of_a_fleet_may_have_excluded_readings_and_its_result_says_why
 ) -> None:
     (tmp_path / "dirty.csv").write_text("configuration,target,reason\n3,1,nest was dirty\n", "utf-8")
     robots = [
-        {"name": "one", "robot": "irb120", "data": str(measured / "a.csv"), "exclude": "dirty.csv"},
+        {"name": "one", "robot": "irb120", "data": str(measured / "a.csv"), "options": {"exclude": "dirty.csv"}},
         {"name": "two", "robot": "irb120", "data": str(measured / "b.csv")},
     ]
     manifest = {"truearm": "truearm-fleet/1", "robots": robots, "options": {"model": "offsets"}}

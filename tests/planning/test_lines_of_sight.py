@@ -11,7 +11,7 @@ from truearm.planning.driving.arm_capsules import ArmCapsules
 from truearm.planning.driving.cell import KeepOut
 from truearm.planning.driving.lines_of_sight import BEAM, hidden
 
-BASE = Transform((2.0, 0.5, -0.4), (0.4, 0.0, 0.0))
+BASE = Transform((2.0, 0.5, -0.4), (np.cos(0.2), 0.0, 0.0, np.sin(0.2)))
 ROBOT = load_robot("irb120").with_frames(BASE, {"tip": [0.0, 0.0, 0.1]})
 
 
@@ -21,25 +21,25 @@ def in_world(place: Array) -> Array:
 
 def test_the_arm_hides_what_lies_behind_a_link() -> None:
     rng = np.random.default_rng(0)
-    joints = ROBOT.random_configurations(60, rng)
+    joints = ROBOT.random_configurations(25, rng)
     arm, eye = ArmCapsules(ROBOT), np.zeros(3)
-    points = {f"n{k}": in_world(rng.uniform(-0.7, 0.7, 3)) for k in range(12)}
+    points = {f"n{k}": 1.3 * in_world(rng.uniform(-0.2, 0.2, 3) + [0.0, 0.0, 0.35]) for k in range(8)}
     found = hidden(ROBOT, joints, eye, points)
     at = arm.points(joints)
     counts = [0, 0]
     for name, point in points.items():
-        line = np.linspace(eye, point, 1500)
+        line = np.linspace(eye, point, 500)
         inside = (line - np.array(ROBOT.base.translation)) @ ROBOT.base.rotation
         for k in range(len(joints)):
             least = np.inf
             for link in (*arm.links, *arm.tools):
-                along = at[link.start][:, k] + np.linspace(0, 1, 60)[:, None] * (at[link.end] - at[link.start])[:, k]
+                along = at[link.start][:, k] + np.linspace(0, 1, 30)[:, None] * (at[link.end] - at[link.start])[:, k]
                 far = np.linalg.norm(inside[:, None] - along, axis=2).min() - link.radius - BEAM
                 least = min(least, far)
-            if abs(least) > 0.02:  # of what is nearly so, points along lines do not tell
+            if abs(least) > 0.01:  # of what is nearly so, points along lines do not tell
                 assert (name in found[k]) == (least < 0)
                 counts[int(least < 0)] += 1
-    assert min(counts) > 20
+    assert min(counts) > 10
     assert {words for one in found for words in one.values()} == {"the arm"}
 
 

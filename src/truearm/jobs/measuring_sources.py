@@ -129,7 +129,8 @@ def virtual_source(asked: AskedOfSource, nominal: Robot, joints: Array, nests: t
     from truearm.simulation.virtual_instrument import VirtualInstrument, virtual_device
 
     name = name_argument(asked.get("device"), "device")
-    truth = _or(asked.get("truth"), "random")
+    given = asked.get("truth")
+    truth = "random" if given is None else given
     seed = whole_argument(_or(asked.get("seed"), 0), "seed")
     sigma = None if (noise := asked.get("noise")) is None else _noise(noise)
     disturbed = _share(_or(asked.get("disturbed"), 0.0))

@@ -203,8 +203,8 @@ def open_campaign(
     path = path_argument(plan, "plan")
     kind = source_kind(asked)
     truth, mapping, about = asked.get("truth"), asked.get("mapping"), asked.get("about")
-    call = command_argument(command) or _call(path, robot, out, asked)
     between = whole_argument(asked.get("every", _EVERY), "every", 1, LONGEST_ROUND)
+    call = command_argument(command) or _call(path, robot, out, {**asked, "every": between})
     read = (path, robot, truth, mapping, about, asked.get("constraints"))
     folder_for((LOG, BEGUN), out, *read)
     folder = folder_for((DATA, PAGE), out, *read, ours=True)
@@ -281,7 +281,9 @@ def sight(campaign: OpenCampaign) -> Sight | None:
 
 def _call(plan: Path, robot: object, out: object, asked: Asked) -> str:
     """Return the call that does the same, without the token: it stands in no file."""
-    said = {name: value for name, value in asked.items() if name != "token" and (name, value) != ("every", _EVERY)}
+    said = {name: value for name, value in asked.items() if name != "token"}
+    if said["every"] == _EVERY:
+        del said["every"]
     return python_call("measure", plan, robot, out=out, **said)
 
 

@@ -100,7 +100,7 @@ class Measuring:
         project, fields, said = self._project, self.fields, self._said
         plan = fields.planned()
         given = measure_arguments(said)
-        for name in ("watch", "about"):
+        for name in ("watch", "about", "constraints"):
             if name in given:
                 given[name] = project.path(given[name], name)
         for name in ("mapping", "truth"):  # a file of the project, or a name that the job knows

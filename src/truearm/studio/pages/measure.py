@@ -104,6 +104,8 @@ class MeasurePage:
                 fields.number("seed", "Seed", "of all that is drawn", optional=False, whole=True)
                 fields.number("disturbed", "Disturbed", "share of readings that go wrong, up to 0.9")
                 fields.number("drift", "Drift [mm]", "how far the instrument moves till the end")
+                boxes = "whose boxes hide nests: of the page Cell, or a file"
+                fields.file("constraints", "Constraints", (".yaml", ".yml"), boxes)
         with self._of_source["watched folder"]:
             fields.text("watch", "Folder", "of the project, into which software writes rows: its name")
             fields.text("mapping", "Mapping", "what the columns mean: a file of the project, or a known program's name")

@@ -23,7 +23,7 @@ def test_the_arm_hides_what_lies_behind_a_link() -> None:
     rng = np.random.default_rng(0)
     joints = ROBOT.random_configurations(25, rng)
     arm, eye = ArmCapsules(ROBOT), np.zeros(3)
-    points = {f"n{k}": 1.3 * in_world(rng.uniform(-0.2, 0.2, 3) + [0.0, 0.0, 0.35]) for k in range(8)}
+    points = {f"n{k}": 1.3 * in_world(np.array([0.0, 0.0, 0.35]) + rng.uniform(-0.2, 0.2, 3)) for k in range(8)}
     found = hidden(ROBOT, joints, eye, points)
     at = arm.points(joints)
     counts = [0, 0]

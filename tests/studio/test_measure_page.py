@@ -446,3 +446,23 @@ def test_the_command_of_the_page_has_every_option_by_its_name() -> None:
         "--most-deviation 0.03 --fewest-samples 4 --out DIR"
     )
     assert measure_arguments(fields.said(None))["most_deviation"] == pytest.approx(3e-5)
+
+
+def test_a_nest_that_a_box_hides_is_said_before_it_is_left_out_and_its_line_is_red(studio: Studio) -> None:
+    project, page = studio.window.project, page_of(studio)
+    (project.folder / "boxes.yaml").write_text(
+        "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\nkeep_out: {shed: {z: [-1, 2000]}}\n"
+    )
+    project.look()
+    ask(page, **{**ARM, "device": "tracker", "constraints": "boxes.yaml"})
+    measuring = Measuring(project, studio.window.robot())
+    try:
+        assert measuring.next_words()[-1] == "It does not see n1, n2 there."
+        lines = measuring.lines_of_sight()
+        assert lines is not None
+        assert (len(lines.segments), [*lines.names]) == (2, ["instrument", "n1, hidden"])
+        assert lines.colours[0].tolist() == lines.colours[1].tolist()
+        (entry,), _ = measuring.step(1)
+        assert (entry.event, entry.words) == ("left", "the box 'shed' is in the line of sight")
+    finally:
+        measuring.campaign.close()

@@ -47,7 +47,9 @@ class ProofPage:
         self._arrows.refresh()
         folder = project.file("result")
         if folder is None or not exists(folder / "result.json"):
-            self._table.content = words.paragraph("There is no result yet: calibrate first.")
+            self._table.content = words.paragraph(
+                f"There is no result yet in the folder {project.settings.result} of the project: calibrate first."
+            )
             self._notices.content, self._shown, self._figures = "", (), {}
             self._picture.visible = self._files.visible = self._drawn.place.visible = False
             return

@@ -128,6 +128,7 @@ class _Plan:
     path: Path
     configurations: Configurations
     joints: Array
+    before: Array | None
 
 
 @dataclass(frozen=True)
@@ -330,7 +331,14 @@ def _planned(path: Path, robot: Robot) -> _Plan:
         position=np.full((n, 3), np.nan),
         joints_are=found.joints_are,
     )
-    return _Plan(path, found, in_model_joints(robot, data).joints)
+    stops = found.before
+    before = None if stops is None else replace(data, joints=stops.joints, joint_kinds=stops.kinds)
+    return _Plan(
+        path,
+        found,
+        in_model_joints(robot, data).joints,
+        None if before is None else in_model_joints(robot, before).joints,
+    )
 
 
 def _about(about: object) -> About:
@@ -417,7 +425,16 @@ def _virtual(
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload)))
     twin, placed = seen_by(device, nominal, twin)
     source = VirtualInstrument(
-        device, twin, placed, planned.joints, nests, asked.seed, asked.disturbed, asked.drift, asked.noise
+        device,
+        twin,
+        placed,
+        planned.joints,
+        nests,
+        asked.seed,
+        asked.disturbed,
+        asked.drift,
+        asked.noise,
+        planned.before,
     )
     return source, placed
 

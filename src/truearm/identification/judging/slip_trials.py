@@ -207,7 +207,7 @@ def mixed_angle_slips(data: Dataset) -> Iterator[Slip]:
         if not 0 < len(which) < data.configurations:
             continue
         joints = data.joints.copy()
-        joints[np.ix_(which, turning)] *= factor
+        joints[np.ix_(which, np.array(turning))] *= factor
         first = ", ".join(data.labels[c] for c in which[:_MOST_NAMED].tolist())
         some = f"{first} and others" if len(which) > _MOST_NAMED else first
         words_of = f"The joints: {words}, at some configurations alone ({some}). Mend the numbers of these rows"

@@ -460,3 +460,22 @@ def test_a_plan_with_a_configuration_twice_is_refused(plan: Path, tmp_path: Path
     with pytest.raises(InputError, match="appears twice") as refusal:
         arm(plan, tmp_path / "out")
     assert refusal.value.parameter == "plan"
+
+
+def test_a_virtual_robot_comes_from_the_stops_of_the_plan(plan: Path, tmp_path: Path) -> None:
+    lag = 1e-3
+    robot = truearm.load_robot("irb120").with_effects(["approach"])
+    truth = robot.with_values({f"approach_{k}": lag for k in range(1, 7)})
+    header, *rows = plan.read_text().splitlines()
+    table = [row.split(",") for row in rows]
+    stops = [",".join(str(float(cell) - 2.0) for cell in row[1:]) for row in table]
+    names = ",".join(f"approach_{k} [deg]" for k in range(1, 7))
+    plan.write_text("\n".join([f"{header},{names}", *(f"{a},{b}" for a, b in zip(rows, stops, strict=True))]) + "\n")
+    came = arm(plan, tmp_path / "stopped", truth=truth, noise=1e-9, nests=[])
+    ahead = [",".join([row[0], *(repr(float(cell) + float(np.degrees(lag))) for cell in row[1:])]) for row in table]
+    plan.write_text("\n".join([header, *ahead]) + "\n")
+    there = arm(plan, tmp_path / "ahead", truth="nominal", noise=1e-9, nests=[])
+    places = [[e.reading.position for e in found.session.kept if e.reading] for found in (came, there)]
+    np.testing.assert_allclose(places[0], places[1], atol=1e-12)
+    assert came.data is not None
+    assert came.data.number.tolist() == list(range(1, 2 * len(table), 2))

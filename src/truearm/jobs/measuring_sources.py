@@ -109,13 +109,17 @@ class VirtualSource:
     entries: dict[str, Any]
 
 
-def virtual_source(asked: AskedOfSource, nominal: Robot, joints: Array, nests: tuple[str, ...]) -> VirtualSource:
+def virtual_source(
+    asked: AskedOfSource, nominal: Robot, joints: Array, before: Array | None, nests: tuple[str, ...]
+) -> VirtualSource:
     """Return a virtual instrument that measures a twin.
 
     Parameters
     ----------
     joints
         Of the plan, as the model counts them [rad or m], ``(n, joints)``.
+    before
+        Where the arm stops right before each of them, as `joints`; None if it comes from the one before.
     nests
         Their names.
 
@@ -142,7 +146,7 @@ def virtual_source(asked: AskedOfSource, nominal: Robot, joints: Array, nests: t
         twin = truth_twin(nominal, made, np.random.default_rng(seed))
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(asked.get("payload"))))
     twin, placed = seen_by(device, nominal, twin)
-    source = VirtualInstrument(device, twin, placed, joints, nests, seed, disturbed, drift, sigma)
+    source = VirtualInstrument(device, twin, placed, joints, nests, seed, disturbed, drift, sigma, before)
     boxes: dict[str, Any] = {}
     if rules is not None:
         from truearm.planning.constraints.constraints import keep_out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Unpack
 
@@ -155,11 +155,13 @@ class _Plan:
     configurations: Configurations
     joints: Array
     reads: tuple[str, ...]
+    before: Array | None
 
     @property
     def begun(self) -> list[Any]:
         """What must be the same when the measuring goes on, as JSON writes it."""
-        return [[*self.configurations.labels], self.joints.tolist(), [*self.reads]]
+        stops = [] if self.before is None else self.before.tolist()
+        return [[*self.configurations.labels], self.joints.tolist(), stops, [*self.reads]]
 
     def reads_of(self, targets: Sequence[str]) -> dict[str, tuple[str, ...]] | None:
         """Return which targets are read at each configuration, by its label; None if the plan says nothing of them.
@@ -218,7 +220,7 @@ def open_campaign(
     virtual: VirtualSource | None = None
     if kind == "device":
         nests = nests or ()
-        virtual = virtual_source(asked, nominal, planned.joints, nests)
+        virtual = virtual_source(asked, nominal, planned.joints, planned.before, nests)
         source, known = virtual.source, tuple(target.name for target in virtual.placed.targets)
         _refuse_unknown(targets, known)
         quality = quality_of_device(
@@ -314,7 +316,15 @@ def _planned(path: Path, robot: Robot) -> _Plan:
     )
     at = cells.names.index(_READS) if _READS in cells.names else None
     reads = () if at is None else cells.columns[at]
-    return _Plan(path, found, in_model_joints(robot, data).joints, reads)
+    stops = found.before
+    before = None if stops is None else replace(data, joints=stops.joints, joint_kinds=stops.kinds)
+    return _Plan(
+        path,
+        found,
+        in_model_joints(robot, data).joints,
+        reads,
+        None if before is None else in_model_joints(robot, before).joints,
+    )
 
 
 def _about(about: object) -> About:

@@ -15,6 +15,7 @@ from truearm.measurement.measuring.readings import Reading, dwell_figures
 from truearm.measurement.measuring.session import Session
 from truearm.measurement.measuring.sources import Incoming
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import approach_from
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.notices import Notice
@@ -22,7 +23,7 @@ from truearm.simulation.devices import DEVICES
 from truearm.simulation.devices.artefacts import Artefact
 from truearm.simulation.devices.device import Device
 from truearm.simulation.devices.tracker import MeasurementArm
-from truearm.simulation.twin import Twin
+from truearm.simulation.twin import Conditions, Twin
 
 #: Samples of a dwell, and how long it takes [s].
 SAMPLES: Final = 20
@@ -69,6 +70,8 @@ class VirtualInstrument:
         How far the instrument has moved at the last configuration [m], evenly over the plan.
     sigma
         Standard deviation of a coordinate of a reading [m]; the device's if None.
+    before
+        Where the arm stops right before each configuration, as `joints`; None if it comes from the one before.
 
     Attributes
     ----------
@@ -89,12 +92,17 @@ class VirtualInstrument:
         disturbed: float = 0.0,
         drift: float = 0.0,
         sigma: float | None = None,
+        before: Array | None = None,
     ) -> None:
         self.device, self.placed = device, placed
         self.sigma = device.sigma if sigma is None else sigma
         self._joints, self._seed, self._disturbed = joints, seed, disturbed
         self.hides: Sequence[Mapping[str, str]] = [{} for _ in joints]
-        self._frames = twin.frames(joints, number=np.arange(float(len(joints))))
+        conditions = Conditions(number=np.arange(float(len(joints))))
+        if before is not None:
+            count = float(2 * len(joints))
+            conditions = Conditions(approach=approach_from(before, joints), number=np.arange(1.0, count, 2.0))
+        self._frames = twin.frames(joints, **conditions)
         rng = np.random.default_rng([seed, 0])
         way = rng.standard_normal(3)
         self._drift = drift * way / np.linalg.norm(way)

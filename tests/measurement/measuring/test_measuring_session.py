@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -93,6 +94,18 @@ def test_a_reading_of_another_configuration_is_kept_where_it_belongs() -> None:
     assert "order" in csv_text(data)
     assert data.number is not None
     assert data.number.tolist() == [0, 1]
+
+
+def test_stops_before_the_configurations_count_in_the_order() -> None:
+    of = session(targets=("a",))
+    for label in LABELS:
+        taken(of, "a", label)
+    data = kept_readings(of, replace(plan(), before=plan()), "kept")
+    assert data is not None
+    assert data.number is not None
+    assert data.approach is not None
+    assert data.number.tolist() == list(range(1, 2 * len(LABELS), 2))
+    assert not data.approach.any()
 
 
 def test_nests_that_are_passed_over_are_counted() -> None:

@@ -16,6 +16,7 @@ from truearm.files import confined_reads, exists
 from truearm.library import load_robot
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.same_arm import fitted_from
 from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.gate import Gate
@@ -303,9 +304,17 @@ class Window:
             return load_robot(folder / "calibrated.yaml")
 
     def result_of_another(self) -> str:
-        """Return which robot the result is of, where that is not the robot that is chosen; nothing otherwise."""
+        """Return which robot the result is of, where that is not the robot that is chosen; nothing otherwise.
+
+        Also a robot of the same name is another one where its file has other kinematics than the result began with.
+        """
         calibrated = self.calibrated()
-        return "" if calibrated is None or calibrated.name == self.robot().name else calibrated.name
+        if calibrated is None:
+            return ""
+        robot = self.robot()
+        if calibrated.name != robot.name:
+            return calibrated.name
+        return "" if fitted_from(calibrated, robot) else f"{calibrated.name} with other kinematics"
 
     def refuse_result_of_another(self) -> None:
         """Refuse to go on with the result of another robot than the one that is chosen.

@@ -85,7 +85,9 @@ class ProofPage:
         found = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
         other = self._window.result_of_another()
         if other:
-            text = f"This result is of the robot {other}, and {self._window.robot().name} is chosen: calibrate again."
+            name, source = self._window.robot().name, self._window.project.settings.robot
+            chosen_now = name if source == name else f"{name} ({source})"
+            text = f"This result is of the robot {other}, and {chosen_now} is chosen: calibrate again."
             found.append(Notice("other-robot", text, "warning"))
         if differing := made.differing(self._window.project.settings, self._window.robot()):
             was, is_now = ("; ".join(f"{name} {pair[i]}" for name, pair in differing.items()) for i in (0, 1))
@@ -99,8 +101,8 @@ class ProofPage:
                 found.append(Notice("other-measurements", text, "warning"))
         exclude = self._window.project.file("exclude")
         chosen = read_exclusions(exclude) if exclude is not None and exists(exclude) else ()
-        chosen_now = [(one.configuration, one.target, one.reason) for one in chosen]
-        if chosen_now != [(one["configuration"], one["target"], one["reason"]) for one in result.get("excluded", ())]:
+        excluded = [(one.configuration, one.target, one.reason) for one in chosen]
+        if excluded != [(one["configuration"], one["target"], one["reason"]) for one in result.get("excluded", ())]:
             text = "This result is without other readings than those that are excluded now: calibrate again."
             found.append(Notice("other-measurements", text, "warning"))
         return found

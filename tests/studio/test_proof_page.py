@@ -121,7 +121,10 @@ def test_an_edited_robot_of_the_same_name_is_another_robot(window: Window) -> No
     proof = proof_of(window)
     (programs,) = (page for page in window.pages if isinstance(page, ProgramsPage))
     edit_the_robot(window, "a: 270.0", "a: 290.0")
-    assert "This result is of the robot irb120 with other kinematics, and irb120 (arm.yaml) is chosen" in proof._notices.content
+    assert (
+        "This result is of the robot irb120 with other kinematics, and irb120 (arm.yaml) is chosen"
+        in proof._notices.content
+    )
     assert "(other-robot)" in proof._notices.content
     (window.project.folder / "part.mod").write_text("MODULE m\nENDMODULE\n")
     window.edit(program="part.mod")

@@ -179,6 +179,18 @@ def test_base_targets_and_fixtures_go_into_a_robot_file_of_the_project(studio: S
     assert load_robot(folder / "irb120-cell.yaml").base.translation == pytest.approx((2.0, 0.0, 0.5))
 
 
+def test_what_is_called_as_in_the_data_leaves_other_names_free(studio: Studio) -> None:
+    places = page_of(studio).places
+    typed(studio, places._add, "target")
+    typed(studio, places._rows["target_1"].name, "1")
+    typed(studio, places._add, "target")
+    assert list(places._rows) == ["1", "target_2"]
+    typed(studio, places._add, "point")
+    typed(studio, places._rows["point_1"].name, "fixture_point_1")
+    typed(studio, places._add, "point")
+    assert list(places._rows) == ["1", "target_2", "fixture_point_1", "point_2"]
+
+
 def test_things_are_put_where_they_were_and_only_what_is_meant_changes() -> None:
     turned = Transform((0.1, 0.0, 0.2), (0.7071067811865476, 0.0, 0.7071067811865476, 0.0))
     robot = load_robot("irb120").with_frames(Transform((1.0, 0.0, 0.0)), {"a": (0.0, 0.0, 0.1), "b": turned})

@@ -66,6 +66,7 @@ def test_excluded_readings_count_as_missing_and_the_split_stays(csv: Path, tmp_p
     assert said in found.lines()
     assert " 2 readings excluded, redundancy" in found.history
     assert f"exclude='{file}'" in found.command
+    assert "missing" not in [one.code for one in found.warnings]
     rows = json.loads((tmp_path / "result" / "result.json").read_text())["excluded"]
     assert [(row["configuration"], row["reason"], row["part"]) for row in rows] == [
         (TRAINING[0], "beam, broken", "training"),
@@ -108,6 +109,7 @@ def test_what_is_excluded_is_no_longer_found_and_counted(csv: Path, tmp_path: Pa
     assert "outliers" not in found
     assert found["excluded"]["level"] == "note"
     assert "1 reading is excluded: touched (1). Excluded readings count as missing." in found["excluded"]["message"]
+    assert "missing" not in found  # whoever has excluded it knows that it is
     assert "falsifies the proof" in found["excluded"]["message"]
     words = ["calibrate", "irb120", str(csv), "--model", "offsets", "--exclude", str(file), "--json"]
     done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "r")])

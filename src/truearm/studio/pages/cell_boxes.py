@@ -94,7 +94,9 @@ class CellBoxes:
             with folder:
                 called = gui.add_text("Name", name)
                 x, y, z = (
-                    gui.add_text(f"{axis} [mm]", "", hint="from..to in the base frame, nothing: without end")
+                    gui.add_text(
+                        f"{axis} [mm]", "", hint="from..to in the base frame; empty: without end on both sides"
+                    )
                     for axis in "xyz"
                 )
                 remove = gui.add_button("Remove the box")

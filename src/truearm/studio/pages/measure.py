@@ -14,6 +14,7 @@ from truearm.results.measured import DATA, PAGE
 from truearm.studio import words
 from truearm.studio.measure_fields import SOURCES
 from truearm.studio.measuring import HEAD, Measuring
+from truearm.studio.pages.check import choose_measurements
 from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.fields import Fields
 from truearm.studio.pages.measured_with import MeasuredWith
@@ -244,7 +245,7 @@ class MeasurePage:
             raise InputError(
                 "no reading of a target is kept, so there are no measurements", cure="Go on, or choose another plan."
             )
-        self._window.edit(data=measuring.data)
+        choose_measurements(self._window, measuring.data)
         self._window.tell(Notice("measured", _DONE, "note"))
         self._window.refresh()
 

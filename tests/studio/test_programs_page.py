@@ -236,6 +236,7 @@ def test_a_correction_that_is_refused_leaves_nothing_of_the_one_before(
     (folder / "cell.yaml").write_text(_TOOL.replace("tProbe", "tOther"))
     act(page._run)
     assert "tother" in notices(window)
+    window.refresh()  # as after every long action
     assert page._said.content == ""
     assert not page._space.place.visible
     assert not page._downloads.visible

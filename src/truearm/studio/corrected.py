@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any, Final, Literal
 from truearm.compensation.cell import CellFile
 from truearm.compensation.program_files import CorrectionRecord, ProgramFile, correction_record, program_files
 from truearm.errors import InputError, Words
-from truearm.files import exists, read_bytes, read_yaml
+from truearm.files import exists, read_bytes, read_text, read_yaml
 from truearm.manifest import hash_of, sets_in
 from truearm.modeling.formats.controller_entry import STATED, controller_summary
 from truearm.modeling.robot import Robot
@@ -19,6 +20,9 @@ from truearm.studio.project import Project
 
 CellPart = Literal["tools", "frames"]
 _PARTS: Final[tuple[CellPart, ...]] = ("tools", "frames")
+
+#: The entry that a kinematics file begins with; robot files have it under their controller.
+_KINEMATICS: Final = re.compile(r"^kinematics[ \t]*+:", re.M)
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,22 @@ def cell_parts(path: Path) -> tuple[CellPart, ...]:
     """Return what a file of tools and frames has, as the job takes it; both where it has neither, which it refuses."""
     content = read_yaml(path, CellFile)
     return tuple(part for part in _PARTS if getattr(content, part)) or _PARTS
+
+
+def kinematics_files(project: Project) -> list[str]:
+    """Return the files of a project that say what a controller computes with: calibration.conf, or the driver's."""
+    return [
+        *project.names(".conf"),
+        *(name for name in project.names(".yaml", ".yml") if _is_kinematics(project, name)),
+    ]
+
+
+def _is_kinematics(project: Project, name: str) -> bool:
+    """Return whether a file looks like one of kinematics, as the ROS driver's program writes it."""
+    try:
+        return _KINEMATICS.search(read_text(project.path(name), "yaml_size")) is not None
+    except InputError:
+        return False
 
 
 def corrected_now(project: Project, robots: Callable[[], tuple[Robot | None, str]]) -> Corrected | None:

@@ -15,7 +15,7 @@ from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES
 from truearm.results.program_correction import REPORT
 from truearm.studio import words
-from truearm.studio.corrected import Corrected, corrected_now
+from truearm.studio.corrected import Corrected, corrected_now, kinematics_files
 from truearm.studio.drawn_program import DrawnProgram, corrected_program, read_program
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.program_in_space import ProgramInSpace
@@ -45,7 +45,7 @@ class ProgramsPage:
         self._cell = gui.add_dropdown("Tools and frames", (NONE,), hint="a file of the schema truearm-cell/1")
         self._taught = gui.add_dropdown("Taught", (_UNSAID, *_TAUGHT), hint="what was taught at the robot itself")
         self._kinematics = gui.add_dropdown(
-            "Controller has", (_UNSAID, *STATED), hint="with what the controller turns poses into joint positions"
+            "Controller has", (_UNSAID, *STATED), hint="with what it turns poses into joint positions; or a file"
         )
         self._read = gui.add_button("Draw the program")
         self._run = gui.add_button("Correct the program")
@@ -77,7 +77,7 @@ class ProgramsPage:
         offer(self._program, programs, settings.program)
         offer(self._cell, project.names(".yaml", ".yml"), settings.cell)
         offer(self._taught, _TAUGHT, None if settings.taught is None else ", ".join(settings.taught), _UNSAID)
-        offer(self._kinematics, STATED, settings.controller_kinematics, _UNSAID)
+        offer(self._kinematics, (*STATED, *kinematics_files(project)), settings.controller_kinematics, _UNSAID)
         if self._told_of.differs(window):
             self._said.content, self._told_of = "", _Of()
         if self._of.differs(window):

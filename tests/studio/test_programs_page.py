@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import replace
+from html import unescape
 from importlib.resources import files
 from pathlib import Path
 from shutil import copytree
@@ -11,13 +13,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests import ur_controller as ur
+from tests.cli.conftest import Truearm
+from tests.cli.conftest import truearm as truearm
 from tests.simulated import campaign
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, notices
 
 from truearm.jobs.calibrate import calibrate
 from truearm.jobs.compensate import compensate
+from truearm.jobs.export import export
+from truearm.jobs.import_ur_kinematics import import_ur_kinematics
 from truearm.library import load_robot
+from truearm.studio.drawn_program import corrected_program
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.programs import ProgramsPage
 from truearm.studio.pages.proof import ProofPage
@@ -241,3 +249,60 @@ def test_a_correction_that_is_refused_leaves_nothing_of_the_one_before(
     assert not page._space.place.visible
     assert not page._downloads.visible
     assert "Changed since: tools and frames." in page._stands.content
+
+
+def test_the_files_of_a_controllers_kinematics_are_offered_and_taken(
+    serving: Serving, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = project(tmp_path)
+    (folder / "calibration.conf").write_text(ur.UR10_CONF)
+    own = import_ur_kinematics(folder / "calibration.conf", "ur10", out=tmp_path / "own.yaml").robot
+    export(own, "ur-kinematics", out=folder / "driver.yaml")
+    (folder / "cell.yaml").write_text(_TOOL)
+    (folder / "part.script").write_text(
+        "def part():\n  set_tcp(p[0,0,0.1,0,0,0])\n  movel(p[0.6, 0.1, 0.3, 3.141593, 0, 0])\n"
+        "  movel(p[0.7, 0.2, 0.3, 3.141593, 0, 0])\nend\n"
+    )
+    _, data = campaign(str(tmp_path / "own.yaml"), 40, 0.02e-3, 4)
+    calibrate("ur10", data, out=folder / "result")
+    window = serving(folder).window
+    page = programs(window)
+    at_once(window, monkeypatch)
+    window.edit(robot="ur10", program="part.script", controller_kinematics=None)
+    assert page._kinematics.options[-2:] == ("calibration.conf", "driver.yaml")
+    assert {"points", "tools, frames"} <= {*page._taught.options}  # as a notice tells to answer
+    act(page._run)
+    assert "calibration.conf" in notices(window)
+    assert page._said.content == ""
+    act(page._kinematics, "calibration.conf")
+    act(page._run)
+    assert "2 targets: 2 corrected" in page._said.content
+    assert page._stands.content == ""
+    (folder / "calibration.conf").write_text(ur.UR10_CONF + "# edited\n")
+    window.refresh()
+    assert "Changed since: what the controller has." in page._stands.content
+
+
+@pytest.mark.parametrize("parts", [("tools",), ("frames",), ("tools", "frames")])
+def test_the_command_that_the_report_names_does_the_same(
+    parts: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, calibrated: Path, truearm: Truearm
+) -> None:
+    folder = project(tmp_path)
+    copytree(calibrated, folder / "result")
+    frame = "frames:\n  wobjPlate: {of: base, translation: [310, -110, 60]}\n"
+    head, _, tool = _TOOL.partition("tools:")
+    text = head + f"tools:{tool}" * ("tools" in parts) + frame * ("frames" in parts)
+    (folder / "cell.yaml").write_text(text)
+    monkeypatch.chdir(folder)
+    corrected_program(
+        folder, "result/calibrated.yaml", "plate.mod", "studio", "cell.yaml", ["none"], "nominal", print
+    )
+    found = re.search(
+        r"truearm (compensate result/calibrated.yaml plate.mod .*) --out DIR",
+        unescape((folder / "studio/compensation.html").read_text()),
+    )
+    assert found is not None
+    run = truearm(*shlex.split(found[1]), "--out", "command")
+    assert run.code == 0, run.err
+    for name in ("plate.mod", "plate.mod.truearm.json", "compensation.html"):
+        assert (folder / "command" / name).read_bytes() == (folder / "studio" / name).read_bytes()

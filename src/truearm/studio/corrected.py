@@ -78,10 +78,8 @@ def cell_parts(path: Path) -> tuple[CellPart, ...]:
 
 def kinematics_files(project: Project) -> list[str]:
     """Return the files of a project that say what a controller computes with: calibration.conf, or the driver's."""
-    return [
-        *project.names(".conf"),
-        *(name for name in project.names(".yaml", ".yml") if _is_kinematics(project, name)),
-    ]
+    written = (name for name in project.names(".yaml", ".yml") if _is_kinematics(project, name))
+    return [*project.names(".conf"), *written]
 
 
 def _is_kinematics(project: Project, name: str) -> bool:

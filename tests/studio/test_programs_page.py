@@ -294,9 +294,7 @@ def test_the_command_that_the_report_names_does_the_same(
     text = head + f"tools:{tool}" * ("tools" in parts) + frame * ("frames" in parts)
     (folder / "cell.yaml").write_text(text)
     monkeypatch.chdir(folder)
-    corrected_program(
-        folder, "result/calibrated.yaml", "plate.mod", "studio", "cell.yaml", ["none"], "nominal", print
-    )
+    corrected_program(folder, "result/calibrated.yaml", "plate.mod", "studio", "cell.yaml", ["none"], "nominal", print)
     found = re.search(
         r"truearm (compensate result/calibrated.yaml plate.mod .*) --out DIR",
         unescape((folder / "studio/compensation.html").read_text()),

@@ -75,6 +75,10 @@ def test_boxes_are_rows_a_plain_file_and_in_the_scene(studio: Studio) -> None:
     assert read_yaml(file, Constraints).clearance is None
     window.edit(robot="ur5e")
     assert len(drawn(studio, "boxes")) == 4
+    typed(studio, boxes._draws, False)
+    assert drawn(studio, "boxes") == []
+    typed(studio, boxes._draws, True)
+    assert len(drawn(studio, "boxes")) == 4
     for _ in range(3):
         window._undo_edit()
     assert list(boxes._rows) == ["box_2", "table"]

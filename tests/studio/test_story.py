@@ -243,7 +243,7 @@ def refusals_stand_where_one_acts_and_edits_are_undone(person: Person) -> None:
     assert project.settings.seed == 0
     person.write("Seed", "7")
     assert eventually(lambda: project.settings.seed == 7)
-    person.page.get_by_role("alert").wait_for(state="detached")
+    person.page.locator("p[role=alert]").wait_for(state="detached")
     person.press("undo")
     assert eventually(lambda: project.settings.seed == 0)
     person.page.keyboard.press("Control+Shift+Z")
@@ -254,7 +254,7 @@ def refusals_stand_where_one_acts_and_edits_are_undone(person: Person) -> None:
 
 def stands_below_the_field_within_the_panel(person: Person, label: str) -> None:
     """The refusal begins where the field ends, and is as wide as the page at most."""
-    refusal, panel = person.page.get_by_role("alert"), person.page.get_by_role("tab", name="Cell", exact=True)
+    refusal, panel = person.page.locator("p[role=alert]"), person.page.get_by_role("tab", name="Cell", exact=True)
     field = person.page.locator(f"xpath=//*[normalize-space(text())='{label}']").locator("visible=true").first
     refused, named, left = refusal.bounding_box(), field.bounding_box(), panel.bounding_box()["x"]
     assert 0.0 < refused["y"] - named["y"] < 60.0, (refused, named)

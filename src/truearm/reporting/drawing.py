@@ -53,10 +53,18 @@ def axis(title: str) -> Figure:
 
 
 def logarithmic_axis(title: str, low: float, high: float) -> Figure:
-    """Make an axis with ticks at 1, 2 and 5 in every decade, or at whole decades where there are many."""
+    """Make an axis with ticks at 1, 2 and 5 in every decade, at whole decades where there are many.
+
+    Where fewer than two of them lie between `low` and `high`, the ticks are evenly spaced.
+    """
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     steps = (1, 2, 5) if len(decades) <= 5 else (1,)
     ticks = [float(f"{step}e{decade}") for decade in decades for step in steps]
+    if low < high and sum(low <= tick <= high for tick in ticks) < 2:
+        decade = math.floor(math.log10(third := (high - low) / 3.0))
+        step = max(one for one in (1, 2, 5) if one * 10.0**decade <= third)
+        first, last = (int(end / (step * 10.0**decade)) for end in (low, high))
+        ticks = [float(f"{k * step}e{decade}") for k in range(max(first, 1), last + 2)]
     return axis(f"{title}, logarithmic") | {
         "type": "log",
         "tickvals": ticks,

@@ -30,6 +30,8 @@ UNTOLD: Final = (70, 130, 180)
 _NEXT: Final = (46, 160, 67)
 _HIDDEN: Final = (214, 69, 61)
 _OTHER: Final = (150, 158, 170)
+#: What the instrument is called among the lines of sight.
+INSTRUMENT: Final = "instrument"
 #: What stands above the columns of the last readings.
 HEAD: Final = ("no.", "at", "point", "dev. [mm]", "settling [mm]", "breaks", "became")
 
@@ -258,7 +260,7 @@ class Measuring:
             (_NEXT if asked else _OTHER) if visible else _HIDDEN
             for visible, asked in zip(seen.visible, seen.outstanding, strict=True)
         ]
-        names = {"instrument": origin[0]}
+        names = {INSTRUMENT: origin[0]}
         step = self.campaign.session.next
         if step is not None:
             k = seen.names.index(step.names[0])  # labels of all of them would cover each other

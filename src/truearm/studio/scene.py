@@ -83,8 +83,6 @@ class DrawnRobot:
                         mesh.faces,
                         color=colour,
                         opacity=opacity,
-                        cast_shadow=not ghost,
-                        receive_shadow=not ghost,
                     )
 
     def move(self, at: Array | Postures) -> None:
@@ -211,7 +209,6 @@ class Scene:
                     color=_BOX,
                     dimensions=tuple((high - low).tolist()),
                     opacity=_SEE_THROUGH,
-                    cast_shadow=False,
                     position=base.rotation @ middle + base.translation,
                     wxyz=base.quaternion,
                 ),
@@ -306,7 +303,6 @@ class Scene:
                     color=colour,
                     opacity=_SEE_THROUGH,
                     position=centre,
-                    cast_shadow=False,
                 )
                 self._parts[name].append(ball)
 
@@ -376,8 +372,12 @@ class Scene:
         self._look_at(look, look + base.rotation @ (self.length * np.array([0.85, -1.15, 0.6])))
 
     def _light(self) -> None:
-        """Light the scene from above and all around: viser's picture of a room costs a slow computer half a minute."""
+        """Light the scene from above and all around, without shadows.
+
+        Where the processor draws, viser's picture of a room takes half a minute, and shadows half of the pictures.
+        """
         self._scene.configure_environment_map(None)
+        self._scene.configure_default_lights(cast_shadow=False)
         self._scene.add_light_hemisphere("/light/sky", sky_color=_SKY, ground_color=_GROUND, intensity=_ALL_ROUND)
         self._scene.add_light_directional("/light/side", intensity=_SIDEWAYS, position=(1.0, -2.0, 0.6))
 

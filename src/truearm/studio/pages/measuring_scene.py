@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm.modeling.chain import Array
 from truearm.studio import words
-from truearm.studio.measuring import ASIDE, Measuring
+from truearm.studio.measuring import ASIDE, INSTRUMENT, Measuring
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.window import Window
 
@@ -20,6 +20,8 @@ _LEGEND: Final = (
 _KEPT, _ASIDE, _LINES, _NAMES = "measured-kept", "measured-aside", "measured-sight", "measured-names"
 #: Of a point, by the length of the arm.
 _SIZE: Final = 0.01
+#: So high above it stands what the instrument is called, by the length of the arm: at it stands the name of the world.
+_ABOVE: Final = 0.22
 _ASIDE_SIZE: Final = 0.014
 
 
@@ -69,7 +71,9 @@ class MeasuringScene:
         else:
             scene.show_lines(_LINES, in_scene(lines.segments), lines.colours)
         names = {} if lines is None else lines.names
-        scene.show_names(_NAMES, {words.one_line(name): in_scene(place) for name, place in names.items()})
+        above = {INSTRUMENT: np.array([0.0, 0.0, _ABOVE * scene.length])}
+        places = {name: in_scene(place) + above.get(name, 0.0) for name, place in names.items()}
+        scene.show_names(_NAMES, {words.one_line(name): place for name, place in places.items()})
 
     def clear(self) -> None:
         """Draw nothing any more."""

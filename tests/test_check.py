@@ -298,7 +298,7 @@ def test_one_target_a_configuration_is_a_campaign() -> None:
     assert codes(in_turn, None) == set()
     twice = data.of_readings((data.target == data.configuration % 3) | (data.configuration == 4))
     (missing,) = check(twice).warnings
-    assert missing.message.startswith("90 readings are missing (1 29, 2 31, 3 30). They are left out;")
+    assert missing.message.startswith("90 readings are missing (29 of target 1, 31 of target 2, 30 of target 3).")
 
 
 def test_configurations_that_are_off_are_not_called_nothing_wrong() -> None:
@@ -319,7 +319,7 @@ def test_messages_count_in_words() -> None:
         return [notice.message for notice in check(robot, broken).warnings]
 
     lost = moved_readings(data, np.array([4]), np.array(np.nan))
-    assert told(lost) == ["1 reading is missing (2 1). It is left out; nothing needs to be done."]
+    assert told(lost) == ["1 reading is missing (1 of target 2). It is left out; nothing needs to be done."]
     (far,) = told(moved_readings(data, np.array([4]), np.array([5e-3, 5e-3, 8e-3])))
     assert far.startswith("1 reading is far from where it must be (configuration/target): 2/2 (")
     assert far.endswith("Measure it again or leave it out; `loss=cauchy` lets it count little.")

@@ -17,6 +17,7 @@ from truearm.jobs.calibrate import calibrate
 from truearm.jobs.check import check
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
 from truearm.modeling.transform import quaternion_from_rotation
 from truearm.simulation.truths import at_station
@@ -227,6 +228,32 @@ def test_rows_in_another_unit_of_angle_are_told(of_one: bool) -> None:
     (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
     assert (notice.code, notice.level) == ("unit-angle", "error")
     assert "radians are called deg, at some configurations alone (3, 7)" in notice.message
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
+@pytest.mark.parametrize(
+    ("units", "words"), [(np.radians, "radians are called deg"), (np.degrees, "degrees are called rad")]
+)
+def test_a_block_of_rows_in_another_unit_of_angle_is_told(
+    share: float, units: Callable[[Array], Array], words: str
+) -> None:
+    data = honest()
+    joints, some = data.joints.copy(), round(share * data.configurations)
+    joints[:some] = units(joints[:some])
+    (told,) = [n for n in check(ROBOT, replace(data, joints=joints)).warnings if n.level == "error"]
+    assert told.code == "unit-angle"
+    assert f"{words}, at some configurations alone (1, 2" in told.message
+    whole = check(ROBOT, replace(data, joints=units(data.joints))).warnings
+    assert any(n.message == f"The joints: {words}. Mend the unit in the header." for n in whole)
+
+
+def test_a_robot_is_not_another_one_because_of_one_wrong_row() -> None:
+    data = honest()
+    joints = data.joints.copy()
+    joints[3, 2] += 0.2
+    codes = {n.code for n in calibrate(ROBOT, replace(data, joints=joints)).warnings}
+    assert "joints-mistaken" in codes
+    assert "wrong-robot" not in codes
 
 
 def test_a_reading_far_off_is_blamed_once_and_no_good_one_with_it() -> None:

@@ -114,6 +114,20 @@ def test_a_file_is_written_over_the_one_that_is_known_and_over_no_other(tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_new_file_is_made_only_where_none_has_come_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another program, which knows nothing of locks, makes it in the last moment."""
+    file, link = tmp_path / "a", os.link
+
+    def late(*names: Path, **how: bool) -> None:
+        file.write_text("another's")
+        link(names[0], names[1], follow_symlinks=how["follow_symlinks"])
+
+    monkeypatch.setattr(os, "link", late)
+    with pytest.raises(InputError, match="another program has changed this file"):
+        write_text_over(file, "mine", None)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "another's"}
+
+
 def test_of_several_files_none_is_written_where_one_is_another_than_is_known(tmp_path: Path) -> None:
     write_files(tmp_path, {"a": "old a", "b": "old b"})
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

@@ -178,6 +178,7 @@ def test_a_plan_typed_into_the_pendant_leads_where_it_says(tmp_path: Path) -> No
         assert there[:3, 3] == pytest.approx(p, abs=1e-9)
         assert there[:3, :3] == pytest.approx(R, abs=1e-9)
     before = np.array([[float(row[f"approach_{i} [deg]"]) for i in range(1, 7)] for row in rows])
+    assert plan.made.before is not None
     assert as_model(before) == pytest.approx(np.degrees(plan.made.before), abs=1e-9)
 
 

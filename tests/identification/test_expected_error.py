@@ -146,7 +146,7 @@ def test_parameters_are_uncertain_together_with_the_error_of_the_joints_that_the
         ({"status": Status.NOT_CONVERGED}, "did not converge"),
         ({"model": FRAMES}, "geometry counts as exact"),
         ({"at_bound": ("a_1",)}, "values at a bound"),
-        ({"excess": 2.0}, "the model cannot express"),
+        ({"excess": 2.0}, "the residuals are larger than the declared deviations"),
     ],
 )
 def test_what_makes_it_a_lower_bound(change: dict[str, object], words: str, tmp_path: Path) -> None:
@@ -162,6 +162,19 @@ def test_what_cannot_be_this_robot_is_no_more_than_a_lower_bound() -> None:
     assert found.status is Status.IMPLAUSIBLE
     assert "what was fitted cannot be this robot" in found.expected.omissions
     assert "narrow-data" not in {n.code for n in found.warnings}
+
+
+def test_what_is_left_is_not_said_to_be_the_robots_where_readings_are_doubted() -> None:
+    _, data = campaign("irb120", 30, 0.02e-3, 1)
+    position = data.position.copy()
+    position[[5, 50]] += [[0.02], [0.01]]
+    off = calibrate(IRB120, replace(data, position=position))
+    assert "outliers" in {n.code for n in off.warnings}
+    (words,) = off.expected.omissions
+    assert words.startswith("readings are doubted")
+    (declared,) = calibrate(IRB120, replace(data, sigma=np.full(len(position), 4e-6))).expected.omissions
+    assert declared.startswith("the residuals are larger than the declared deviations")
+    assert all("the robot does" not in word for word in (words, declared))
 
 
 def narrowed(degrees: float) -> Robot:

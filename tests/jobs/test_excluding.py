@@ -16,7 +16,7 @@ from truearm.errors import InputError
 from truearm.jobs.calibrate import calibrate
 from truearm.jobs.check import check
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.excluded import Exclusion, exclusions_text, read_exclusions, without_readings
+from truearm.measurement.excluded import Exclusion, exclusions_text, numbers_read, read_exclusions, without_readings
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.statistics import errors_of
 
@@ -66,6 +66,7 @@ def test_excluded_readings_count_as_missing_and_the_split_stays(csv: Path, tmp_p
     assert said in found.lines()
     assert " 2 readings excluded, redundancy" in found.history
     assert f"exclude='{file}'" in found.command
+    assert "missing" not in [one.code for one in found.warnings]
     rows = json.loads((tmp_path / "result" / "result.json").read_text())["excluded"]
     assert [(row["configuration"], row["reason"], row["part"]) for row in rows] == [
         (TRAINING[0], "beam, broken", "training"),
@@ -108,6 +109,7 @@ def test_what_is_excluded_is_no_longer_found_and_counted(csv: Path, tmp_path: Pa
     assert "outliers" not in found
     assert found["excluded"]["level"] == "note"
     assert "1 reading is excluded: touched (1). Excluded readings count as missing." in found["excluded"]["message"]
+    assert "missing" not in found  # whoever has excluded it knows that it is
     assert "falsifies the proof" in found["excluded"]["message"]
     words = ["calibrate", "irb120", str(csv), "--model", "offsets", "--exclude", str(file), "--json"]
     done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "r")])
@@ -134,9 +136,59 @@ def test_one_of_several_visits_and_reference_points_are_excluded(tmp_path: Path)
     assert read_exclusions(path) == ()
 
 
+def test_a_reading_that_is_not_the_one_that_was_excluded_is_refused(csv: Path, tmp_path: Path) -> None:
+    (row,) = _rows(DATA, "5", "1")
+    x, y, z = DATA.position[row] * 1e3
+    path = tmp_path / "excluded.csv"
+    head = "configuration,target,reason,read [mm]\n"
+    path.write_text(f"{head}5,1,beam broken,{x:.4f} {y:.4f} {z:.4f}\n")
+    assert "excluded" in [one.code for one in check("irb120", csv, exclude=path).warnings]
+    longer = DATA.of_configurations([*range(23), 23, 22])  # more measurements of the same names are no others
+    assert without_readings(longer, read_exclusions(path))[1] == (1,)
+    metres = f"{head.replace('mm', 'm')}5,1,beam broken,{x / 1e3:.7f} {y / 1e3:.7f} {z / 1e3:.7f}\n6,1,by hand,\n"
+    path.write_text(metres)
+    assert without_readings(DATA, read_exclusions(path))[1] == (1, 1)
+
+    path.write_text(f"{head}5,1,beam broken,{x:.4f} {y + 0.01:.4f} {z:.4f}\n")
+    words = "line 2: another reading stands here in the measurements than the one that was excluded"
+    for job in (check, calibrate):
+        with pytest.raises(InputError, match=rf"excluded\.csv, {words}.* that was made for these") as told:
+            job("irb120", csv, exclude=path)
+        assert told.value.parameter == "exclude"
+
+
+def test_what_was_read_is_compared_whatever_was_measured() -> None:
+    plain = Dataset.of(np.zeros((2, 6)), np.arange(6.0).reshape(2, 1, 3), configurations=["a", "b"])
+    twice = replace(plain.of_readings([0, 1, 1]), visit=np.array([1, 1, 2]))
+    assert numbers_read(twice) == [(0.0, 1.0, 2.0), (3.0, 4.0, 5.0), (3.0, 4.0, 5.0)]
+    both = Exclusion("b", "1", "x", read=((3.0, 4.0, 5.0), (3.0, 4.0, 5.0)))
+    assert without_readings(twice, [both])[1] == (2,)
+    with pytest.raises(InputError, match="another reading"):  # it was read once more since
+        without_readings(twice, [replace(both, read=both.read[:1])])
+    assert without_readings(twice, [replace(both, read=both.read[:1], visit="2")])[1] == (1,)
+    lengths = replace(
+        plain,
+        position=np.full((2, 3), np.nan),
+        distance=np.array([0.5, 0.25]),
+        fixtures=("ball",),
+        fixture=np.zeros(2, int),
+    )
+    assert numbers_read(lengths) == [(0.5,), (0.25,)]
+    assert without_readings(lengths, [Exclusion("a", "1", "x", read=((0.5,),))])[1] == (1,)
+    with pytest.raises(InputError, match="got '250 mm in"):
+        without_readings(lengths, [Exclusion("b", "1", "x", read=((0.5,),))])
+    text = exclusions_text([both, Exclusion("a", "1", "y")])
+    assert text == "configuration,target,reason,read [mm]\nb,1,x,3000 4000 5000; 3000 4000 5000\na,1,y,\n"
+
+
 @pytest.mark.parametrize(
     ("text", "what"),
     [
+        ("configuration,target,reason,read\n1,1,x,1 2 3\n", "line 1, read: no unit is given"),
+        ("configuration,target,reason,read [deg]\n1,1,x,1 2 3\n", "line 1, read: this unit does not fit here"),
+        ("configuration,target,reason,read [mm]\n1,1,x,1 2 three\n", "line 2, column read .mm.: numbers with blanks"),
+        ("configuration,target,reason,read [mm]\n1,1,x,1 2 1e99\n", "line 2, column read .mm.: .*too large"),
+        ("configuration,target,reason,read [m],read [mm]\n1,1,x,1,1\n", "line 1: the column read appears twice"),
         ("configuration,target\n1,1\n", "line 1: the column reason is missing"),
         ("configuration,target,reason,why\n1,1,x,y\n", "line 1: the column is not known; got 'why'"),
         ("configuration,target,reason,reason\n1,1,x,y\n", "line 1: the column reason appears twice"),

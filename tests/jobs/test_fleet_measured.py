@@ -79,6 +79,26 @@ def test_a_fleet_calibrates_every_robot_and_says_what_they_say_together(measured
     assert not (out / "priors.yaml").exists()  # of three robots none follow
 
 
+def test_one_robot_of_a_fleet_may_have_excluded_readings_and_its_result_says_why(
+    measured: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "dirty.csv").write_text("configuration,target,reason\n3,1,nest was dirty\n", "utf-8")
+    robots = [
+        {"name": "one", "robot": "irb120", "data": str(measured / "a.csv"), "options": {"exclude": "dirty.csv"}},
+        {"name": "two", "robot": "irb120", "data": str(measured / "b.csv")},
+    ]
+    manifest = {"truearm": "truearm-fleet/1", "robots": robots, "options": {"model": "offsets"}}
+    (tmp_path / "fleet.yaml").write_text(json.dumps(manifest), "utf-8")
+    truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
+    one, two = (
+        json.loads((tmp_path / "out" / "robots" / name / "result.json").read_text("utf-8")) for name in ("one", "two")
+    )
+    assert [(row["configuration"], row["target"], row["reason"]) for row in one["excluded"]] == [
+        ("3", "1", "nest was dirty")
+    ]
+    assert "excluded" not in two
+
+
 def test_a_robot_whose_result_ends_with_an_error_is_named(measured: Path, tmp_path: Path) -> None:
     lines = (measured / "a.csv").read_text("utf-8").splitlines()
     (tmp_path / "metres.csv").write_text("\n".join([lines[0].replace("[mm]", "[m]"), *lines[1:]]) + "\n", "utf-8")

@@ -19,8 +19,10 @@ from truearm.errors import InputError
 from truearm.jobs.measure import open_campaign, sight
 from truearm.jobs.measuring_begun import BEGUN
 from truearm.measurement.measuring.reading_log import LOG
+from truearm.measurement.measuring.readings import Reading
 from truearm.measurement.readers.canonical import read_csv
 from truearm.results.measured import DATA, PAGE
+from truearm.simulation.devices import DEVICES, Device
 from truearm.simulation.virtual_instrument import VIRTUAL, VirtualInstrument
 
 MAPPING = """\
@@ -134,6 +136,7 @@ def test_a_torn_line_is_said_and_measured_again(plan: Path, tmp_path: Path) -> N
         ({"every": 3}, "every"),
         ({"seed": 2}, "source of readings"),
         ({"most_deviation": 1e-3}, "limit of what is kept"),
+        ({"payload": "1kg,0mm,0mm,50mm"}, "source of readings"),
     ],
 )
 def test_a_folder_that_began_otherwise_is_refused(
@@ -278,6 +281,115 @@ def test_what_an_instrument_that_drifts_does_to_the_nests_is_said(plan: Path, tm
     assert summary["nests"]["rounds"] == len(drift.rounds)
 
 
+def test_a_drift_of_one_nest_is_told_where_nothing_states_a_deviation(plan: Path, tmp_path: Path) -> None:
+    plan.write_text(MEASURED_PLAN + "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9)))
+    rng = np.random.default_rng(0)
+    codes = []
+    for number, drift in enumerate((0.0, 0.5)):
+        with open_campaign(plan, "irb120", tmp_path / str(number), listen=0, targets=["a"], nests=["n"], every=1) as c:
+            while (step := c.session.next) is not None:
+                x, y, z = (1e-2 * rng.standard_normal(3) + 2.0).tolist()
+                x += drift * step.configuration / 11 if step.kind == "nests" else 100.0 * step.configuration
+                position = np.array([x, y, z]) * 1e-3
+                c._written(c.session.judged(Reading(step.names[0], 1.0, position, label=step.label)))
+            found = c.measured()
+        codes.append("nests-moved" in {notice.code for notice in found.warnings})
+        assert "No reading is corrected for it." in "\n".join(found.lines())
+    assert codes == [False, True]
+
+
+def test_a_nest_behind_the_arm_or_a_box_is_left_out_and_told(planned: Path, tmp_path: Path) -> None:
+    given: dict[str, Any] = {"device": "tracker", "nests": ["n1", "n2", "n3"], "every": 2, "truth": "nominal"}
+    with open_campaign(planned, "irb120", tmp_path / "open", **given) as campaign:
+        assert isinstance(campaign.source, VirtualInstrument)
+        behind = [(k, name) for k, names in enumerate(campaign.source.hides) for name in names]
+        assert behind
+        seen = sight(campaign)
+        assert seen is not None
+        assert seen.names == ("n1", "n2", "n3")
+        assert seen.visible.tolist() == [name not in campaign.source.hides[0] for name in seen.names]
+        assert seen.outstanding.all()
+    found = truearm.measure(planned, "irb120", out=tmp_path / "open", **given)
+    left = [e for e in found.session.entries if e.event == "left" and e.is_nest]
+    for entry in left:
+        assert entry.words == "the arm is in the line of sight"
+    boxes = tmp_path / "boxes.yaml"
+    boxes.write_text(
+        "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"
+        "keep_out: {wall: {x: [-2000, 2000], y: [-3000, 3000], z: [-2000, -1900]}, shed: {z: [-1, 2000]}}\n"
+    )
+    hidden = truearm.measure(planned, "irb120", out=tmp_path / "shed", constraints=boxes, **given)
+    assert hidden.drift is None
+    (notice,) = [n for n in hidden.warnings if n.code == "nests-missed"]
+    assert "the box 'shed' is in the line of sight" in notice.message
+    with pytest.raises(InputError, match="another source of readings"):
+        truearm.measure(planned, "irb120", out=tmp_path / "shed", **given)
+
+
+def test_what_an_arm_touches_needs_no_line_of_sight(plan: Path, tmp_path: Path) -> None:
+    with open_campaign(plan, "irb120", tmp_path, device="measurement-arm", nests=["n1", "n2", "n3"]) as campaign:
+        assert isinstance(campaign.source, VirtualInstrument)
+        assert not any(campaign.source.hides)
+
+
+def test_the_column_reads_of_a_plan_says_what_is_asked_for(planned: Path, tmp_path: Path) -> None:
+    head, *rows = planned.read_text().splitlines()
+    path = tmp_path / "reads.csv"
+    path.write_text(
+        "\n".join([f"{head},reads", *(f"{row},{'1; 3' if k else '2'}" for k, row in enumerate(rows))]) + "\n"
+    )
+    with open_campaign(path, "irb120", tmp_path / "all", listen=0, targets=["1", "2", "3"]) as campaign:
+        assert campaign.session.outstanding == 1 + 2 * 23
+    with open_campaign(path, "irb120", tmp_path / "other", listen=0, targets=["smr"]) as campaign:
+        assert campaign.session.outstanding == 24
+    with open_campaign(path, "irb120", tmp_path / "beside", listen=0, targets=["2", "smr"]) as campaign:
+        assert campaign.session.outstanding == 25
+
+
+@pytest.mark.parametrize(("unit", "told"), [("mm", False), ("m", True), ("um", True)])
+def test_lengths_that_cannot_be_meant_are_told(plan: Path, tmp_path: Path, unit: str, told: bool) -> None:
+    with open_campaign(plan, "irb120", tmp_path / "out", listen=0, targets=["a"]) as campaign:
+        places = campaign.robot.world_poses(campaign.joints)[0] * 1e3  # as a number, in mm
+        for label, place in zip(campaign.session.labels, places, strict=True):
+            reading = Reading("a", 1.0, place * {"mm": 1e-3, "m": 1.0, "um": 1e-6}[unit], label=label)
+            campaign._written(campaign.session.judged(reading))
+        found = [n for n in campaign.measured().warnings if n.code == "units-unlikely"]
+    assert bool(found) == told
+    assert all(n.level == "warning" and "Check the unit of lengths" in n.message for n in found)
+
+
+def test_an_instrument_without_noise_reads_the_twin_that_is_simulated(planned: Path, tmp_path: Path) -> None:
+    found = truearm.measure(planned, "irb120", out=tmp_path, device="tracker", seed=5, noise=0.0).data
+    simulated = truearm.simulate("irb120", truth="random", seed=5, poses=planned, noise=0.0).data
+    assert found is not None
+    places = {
+        (simulated.labels[c], simulated.targets[t]): place
+        for c, t, place in zip(simulated.configuration, simulated.target, simulated.position, strict=True)
+    }
+    assert found.has_position.sum() >= 24
+    for c, t, place in zip(found.configuration, found.target, found.position, strict=True):
+        if np.isfinite(place).all():
+            np.testing.assert_allclose(place, places[found.labels[c], found.targets[t]], atol=1e-12)
+
+
+def test_the_page_says_the_whole_call_and_no_token(plan: Path, tmp_path: Path) -> None:
+    found = arm(plan, tmp_path / "out", seed=3, disturbed=0.2, most_deviation=1e-3)
+    assert found.command == (
+        f"truearm.measure({str(plan)!r}, 'irb120', out={str(tmp_path / 'out')!r}, device='measurement-arm', seed=3, "
+        "disturbed=0.2, nests=['n'], every=2, most_deviation=0.001)"
+    )
+    again = eval(found.command.replace(str(tmp_path / "out"), str(tmp_path / "again")), {"truearm": truearm})
+    assert (tmp_path / "again" / DATA).read_bytes() == (tmp_path / "out" / DATA).read_bytes()
+    assert again.finished
+    with open_campaign(plan, "irb120", tmp_path / "port", listen=0, token="x" * 20, targets=["a"]) as campaign:
+        assert "x" * 20 not in campaign.measured().command
+
+
+def test_a_word_that_the_job_does_not_know_is_no_keyword(plan: Path, tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="'tracker'"):
+        open_campaign(plan, "irb120", tmp_path / "out", tracker=1)  # type: ignore[call-arg]
+
+
 def test_a_point_of_which_no_reading_can_be_kept_is_left_out_after_twenty(plan: Path, tmp_path: Path) -> None:
     found = arm(plan, tmp_path / "out", most_settling=0.0, nests=[])
     assert found.session.aside_by_reason == {"not-settled": 60}
@@ -296,7 +408,6 @@ def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Pat
     [
         ({"device": None}, "device, watch, listen", "nobody says"),
         ({"listen": 0}, "device, listen", "one source"),
-        ({"device": "ballbar"}, "device", "brought by hand"),
         ({"device": "traker"}, "device", "Did you mean tracker"),
         ({"mapping": "m.yaml"}, "mapping", "belongs to `watch`"),
         ({"token": "x" * 20}, "token", "belongs to `listen`"),
@@ -322,6 +433,15 @@ def test_what_cannot_be_measured_is_refused(
     assert refusal.value.parameter == parameter
 
 
+@pytest.mark.parametrize("device", [device for device in DEVICES if device.name not in VIRTUAL], ids=lambda d: d.name)
+def test_a_device_that_goes_through_no_plan_says_why_and_what_to_do(device: Device, plan: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=device.no_plan) as refusal:
+        arm(plan, tmp_path / "out", device=device.name)
+    assert refusal.value.parameter == "device"
+    assert f"'truearm simulate' finds the postures of {device.name}" in str(refusal.value)
+    assert not (tmp_path / "out").exists()
+
+
 def test_folders_that_cannot_be_watched_are_refused(plan: Path, tmp_path: Path) -> None:
     mapping, out = tmp_path / "out" / DATA, tmp_path / "out"
     out.mkdir()
@@ -340,3 +460,22 @@ def test_a_plan_with_a_configuration_twice_is_refused(plan: Path, tmp_path: Path
     with pytest.raises(InputError, match="appears twice") as refusal:
         arm(plan, tmp_path / "out")
     assert refusal.value.parameter == "plan"
+
+
+def test_a_virtual_robot_comes_from_the_stops_of_the_plan(plan: Path, tmp_path: Path) -> None:
+    lag = 1e-3
+    robot = truearm.load_robot("irb120").with_effects(["approach"])
+    truth = robot.with_values({f"approach_{k}": lag for k in range(1, 7)})
+    header, *rows = plan.read_text().splitlines()
+    table = [row.split(",") for row in rows]
+    stops = [",".join(str(float(cell) - 2.0) for cell in row[1:]) for row in table]
+    names = ",".join(f"approach_{k} [deg]" for k in range(1, 7))
+    plan.write_text("\n".join([f"{header},{names}", *(f"{a},{b}" for a, b in zip(rows, stops, strict=True))]) + "\n")
+    came = arm(plan, tmp_path / "stopped", truth=truth, noise=1e-9, nests=[])
+    ahead = [",".join([row[0], *(repr(float(cell) + float(np.degrees(lag))) for cell in row[1:])]) for row in table]
+    plan.write_text("\n".join([header, *ahead]) + "\n")
+    there = arm(plan, tmp_path / "ahead", truth="nominal", noise=1e-9, nests=[])
+    places = [[e.reading.position for e in found.session.kept if e.reading] for found in (came, there)]
+    np.testing.assert_allclose(places[0], places[1], atol=1e-12)
+    assert came.data is not None
+    assert came.data.number.tolist() == list(range(1, 2 * len(table), 2))

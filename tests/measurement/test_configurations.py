@@ -9,7 +9,9 @@ import pytest
 
 import truearm
 from truearm.errors import InputError
-from truearm.measurement.readers.configurations import read_configurations
+from truearm.measurement.readers.configurations import read_configurations, read_stops
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
 
 HEAD = "configuration,joint_1 [deg],joint_2 [mm],approach_1 [deg],approach_2 [mm],reads\n"
 
@@ -71,3 +73,62 @@ def test_a_plan_is_taken_where_configurations_are(robot: str, joints_are: str, t
     model = truearm.load_data(seen, robot) if seen.joints_are == "controller" else seen
     assert (seen.labels, len(seen.position)) == (first.labels, 45)
     assert model.joints == pytest.approx(first.joints)
+
+
+@pytest.mark.parametrize("name", ["irb120", "lrmate200id"])
+def test_a_twin_comes_to_a_plan_as_the_robot_does_that_drives_its_ways(name: str, tmp_path: Path) -> None:
+    table, file = tmp_path / "plan.csv", tmp_path / "twin.csv"
+    planned = truearm.plan(name, poses=12, candidates=80, clearance=0.02, out=table)
+    assert planned.tour is not None
+    arm = truearm.load_robot(name).with_effects(["approach"])
+    truth = arm.with_values({one: 2e-3 for one in arm.parameters if one.startswith("approach_")})
+    made = truearm.simulate(name, truth=truth, poses=table, noise=0.0, out=file)
+    assert made.lines()[1].startswith("Before each the arm stopped at its approach_i;")
+    twin = truth_twin(planned.made.robot, truth, np.random.default_rng(0))
+    stops = planned.tour.stops
+    driven = measure(twin, np.array([stop.joints for stop in stops]), 0.0, np.random.default_rng(0))
+    rows = [row for row, stop in enumerate(stops) if stop.kind == "measure"]
+    every = driven.position.reshape(len(stops), -1, 3)[rows].reshape(-1, 3)
+    assert made.data.position == pytest.approx(every, abs=1e-12)
+    joints = np.array([stops[row].joints for row in rows])
+    straight = measure(twin, joints, 0.0, np.random.default_rng(0))
+    assert np.abs(straight.position - every).max() > 1e-4  # from the configuration before it stands elsewhere
+    again = truearm.load_data(file)
+    assert again.approach is not None
+    assert not again.approach.any()  # nobody takes it that joints came from the configuration before
+    assert again.number is not None
+    assert again.number.tolist() == list(range(1, 24, 2))
+
+
+def test_a_program_without_stops_before_has_a_plan_without_them(tmp_path: Path) -> None:
+    truearm.plan("irb120", poses=10, candidates=60, clearance=0.02, program="rapid", out=tmp_path / "made")
+    table = tmp_path / "made" / "plan.csv"
+    assert "approach" not in table.read_text()
+    assert read_stops(table) is None
+    made = truearm.simulate("irb120", truth="nominal", poses=table, noise=0.0)
+    assert (len(made.lines()), made.stopped_before) == (1, False)
+    assert made.data.number is not None
+    assert made.data.number.tolist() == list(range(10))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (HEAD.replace(",approach_2 [mm]", "") + "P1,1,1,1,\n", "the stops before the configurations are not those"),
+        (HEAD.replace("approach_1 [deg]", "approach_1") + "P1,1,1,1,1,\n", "approach_1: no unit is given"),
+        (HEAD + "P1,1,1,,1,\n", "line 2, column approach_1 [deg]"),
+    ],
+)
+def test_stops_that_cannot_be_are_refused_with_their_place(tmp_path: Path, text: str, words: str) -> None:
+    table = written(tmp_path, text)
+    with pytest.raises(InputError) as refusal:
+        read_stops(table)
+    assert words in str(refusal.value)
+    assert str(table) in str(refusal.value)
+    assert read_configurations(table).configurations == 1  # where the arm stands is known all the same
+
+
+def test_stops_are_read_in_their_units(tmp_path: Path) -> None:
+    stops = read_stops(written(tmp_path, HEAD + "P1,90,10,88,5,tip\nP2,-90,20,-92,15,tip\n"))
+    assert stops is not None
+    assert stops.joints == pytest.approx(np.array([[np.deg2rad(88.0), 0.005], [np.deg2rad(-92.0), 0.015]]))

@@ -67,6 +67,7 @@ def test_a_plan_is_better_than_chance_and_within_limits(plan: MeasurementPlan) -
 
 def test_every_joint_comes_from_below(plan: MeasurementPlan) -> None:
     low = np.array([joint.limits[0] for joint in plan.robot.joints if joint.limits])
+    assert plan.before is not None
     step = plan.joints - plan.before
     inside = plan.joints - APPROACH["revolute"] >= low
     assert step[inside] == pytest.approx(APPROACH["revolute"])

@@ -75,6 +75,10 @@ def test_boxes_are_rows_a_plain_file_and_in_the_scene(studio: Studio) -> None:
     assert read_yaml(file, Constraints).clearance is None
     window.edit(robot="ur5e")
     assert len(drawn(studio, "boxes")) == 4
+    typed(studio, boxes._draws, False)
+    assert drawn(studio, "boxes") == []
+    typed(studio, boxes._draws, True)
+    assert len(drawn(studio, "boxes")) == 4
     for _ in range(3):
         window._undo_edit()
     assert list(boxes._rows) == ["box_2", "table"]
@@ -91,6 +95,9 @@ def test_boxes_are_rows_a_plain_file_and_in_the_scene(studio: Studio) -> None:
     ("field", "text", "words"),
     [
         ("x", "350", "a range of two numbers belongs here"),
+        ("x", "350..", "or an empty field where the box ends on neither side"),
+        ("x", "..350", "or an empty field where the box ends on neither side"),
+        ("x", "1,5..800", "both with a decimal point"),
         ("x", "800..350", "the range is empty"),
         ("x", "-500..500", "holds the base of the robot"),
         ("y", "0..1e300", "too large to be plausible"),
@@ -109,6 +116,13 @@ def test_a_box_that_cannot_be_is_refused_beside_its_field(studio: Studio, field:
     assert words in below(studio.window, element)
     assert file.read_text() == before
     assert element.value == text
+
+
+def test_a_decimal_comma_is_refused_and_told_of(studio: Studio) -> None:
+    floor = page_of(studio).boxes._fields.element("floor")
+    typed(studio, floor, "1,5")
+    assert "Write a decimal point" in below(studio.window, floor)
+    assert studio.window.project.settings.constraints is None
 
 
 def test_the_rest_of_a_constraints_file_stays_as_it_is(tmp_path: Path) -> None:
@@ -177,6 +191,45 @@ def test_base_targets_and_fixtures_go_into_a_robot_file_of_the_project(studio: S
     assert not (folder / "irb120-cell.yaml").exists()
     window._redo_edit()
     assert load_robot(folder / "irb120-cell.yaml").base.translation == pytest.approx((2.0, 0.0, 0.5))
+
+
+def test_what_is_called_as_in_the_data_leaves_other_names_free(studio: Studio) -> None:
+    places = page_of(studio).places
+    typed(studio, places._add, "target")
+    typed(studio, places._rows["target_1"].name, "1")
+    typed(studio, places._add, "target")
+    assert list(places._rows) == ["1", "target_2"]
+    typed(studio, places._add, "point")
+    typed(studio, places._rows["point_1"].name, "fixture_point_1")
+    typed(studio, places._add, "point")
+    assert list(places._rows) == ["1", "target_2", "fixture_point_1", "point_2"]
+
+
+@pytest.mark.parametrize(
+    "text", ["2.7kg", "-3kg,0mm,0mm,50mm", "2.7,50,25,100", "nan kg,0mm,0mm,0mm", "2.7kg,50mm,25mm,100"]
+)
+def test_a_payload_that_cannot_be_is_refused_below_its_field_and_not_kept(studio: Studio, text: str) -> None:
+    field = page_of(studio)._payload
+    typed(studio, field, text)
+    assert "payload" in below(studio.window, field)
+    assert studio.window.project.settings.payload is None
+    assert field.value == text
+
+
+def test_a_payload_that_the_arm_cannot_carry_is_warned_of(studio: Studio) -> None:
+    field, rated = page_of(studio)._payload, load_robot("irb120").rated_load
+    typed(studio, field, "2kg,0mm,0mm,50mm")
+    assert "payload" not in said(studio)
+    typed(studio, field, "500kg,0mm,0mm,50mm")
+    assert f"The flange carries 500 kg, and irb120 is rated for {rated:g} kg." in said(studio)
+    assert "payload-far" not in said(studio)
+    typed(studio, field, "2kg,0mm,0mm,50m")
+    assert studio.window.project.settings.payload == "2kg,0mm,0mm,50m"
+    assert "is 50000 mm from the flange, and irb120 is " in said(studio)
+    told = len(said(studio))
+    typed(studio, field, "")
+    assert studio.window.project.settings.payload is None
+    assert len(said(studio)) == told
 
 
 def test_things_are_put_where_they_were_and_only_what_is_meant_changes() -> None:

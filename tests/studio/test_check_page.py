@@ -80,7 +80,11 @@ def test_readings_are_excluded_with_a_reason_undone_and_restored(window: Window)
     assert not file.exists()
     page._reason._impl.value = " beam\n broken "
     act(page._exclude)
-    assert file.read_text() == "configuration,target,reason\n3,2,beam broken\n"
+    x, y, z = DATA.position[7] * 1e3 + [5.0, 0.0, 0.0]
+    head, row = file.read_text().splitlines()
+    assert head == "configuration,target,reason,read [mm]"
+    assert row.startswith("3,2,beam broken,")
+    assert [float(word) for word in row.rpartition(",")[2].split()] == pytest.approx([x, y, z], abs=1e-6)
     assert window.project.settings.exclude == "excluded.csv"
     assert "Exclusions have changed: check again." in page._found.content
     assert "beam broken" in page._table.content
@@ -136,6 +140,40 @@ def test_a_calibration_is_without_what_is_excluded_and_says_so(
     assert "other readings than those that are excluded now" in proof._notices.content
 
 
+def test_other_measurements_are_calibrated_without_what_was_excluded_from_the_first(window: Window) -> None:
+    page, _ = page_of(window)
+    (calibrating,) = (page for page in window.pages if isinstance(page, CalibratePage))
+    folder, project = window.project.folder, window.project
+    (folder / "other.csv").write_text(csv_text(DATA))
+    act(page._run)
+    page._reason._impl.value = "reflector bumped"
+    act(page._exclude)
+    window.refresh()
+    act(calibrating._data, "other.csv")
+    assert (project.settings.data, project.settings.exclude) == ("other.csv", None)
+    assert "excluded.csv excludes readings of data.csv" in notices(window)
+    assert "None." in page._table.content
+    act(page._run)
+    act(page._finding, "(any reading)")
+    act(page._reading, "5/1")
+    page._reason._impl.value = "beam broken"
+    act(page._exclude)
+    assert project.settings.exclude == "excluded-2.csv"
+    assert "reflector bumped" in (folder / "excluded.csv").read_text()
+    act(page._file, "excluded.csv")  # on purpose, and refused: in these measurements the reading is a good one
+    act(calibrating._run)
+    assert "another reading stands here in the measurements than the one that was excluded" in notices(window)
+    assert not (folder / "result").exists()
+    for _ in range(3):
+        window._undo_edit()
+    assert (project.settings.data, project.settings.exclude) == ("data.csv", "excluded.csv")
+    told = len(notices(window))
+    act(page._data, "data.csv")
+    act(page._file, "(none)")
+    act(page._data, "other.csv")
+    assert "nothing-excluded" not in notices(window)[told:]
+
+
 def test_where_nothing_is_wrong_nothing_is_drawn_before_it_is_asked_for(window: Window) -> None:
     page, jog = page_of(window)
     (window.project.folder / "data.csv").write_text(csv_text(DATA))
@@ -153,7 +191,8 @@ def test_where_nothing_is_wrong_nothing_is_drawn_before_it_is_asked_for(window: 
 
 def test_readings_without_a_place_are_chosen_and_not_drawn() -> None:
     readings = (("1", "a"), ("1", "b"), ("2", "a"))
-    found = Checked(Outcome(()), (), readings, np.full((3, 3), np.nan), np.zeros((3, 6)))
+    found = Checked(Outcome(()), (), readings, np.full((3, 3), np.nan), ((1.0,), (), (3.0,)), np.zeros((3, 6)))
     assert found.rows_of((("1", ""),)).tolist() == [0, 1]
     assert found.rows_of((("2", "a"), ("9", "z"))).tolist() == [2]
+    assert found.named([1, 2]) == {("1", "b"): (), ("2", "a"): ((3.0,),)}
     assert Notice("x", "y") == Notice("x", "y", at=(("1", "a"),))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.studio.conftest import Serving
+from tests.studio.pressing import below
 
 from truearm.errors import InputError
 from truearm.jobs.calibrate import calibrate
@@ -25,6 +26,7 @@ from truearm.studio.arrows import Arrows, coloured, error_arrows
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.plan import PlanPage
 from truearm.studio.pages.proof import ProofPage
+from truearm.studio.recorded import Recorded
 from truearm.studio.serving import Studio
 
 #: An event of a user; those of the studio itself have no client.
@@ -46,7 +48,7 @@ def act(element: Any, value: Any = None) -> None:
     if value is not None:
         element._impl.value = value
     for callback in element._impl.update_cb:
-        callback(BY_A_USER)
+        callback(SimpleNamespace(client=object(), target=element))
 
 
 def drag(page: JogPage, position: Any, rotation: Any) -> None:
@@ -236,6 +238,27 @@ def test_files_of_others_are_not_recorded_into(page: JogPage, studio: Studio) ->
     assert file.read_text() == before
     act(page._play, "play")
     assert page._playing is not None
+
+
+def test_what_another_program_writes_while_a_pose_is_recorded_is_not_overwritten(
+    page: JogPage, studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It writes once the page has looked at the file: a new one first, then one that was recorded here."""
+    file, with_one = studio.window.project.folder / "recorded.csv", Recorded.with_one
+
+    def late(known: Recorded, joints: Any) -> Recorded:
+        file.write_text("theirs")
+        return with_one(known, joints)
+
+    for there in (False, True):
+        file.unlink(missing_ok=True)
+        if there:
+            act(page._record, "record")
+        with monkeypatch.context() as meanwhile:
+            meanwhile.setattr(Recorded, "with_one", late)
+            act(page._record, "record")
+        assert "another program has changed this file" in below(studio.window, page._record)
+        assert file.read_text() == "theirs"
 
 
 def _notices(studio: Studio) -> str:

@@ -127,8 +127,11 @@ def test_files_of_a_virtual_instrument_are_those_of_the_command(
         assert quality is not None
         assert [one.y for one in page._quality._plot.figure.data] == [tuple(one["y"]) for one in quality["data"]]
         assert len(page._drift._plot.figure.data) == len(drift["data"])
-    act(page._stop, "finish")
+    assert "All is measured" in page._next.content
+    assert (page._stop.visible, page._end_all.visible, page.settings.visible) == (False, True, False)
+    act(page._end_all)
     assert page.measuring is None
+    assert (page._stop.visible, page._end_all.visible, page.settings.visible) == (False, False, True)
     assert studio.window.project.changes() == ()
     other = tmp_path / "other"
     other.mkdir()
@@ -443,3 +446,23 @@ def test_the_command_of_the_page_has_every_option_by_its_name() -> None:
         "--most-deviation 0.03 --fewest-samples 4 --out DIR"
     )
     assert measure_arguments(fields.said(None))["most_deviation"] == pytest.approx(3e-5)
+
+
+def test_a_nest_that_a_box_hides_is_said_before_it_is_left_out_and_its_line_is_red(studio: Studio) -> None:
+    project, page = studio.window.project, page_of(studio)
+    (project.folder / "boxes.yaml").write_text(
+        "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\nkeep_out: {shed: {z: [-1, 2000]}}\n"
+    )
+    project.look()
+    ask(page, **{**ARM, "device": "tracker", "constraints": "boxes.yaml"})
+    measuring = Measuring(project, studio.window.robot())
+    try:
+        assert measuring.next_words()[-1] == "It does not see n1, n2 there."
+        lines = measuring.lines_of_sight()
+        assert lines is not None
+        assert (len(lines.segments), [*lines.names]) == (2, ["instrument", "n1, hidden"])
+        assert lines.colours[0].tolist() == lines.colours[1].tolist()
+        (entry,), _ = measuring.step(1)
+        assert (entry.event, entry.words) == ("left", "the box 'shed' is in the line of sight")
+    finally:
+        measuring.campaign.close()

@@ -56,6 +56,12 @@ def measure(
         ),
     ] = None,
     payload: PayloadText = None,
+    constraints: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE", help="Its boxes hide nests, as the arm does.", show_default=False, rich_help_panel=_VIRTUAL
+        ),
+    ] = None,
     watch: Annotated[
         str | None,
         typer.Option(metavar="DIR", help="Readings from a folder into which software writes.", rich_help_panel=_REAL),
@@ -126,6 +132,7 @@ def measure(
             disturbed=disturbed,
             drift=length(drift),
             payload=payload,
+            constraints=constraints,
             watch=watch,
             mapping=mapping,
             listen=listen,

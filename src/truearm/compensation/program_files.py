@@ -123,7 +123,7 @@ def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
     _refuse_twice(paths)
     made = []
     for path, name in zip(paths, _names(paths), strict=True):
-        record = _record(path)
+        record = correction_record(path)
         if record is None:
             raise InputError(
                 "there is no record beside this program, so nothing to restore it from",
@@ -222,7 +222,7 @@ def write_programs(
         if not exists(path):
             continue
         here = read_bytes(path)
-        record = _record(path)
+        record = correction_record(path)
         new = content if isinstance(content, bytes) else content.encode()
         if here != new and (record is None or record.corrected_sha256 != _hash(here)):
             raise _not_written_here(path)
@@ -236,7 +236,7 @@ def _refuse_losing(record: Path) -> None:
         return
     program = record.with_name(record.name.removesuffix(".truearm.json"))
     try:
-        known = _record(program)
+        known = correction_record(program)
     except InputError as error:
         raise _not_written_here(record) from error
     if known is not None and not exists(program):
@@ -259,7 +259,7 @@ def _not_written_here(path: Path) -> InputError:
 
 
 def _original(path: Path, again: bool) -> bytes:
-    record = _record(path)
+    record = correction_record(path)
     if record is None:
         content = _text_bytes(path)
         if MARK.encode() in content:
@@ -318,7 +318,14 @@ def _unpacked(packed: str, record: Path) -> bytes:
     return original if unpacking.eof else b""
 
 
-def _record(path: Path) -> CorrectionRecord | None:
+def correction_record(path: Path) -> CorrectionRecord | None:
+    """Return the record beside a program; None if there is none, so that nobody has corrected it.
+
+    Raises
+    ------
+    InputError
+        If the program is a folder, or the record cannot be read.
+    """
     if path.is_dir():
         raise InputError("this is a folder, a program is needed", where=str(path), cure="Name the files in it.")
     beside = record_path(path)

@@ -20,7 +20,7 @@ from truearm.manifest import sets_in
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
-from truearm.measurement.readers.configurations import read_configurations
+from truearm.measurement.readers.configurations import read_configurations, read_stops
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
@@ -109,6 +109,15 @@ def configurations_argument(robot: Robot, data: object, parameter: str) -> Datas
     found = data_argument(data, parameter, read_configurations, f"{_CANONICAL}, or that of a plan")
     with refusals_of(parameter):
         return in_model_joints(robot, found)
+
+
+def stops_argument(robot: Robot, data: object, parameter: str) -> Dataset | None:
+    """Return where an arm stops right before each configuration, by its model; None where what is given has none."""
+    if not isinstance(data, str | Path):
+        return None
+    with refusals_of(parameter):
+        found = read_stops(path_argument(data, parameter))
+        return None if found is None else in_model_joints(robot, found)
 
 
 def joints_argument(joints: object, robot: Robot, parameter: str = "joints") -> JointsOf:

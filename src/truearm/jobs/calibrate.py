@@ -46,7 +46,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
-from truearm.jobs.excluding import check_excluded, in_parts, without_excluded
+from truearm.jobs.excluding import check_excluded, count_excluded, in_parts, without_excluded
 from truearm.jobs.following import followed
 from truearm.jobs.holding import held_argument
 from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
@@ -293,7 +293,7 @@ def calibrate(
             progress("finding how the base moved")
             along = named_model("geometric") if named is None else named.also(effects)
             steady, moved = with_one_base(nominal_robot, steady, training, base_changes, along, loss, held)
-        noticed = notices_of(readings, nominal_robot, steady=steady)
+        noticed = notices_of(readings, nominal_robot, steady=steady, excluded=count_excluded(excluded))
         readings = steady
         first = readings.of_configurations(training)
         second = readings.of_configurations(held_out) if len(held_out) else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from truearm.errors import InputError
@@ -10,7 +11,7 @@ from truearm.identification.judging.next_steps import steps_after_check
 from truearm.identification.judging.plausibility import check_against
 from truearm.identification.solving.fit import Fit
 from truearm.jobs.arguments import data_argument, device_argument, readings_argument, refuse_swapped, robot_argument
-from truearm.jobs.excluding import excluded_notices, without_excluded
+from truearm.jobs.excluding import count_excluded, excluded_notices, without_excluded
 from truearm.limits import limit
 from truearm.measurement.checks import check_data, check_range
 from truearm.measurement.dataset import Dataset
@@ -60,7 +61,7 @@ def check(
         raise InputError(
             "there is no reading", parameter="data", where=measured.source, cure="Fill in x, y and z, or distance."
         )
-    noticed, fit, part = _compared(measured, against, device)
+    noticed, fit, part = _compared(measured, against, device, excluded=count_excluded(excluded))
     noticed = (*noticed, *excluded_notices(excluded))
     if fit is None or part is None:
         return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None))
@@ -68,19 +69,28 @@ def check(
     return DataCheck(measured, noticed, steps)
 
 
-def notices_of(data: Dataset, robot: Robot, *, steady: Dataset) -> tuple[Notice, ...]:
+def notices_of(
+    data: Dataset, robot: Robot, *, steady: Dataset, excluded: Mapping[str, int] | None = None
+) -> tuple[Notice, ...]:
     """Return one notice for each kind of fault; none for believable data.
 
     Parameters
     ----------
     steady
         The same data without the motion of the table.
+    excluded
+        How many readings of each target were excluded.
     """
-    return _compared(data, robot, steady=steady)[0]
+    return _compared(data, robot, steady=steady, excluded=excluded)[0]
 
 
 def _compared(
-    data: Dataset, robot: Robot | None, device: str | None = None, *, steady: Dataset | None = None
+    data: Dataset,
+    robot: Robot | None,
+    device: str | None = None,
+    *,
+    steady: Dataset | None = None,
+    excluded: Mapping[str, int] | None = None,
 ) -> tuple[tuple[Notice, ...], Fit | None, Dataset | None]:
     """Return one notice for each kind of fault, a robust fit of the robot, and what is believed of its readings.
 
@@ -88,19 +98,21 @@ def _compared(
     ----------
     steady
         The same data without the motion of the table, where that has been removed already.
+    excluded
+        How many readings of each target were excluded.
     """
     ranged: tuple[Notice, ...] = ()
     if device is not None:
         ranged = tuple(check_range(data, device_argument(device)))
     if robot is None:
-        return (*ranged, *check_data(data)), None, None
+        return (*ranged, *check_data(data, excluded=excluded)), None, None
     still = without_table_motion(data) if steady is None else steady
     part = thinned(still, len(robot.parameters), limit("derivatives") // 2)
     if part is None:
-        return (*ranged, *check_data(data), _too_seldom(data)), None, None
+        return (*ranged, *check_data(data, excluded=excluded), _too_seldom(data)), None, None
     against = check_against(robot, part)
     left_out = () if part is still else (_in_part(part, still),)
-    notices = (*ranged, *check_data(data, against.suspects), *against.notices, *left_out)
+    notices = (*ranged, *check_data(data, against.suspects, excluded), *against.notices, *left_out)
     return notices, against.fit, against.believed
 
 

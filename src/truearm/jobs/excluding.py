@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Final
 
@@ -53,6 +54,15 @@ def in_parts(excluded: tuple[Excluded, ...], split: Dataset, held_out: IntArray)
         return "held out" if label in judging else "training" if label in known else "left out"
 
     return tuple(Excluded(one.row, one.readings, part(one.row.configuration)) for one in excluded)
+
+
+def count_excluded(excluded: tuple[Excluded, ...]) -> dict[str, int]:
+    """Return how many readings of each target are excluded, of configurations that are not left out."""
+    found = Counter[str]()
+    for one in excluded:
+        if one.part != "left out":
+            found[one.row.target] += one.readings
+    return dict(found)
 
 
 def excluded_notices(excluded: tuple[Excluded, ...]) -> list[Notice]:

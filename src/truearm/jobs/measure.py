@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import Any, Final
+from typing import Final
 
 from truearm.arrays import finite_number
 from truearm.errors import wrong_kind
 from truearm.jobs.arguments import progress_argument
-from truearm.jobs.open_campaign import OpenCampaign, Sight, open_campaign, sight
+from truearm.jobs.open_campaign import Asked, OpenCampaign, Sight, open_campaign, sight
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.measured import Measured
@@ -37,6 +37,7 @@ def measure(
     disturbed: float | None = None,
     drift: float | None = None,
     payload: Payload | str | None = None,
+    constraints: str | Path | None = None,
     watch: str | Path | None = None,
     mapping: str | Path | None = None,
     listen: int | None = None,
@@ -77,6 +78,8 @@ def measure(
         Share of its readings with a broken beam, an arm that still moves, or too much scatter, up to 0.9.
     drift
         How far it moves until the last configuration [m].
+    constraints
+        Constraints file whose boxes hide nests from it, as the arm does.
     watch
         Or readings that an instrument's software writes into this folder, in files or rows at the end of files.
     mapping
@@ -87,6 +90,7 @@ def measure(
         Which they must send first; a new one if None. It is told once.
     targets
         What is measured at each configuration; those of the device or robot if None, else those that the mapping fixes.
+        A plan that says in its column ``reads`` which of them the instrument sees is followed.
     nests
         Fixed points beside the robot that are measured at the start, along the way and at the end; the mapping's
         ``references``, or none, if None.
@@ -120,7 +124,7 @@ def measure(
     if not callable(tell):
         raise wrong_kind("a function belongs here", tell, "tell", "a function that takes a text")
     patience = None if wait is None else finite_number(wait, "wait", lowest=0.0, allowed="seconds, 0 or more")
-    given: dict[str, Any] = {
+    given: Asked = {
         "device": device,
         "truth": truth,
         "noise": noise,
@@ -128,6 +132,7 @@ def measure(
         "disturbed": disturbed,
         "drift": drift,
         "payload": payload,
+        "constraints": constraints,
         "watch": watch,
         "mapping": mapping,
         "listen": listen,

@@ -12,8 +12,6 @@ from truearm.files import read_text
 from truearm.measurement.measuring.about import About
 from truearm.measurement.measuring.reading_log import LOG
 from truearm.measurement.measuring.session import Session
-from truearm.measurement.readers.rows import Configurations
-from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.writing import write_text
 
@@ -24,8 +22,7 @@ _SCHEMA: Final = "truearm-measuring/1"
 
 def begin(
     folder: Path,
-    configurations: Configurations,
-    joints: Array,
+    plan: list[Any],
     robot: Robot,
     session: Session,
     virtual: dict[str, Any] | None,
@@ -35,8 +32,8 @@ def begin(
 
     Parameters
     ----------
-    configurations, joints
-        Of the plan, and its joint positions as the model counts them [rad or m], ``(n, joints)``.
+    plan
+        What it holds, as JSON writes it.
     virtual
         The virtual instrument and its twin; None for a real instrument.
 
@@ -47,8 +44,8 @@ def begin(
     """
     now: dict[str, Any] = {
         "truearm": _SCHEMA,
-        "plan": _hash([[*configurations.labels], joints.tolist()]),
-        "robot": f"{robot.name} {_hash([[p.name, p.value] for p in robot.parameters.values()])}",
+        "plan": hash_of(plan),
+        "robot": f"{robot.name} {hash_of([[p.name, p.value] for p in robot.parameters.values()])}",
         "targets": [*session.targets],
         "nests": [*session.nests],
         "every": session.every,
@@ -101,5 +98,6 @@ def _then(path: Path) -> dict[str, Any]:
     raise InputError("this does not say how a measuring began", where=str(path), cure="Choose another folder.")
 
 
-def _hash(content: object) -> str:
+def hash_of(content: object) -> str:
+    """Return by what contents that JSON can write are known again."""
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()

@@ -5,26 +5,33 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.arrays import finite_number
 from truearm.errors import InputError, did_you_mean, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
     command_argument,
-    deviation_argument,
     folder_for,
     length_argument,
-    name_argument,
     names_argument,
-    payload_argument,
+    python_call,
     robot_argument,
     whole_argument,
 )
+from truearm.jobs.measured_extent import extent_notices
 from truearm.jobs.measuring_begun import BEGUN, begin
+from truearm.jobs.measuring_sources import (
+    AskedOfSource,
+    VirtualSource,
+    listener,
+    quality_of_device,
+    source_kind,
+    virtual_source,
+    watched_source,
+)
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.measuring.about import About, read_about
@@ -36,31 +43,44 @@ from truearm.measurement.measuring.sources import Source
 from truearm.measurement.readers.columns import joints_in_file
 from truearm.measurement.readers.rows import Configurations
 from truearm.modeling.chain import Array
-from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.printable import is_one_line
 from truearm.results.measured import DATA, PAGE, Measured
 
-if TYPE_CHECKING:
-    from truearm.measurement.measuring.watched_folder import WatchedFolder
-
 _LONGEST_NAME: Final = 100
-_MOST_DISTURBED: Final = 0.9
 _MOST_SAMPLES: Final = 1_000_000
+#: Configurations between two rounds of the nests, where nothing is said.
+_EVERY: Final = 10
+#: Column of a plan that names what a device reads at a configuration, and what separates the names.
+_READS: Final = "reads"
+_BETWEEN: Final = "; "
+
+
+class Asked(AskedOfSource, total=False):
+    """What :func:`truearm.measure` is asked for of a plan; what is not named is None."""
+
+    targets: Sequence[str] | None
+    nests: Sequence[str] | None
+    every: int
+    most_deviation: float | None
+    most_settling: float | None
+    fewest_samples: int | None
+    about: str | Path | None
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """Lines of sight at the configuration that is measured next, or was measured last.
+    """Lines of sight at the configuration that is measured next: to the targets, or to the nests in their round.
 
     Attributes
     ----------
     names
-        Of the targets.
+        Of the targets or nests.
     origin
         Where the instrument is, in the world [m], ``(3,)``.
     targets
-        Where the nominal robot has them [m], ``(k, 3)``.
+        Where the nominal robot has them, or where the nests stand [m], ``(k, 3)``.
     visible
         Which the instrument can read, ``(k,)``.
     outstanding
@@ -101,6 +121,12 @@ class OpenCampaign(Campaign):
         super().__init__(session, source, folder)
         self.robot, self.placed, self.joints = robot, placed, plan.joints
         self._plan, self._said, self._folder = plan, said, folder
+        self._flange = robot.world_poses(plan.joints)[0]
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What to know so far about how it was measured, and whether its lengths can be meant."""
+        return (*extent_notices(self.session, self._flange), *super().notices)
 
     def measured(self) -> Measured:
         """Return what has come of it so far."""
@@ -128,6 +154,28 @@ class _Plan:
     path: Path
     configurations: Configurations
     joints: Array
+    reads: tuple[str, ...]
+    before: Array | None
+
+    @property
+    def begun(self) -> list[Any]:
+        """What must be the same when the measuring goes on, as JSON writes it."""
+        stops = [] if self.before is None else self.before.tolist()
+        return [[*self.configurations.labels], self.joints.tolist(), stops, [*self.reads]]
+
+    def reads_of(self, targets: Sequence[str]) -> dict[str, tuple[str, ...]] | None:
+        """Return which targets are read at each configuration, by its label; None if the plan says nothing of them.
+
+        A target that the plan names nowhere is read everywhere: it is called otherwise, or comes on top.
+        """
+        rows = [{*words.split(_BETWEEN)} for words in self.reads]
+        other = {*targets}.difference(*rows) if rows else {*targets}
+        if len(other) == len({*targets}):
+            return None
+        return {
+            label: tuple(name for name in targets if name in row or name in other)
+            for label, row in zip(self.configurations.labels, rows, strict=True)
+        }
 
 
 @dataclass(frozen=True)
@@ -142,110 +190,62 @@ def open_campaign(
     robot: Robot | str | Path,
     out: str | Path,
     *,
-    device: str | None = None,
-    truth: Robot | str | Path | None = None,
-    noise: float | None = None,
-    seed: int | None = None,
-    disturbed: float | None = None,
-    drift: float | None = None,
-    payload: Payload | str | None = None,
-    watch: str | Path | None = None,
-    mapping: str | Path | None = None,
-    listen: int | None = None,
-    token: str | None = None,
-    targets: Sequence[str] | None = None,
-    nests: Sequence[str] | None = None,
-    every: int = 10,
-    most_deviation: float | None = None,
-    most_settling: float | None = None,
-    fewest_samples: int | None = None,
-    about: str | Path | None = None,
     command: str | None = None,
+    **asked: Unpack[Asked],
 ) -> OpenCampaign:
-    """Open the measuring of a plan; parameters as for :func:`truearm.measure`.
+    """Open the measuring of a plan; keywords as for :func:`truearm.measure`.
 
     Raises
     ------
     InputError
         If anything cannot be used, or the folder holds the measuring of another plan.
     """
+    if unknown := {*asked} - {*Asked.__annotations__, *AskedOfSource.__annotations__}:
+        raise TypeError(f"open_campaign() takes no keyword {sorted(unknown)[0]!r}")
     path = path_argument(plan, "plan")
-    kind = _one_source(device, watch, listen)
-    _refuse_beside(
-        kind,
-        device={
-            "truth": truth,
-            "noise": noise,
-            "seed": seed,
-            "disturbed": disturbed,
-            "drift": drift,
-            "payload": payload,
-        },
-        watch={"mapping": mapping},
-        listen={"token": token},
-    )
-    call = command_argument(command) or f"truearm.measure({str(path)!r}, .., out={str(out)!r})"
-    between = whole_argument(every, "every", 1, LONGEST_ROUND)
-    folder_for((LOG, BEGUN), out, path, robot, truth, mapping, about)
-    folder = folder_for((DATA, PAGE), out, path, robot, truth, mapping, about, ours=True)
+    kind = source_kind(asked)
+    truth, mapping, about = asked.get("truth"), asked.get("mapping"), asked.get("about")
+    between = whole_argument(asked.get("every", _EVERY), "every", 1, LONGEST_ROUND)
+    call = command_argument(command) or _call(path, robot, out, {**asked, "every": between})
+    read = (path, robot, truth, mapping, about, asked.get("constraints"))
+    folder_for((LOG, BEGUN), out, *read)
+    folder = folder_for((DATA, PAGE), out, *read, ours=True)
     nominal = robot_argument(robot)
     with refusals_of("plan"):
         planned = _planned(path, nominal)
     said = About() if about is None else _about(about)
-    asked = {name: _names(value, name) for name, value in (("targets", targets), ("nests", nests))}
-    quality = Quality(
-        None if most_deviation is None else length_argument(most_deviation, "most_deviation", 0.0),
-        None if most_settling is None else length_argument(most_settling, "most_settling", 0.0),
-        1 if fewest_samples is None else whole_argument(fewest_samples, "fewest_samples", 1, _MOST_SAMPLES),
-    )
+    targets, nests = _names(asked.get("targets"), "targets"), _names(asked.get("nests"), "nests")
+    quality = _quality(asked)
     source: Source
-    placed: Robot | None = None
-    virtual: dict[str, Any] | None = None
-    if device is not None:
-        made = _Virtual(
-            name_argument(device, "device"),
-            "random" if truth is None else truth,
-            None if noise is None else deviation_argument(noise, "noise"),
-            0 if seed is None else whole_argument(seed, "seed"),
-            0.0 if disturbed is None else _share(disturbed),
-            0.0 if drift is None else length_argument(drift, "drift", 0.0),
+    virtual: VirtualSource | None = None
+    if kind == "device":
+        nests = nests or ()
+        virtual = virtual_source(asked, nominal, planned.joints, planned.before, nests)
+        source, known = virtual.source, tuple(target.name for target in virtual.placed.targets)
+        _refuse_unknown(targets, known)
+        quality = quality_of_device(
+            quality, source, *(asked.get(name) for name in ("most_deviation", "most_settling", "fewest_samples"))
         )
-        nests_named = asked["nests"] or ()
-        source, placed = _virtual(made, nominal, payload, planned, nests_named)
-        known: tuple[str, ...] | None = tuple(target.name for target in placed.targets)
-        if asked["targets"] is not None and (unknown := [n for n in asked["targets"] if n not in (known or ())]):
-            raise InputError(
-                "the tool has no such target",
-                parameter="targets",
-                came=unknown[0],
-                allowed=", ".join(known or ()),
-                cure=did_you_mean(unknown[0], known or ()),
-            )
-        quality = _of_device(quality, source, most_deviation, most_settling, fewest_samples)
-        virtual, instrument = made.entries(), f"a virtual {device} that measures a twin"
-    elif watch is not None:
-        folder_watched = _watched(watch, mapping, planned, folder)
-        source, instrument = folder_watched, f"files in {folder_watched.folder}"
-        references = tuple(folder_watched.content.references)
-        nests_named = references if asked["nests"] is None else asked["nests"]
-        fixed = folder_watched.names
-        known = None if fixed is None else tuple(name for name in fixed if name not in nests_named)
+        instrument = f"a virtual {source.device.name} that measures a twin"
+    elif kind == "watch":
+        source = watched = watched_source(asked.get("watch"), mapping, planned.configurations.labels, folder)
+        instrument = f"files in {watched.folder}"
+        nests = tuple(watched.content.references) if nests is None else nests
+        known = tuple(name for name in watched.names or () if name not in nests)
     else:
-        from truearm.measurement.measuring.listening import Listener
-
-        source = Listener(whole_argument(listen, "listen", 0, 65535), _token(token))
-        nests_named, known, instrument = asked["nests"] or (), None, f"lines sent to port {source.port}"
+        source = port = listener(asked.get("listen"), asked.get("token"))
+        nests, known, instrument = nests or (), (), f"lines sent to port {port.port}"
     try:
-        names = asked["targets"] or tuple(target.name for target in nominal.targets if device is None) or known or ()
-        _refuse_names(names, nests_named)
-        session = Session(planned.configurations.labels, names, nests_named, between, quality)
-        begin(folder, planned.configurations, planned.joints, nominal, session, virtual, said)
+        names = targets or (tuple(target.name for target in nominal.targets) if virtual is None else ()) or known
+        _refuse_names(names, nests)
+        session = Session(planned.configurations.labels, names, nests, between, quality, planned.reads_of(names))
+        begin(folder, planned.begun, nominal, session, None if virtual is None else virtual.entries, said)
         return OpenCampaign(
             session,
             source,
             folder,
             robot=nominal,
-            placed=placed,
+            placed=None if virtual is None else virtual.placed,
             plan=planned,
             said=_Said(said, instrument, call),
         )
@@ -261,6 +261,15 @@ def sight(campaign: OpenCampaign) -> Sight | None:
     step, robot = campaign.session.next, campaign.placed
     if step is None or robot is None or not isinstance(campaign.source, VirtualInstrument):
         return None
+    if step.kind == "nests":
+        names = campaign.session.nests
+        return Sight(
+            names,
+            np.zeros(3),
+            np.array([campaign.source.nests[name] for name in names]),
+            np.array([name not in campaign.source.hides[step.configuration] for name in names]),
+            np.array([name in step.names for name in names]),
+        )
     names = tuple(target.name for target in robot.targets)
     q = campaign.joints[step.configuration : step.configuration + 1]
     return Sight(
@@ -268,44 +277,19 @@ def sight(campaign: OpenCampaign) -> Sight | None:
         np.zeros(3),
         np.array([robot.world_poses(q, name)[0][0] for name in names]),
         campaign.source.visible(step.configuration),
-        np.array([step.kind == "configuration" and name in step.names for name in names]),
+        np.array([name in step.names for name in names]),
     )
 
 
-def _share(disturbed: object) -> float:
-    share = finite_number(disturbed, "disturbed", lowest=0.0)
-    if share > _MOST_DISTURBED:
-        raise InputError(
-            "too many readings would be disturbed",
-            parameter="disturbed",
-            came=f"{share:g}",
-            allowed=f"0 to {_MOST_DISTURBED:g}, a share",
-        )
-    return share
+def _call(plan: Path, robot: object, out: object, asked: Asked) -> str:
+    """Return the call that does the same, without the token: it stands in no file."""
+    said = {name: value for name, value in asked.items() if name != "token"}
+    if said["every"] == _EVERY:
+        del said["every"]
+    return python_call("measure", plan, robot, out=out, **said)
 
 
 # -- what was asked for ----------------------------------------------------------------------------------------
-
-
-def _one_source(device: object, watch: object, listen: object) -> str:
-    given = [name for name, value in (("device", device), ("watch", watch), ("listen", listen)) if value is not None]
-    if len(given) == 1:
-        return given[0]
-    raise InputError(
-        "readings come from one source" if given else "nobody says where readings come from",
-        parameter=", ".join(given) or "device, watch, listen",
-        allowed="a virtual device, a folder to watch, or a port to listen on",
-        cure="Keep one of them." if given else "Give one of them.",
-    )
-
-
-def _refuse_beside(kind: str, **options: dict[str, object]) -> None:
-    for of, given in options.items():
-        for name, value in given.items():
-            if value is not None and of != kind:
-                raise InputError(
-                    f"this belongs to `{of}`, and readings come from `{kind}`", parameter=name, cure="Leave it out."
-                )
 
 
 def _planned(path: Path, robot: Robot) -> _Plan:
@@ -330,13 +314,32 @@ def _planned(path: Path, robot: Robot) -> _Plan:
         position=np.full((n, 3), np.nan),
         joints_are=found.joints_are,
     )
-    return _Plan(path, found, in_model_joints(robot, data).joints)
+    at = cells.names.index(_READS) if _READS in cells.names else None
+    reads = () if at is None else cells.columns[at]
+    stops = found.before
+    before = None if stops is None else replace(data, joints=stops.joints, joint_kinds=stops.kinds)
+    return _Plan(
+        path,
+        found,
+        in_model_joints(robot, data).joints,
+        reads,
+        None if before is None else in_model_joints(robot, before).joints,
+    )
 
 
 def _about(about: object) -> About:
     path = path_argument(about, "about")
     with refusals_of("about"):
         return read_about(path)
+
+
+def _quality(asked: Asked) -> Quality:
+    deviation, settling, samples = (asked.get(n) for n in ("most_deviation", "most_settling", "fewest_samples"))
+    return Quality(
+        None if deviation is None else length_argument(deviation, "most_deviation", 0.0),
+        None if settling is None else length_argument(settling, "most_settling", 0.0),
+        1 if samples is None else whole_argument(samples, "fewest_samples", 1, _MOST_SAMPLES),
+    )
 
 
 def _names(names: object, parameter: str) -> tuple[str, ...] | None:
@@ -358,6 +361,18 @@ def _names(names: object, parameter: str) -> tuple[str, ...] | None:
     return found
 
 
+def _refuse_unknown(targets: Sequence[str] | None, known: Sequence[str]) -> None:
+    unknown = [name for name in targets or () if name not in known]
+    if unknown:
+        raise InputError(
+            "the tool has no such target",
+            parameter="targets",
+            came=unknown[0],
+            allowed=", ".join(known),
+            cure=did_you_mean(unknown[0], known),
+        )
+
+
 def _refuse_names(targets: Sequence[str], nests: Sequence[str]) -> None:
     if not targets:
         raise InputError(
@@ -369,86 +384,3 @@ def _refuse_names(targets: Sequence[str], nests: Sequence[str]) -> None:
     both = [name for name in nests if name in targets]
     if both:
         raise InputError("a name stands for a target and for a nest", parameter="targets, nests", came=both[0])
-
-
-def _token(token: object) -> str | None:
-    if token is None:
-        return None
-    text = name_argument(token, "token")
-    if not 16 <= len(text) <= 200 or not all(c.isascii() and (c.isalnum() or c in "-_") for c in text):
-        raise InputError(
-            "this is no token that keeps others out",
-            parameter="token",
-            allowed="16 to 200 letters, digits, - and _",
-            cure="Leave it out: then one is made.",
-        )
-    return text
-
-
-# -- sources ---------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Virtual:
-    device: str
-    truth: Robot | str | Path
-    noise: float | None
-    seed: int
-    disturbed: float
-    drift: float
-
-    def entries(self) -> dict[str, Any]:
-        """Return what must be the same when it goes on."""
-        truth = self.truth.name if isinstance(self.truth, Robot) else Path(self.truth).name
-        return {**self.__dict__, "truth": truth}
-
-
-def _virtual(
-    asked: _Virtual, nominal: Robot, payload: object, planned: _Plan, nests: tuple[str, ...]
-) -> tuple[Source, Robot]:
-    from truearm.simulation.devices import seen_by
-    from truearm.simulation.truths import truth_twin
-    from truearm.simulation.virtual_instrument import VirtualInstrument, virtual_device
-
-    device = virtual_device(asked.device)
-    with refusals_of("truth"):
-        truth = asked.truth if isinstance(asked.truth, Robot) else str(path_argument(asked.truth, "truth"))
-        twin = truth_twin(nominal, truth, np.random.default_rng(asked.seed))
-    twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload)))
-    twin, placed = seen_by(device, nominal, twin)
-    source = VirtualInstrument(
-        device, twin, placed, planned.joints, nests, asked.seed, asked.disturbed, asked.drift, asked.noise
-    )
-    return source, placed
-
-
-def _of_device(quality: Quality, source: Any, *said: object) -> Quality:
-    """Return what is asked of the readings of a virtual device: what is expected of it where nothing else is said."""
-    from truearm.simulation.virtual_instrument import SAMPLES
-
-    expected = Quality.of_instrument(source.sigma, SAMPLES)
-    mine = [quality.deviation, quality.settling, quality.samples]
-    usual = [expected.deviation, expected.settling, expected.samples]
-    deviation, settling, samples = (
-        theirs if given is None else own for own, theirs, given in zip(mine, usual, said, strict=True)
-    )
-    return Quality(deviation, settling, samples)  # type: ignore[arg-type]
-
-
-def _watched(watch: object, mapping: object, planned: _Plan, out: Path) -> WatchedFolder:
-    from truearm.measurement.measuring.watched_folder import WatchedFolder
-
-    folder = path_argument(watch, "watch")
-    if mapping is None:
-        raise InputError(
-            "nobody says what the columns of the rows mean",
-            parameter="mapping",
-            allowed="a mapping file, as `truearm import table` takes it",
-            cure="Let `truearm import guess` write one for a file of the instrument.",
-        )
-    if folder.exists() and out.exists() and folder.resolve() == out.resolve():
-        raise InputError(
-            "the folder that is watched is written to", parameter="out", came=str(out), cure="Choose another."
-        )
-    with refusals_of("mapping"):
-        return WatchedFolder(folder, path_argument(mapping, "mapping"), planned.configurations.labels)

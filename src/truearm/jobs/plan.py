@@ -269,11 +269,12 @@ def plan(
         drawn=drawn,
         progress=progress,
     )
+    if wanted_program is not None and not wanted_program.approach:
+        made = replace(made, before=None)
     tour = None
     if finder is not None:
         progress("looking for ways that keep clear")
-        stops = made.before if wanted_program is None or wanted_program.approach else None
-        tour = tour_of(finder, made.joints, made.labels, stops)
+        tour = tour_of(finder, made.joints, made.labels, made.before)
     words = "" if goal is None else goal.words
     named = "" if instrument is None else instrument.name
     weighed = payload is not None or carrying.payload != NO_PAYLOAD

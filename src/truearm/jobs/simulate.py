@@ -25,6 +25,7 @@ from truearm.jobs.arguments import (
     progress_argument,
     pushed_at_argument,
     robot_argument,
+    stops_argument,
     whole_argument,
     wrench_argument,
 )
@@ -32,14 +33,16 @@ from truearm.limits import refuse_beyond
 from truearm.measurement.controller_joints import in_controller_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import csv_text
+from truearm.measurement.readers.rows import before_each, in_order, places_after_stops
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
+from truearm.modeling.postures import approach_from
 from truearm.modeling.robot import Robot
 from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.results.simulation import Simulation
 from truearm.simulation.devices import in_view_of, measured_with
 from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure, with_wrench_read
+from truearm.simulation.twin import Conditions, measure, with_wrench_read
 from truearm.writing import write_text
 
 
@@ -63,7 +66,8 @@ def simulate(
     """Measure a digital twin whose truth is known, with a simulated instrument.
 
     Configurations are measured in their order: what depends on the way the arm came, or on how long it has been moving,
-    follows from it.
+    follows from it. Where the table of a plan says where to stop right before each (``approach_i``), the joints come
+    from there. The data then count these stops in their order, so that no configuration follows another.
 
     Parameters
     ----------
@@ -133,6 +137,7 @@ def simulate(
     nominal = robot_argument(robot)
     joints_are = joints_argument(choice_argument(joints, "joints", JOINTS_OF), nominal)
     wanted = configurations_argument(nominal, poses, "poses") if given else None
+    stops = stops_argument(nominal, poses, "poses") if given else None
     count = count if wanted is None else wanted.configurations
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
@@ -142,15 +147,25 @@ def simulate(
     refuse_beyond("readings", count * len(seen.targets), parameter="poses")
     progress(f"measuring {count} configurations")
     if wanted is not None:
-        data = replace(measure(twin, wanted.joints, sigma, rng), labels=wanted.labels)
+        conditions = Conditions() if stops is None else _stopped_before(wanted, stops)
+        data = replace(measure(twin, wanted.joints, sigma, rng, **conditions), labels=wanted.labels)
     elif instrument is None:
         data = measure(twin, nominal.random_configurations(count, rng), sigma, rng)
     else:
         data = measured_with(instrument, nominal, twin, count, rng, sigma)
     if twin.robot.wrench is not None:
         data = with_wrench_read(twin, data)
+    if stops is not None:
+        data = in_order(data, places_after_stops(data.configurations))
     if joints_are == "controller":
         data = in_controller_joints(nominal, data)
     if file is not None:
         write_text(file, csv_text(data))
-    return Simulation(nominal.name, truth.name if isinstance(truth, Robot) else str(truth), data, file)
+    named = truth.name if isinstance(truth, Robot) else str(truth)
+    return Simulation(nominal.name, named, data, file, stopped_before=stops is not None)
+
+
+def _stopped_before(wanted: Dataset, stops: Dataset) -> Conditions:
+    """Return how the arm comes to configurations, each from where it stops right before: that stop is one, too."""
+    places = places_after_stops(wanted.configurations)
+    return Conditions(approach=approach_from(stops.joints, wanted.joints), number=before_each(places))

@@ -7,7 +7,7 @@ readings of a real instrument agree to the last digit.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, Protocol
 
 import numpy as np
@@ -37,15 +37,19 @@ _FEW_SHARE: Final = 0.1
 _OFTEN_SHARE: Final = 0.8
 
 
-def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list[Notice]:
+def check_data(
+    data: Dataset, suspects: Iterable[Suspect] | None = None, excluded: Mapping[str, int] | None = None
+) -> list[Notice]:
     """Return what is wrong with a dataset without asking a robot.
 
     Parameters
     ----------
     suspects
         Readings that a robot doubts. At their configurations it tells which reading is wrong better than distances do.
+    excluded
+        How many readings of each target are missing because they were excluded: nobody need be told that.
     """
-    found = [*_misnamed(data), *_missing(data), *check_duplicates(data)]
+    found = [*_misnamed(data), *_missing(data, excluded or {}), *check_duplicates(data)]
     pairs = repeated_joints(data)
     known = {label for pair in pairs for label in pair}
     doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
@@ -249,7 +253,7 @@ def check_joints(robot: Robot, data: Dataset | Inclinations) -> None:
 # -- bookkeeping -------------------------------------------------------------------------------------------
 
 
-def _missing(data: Dataset) -> list[Notice]:
+def _missing(data: Dataset, excluded: Mapping[str, int]) -> list[Notice]:
     counts: dict[str, int] = {}
     for part in [data] if data.references is None else [data, data.references]:
         names = len(part.targets)
@@ -265,10 +269,11 @@ def _missing(data: Dataset) -> list[Notice]:
         among = part.configurations if part is data else len(np.unique(of))
         absent = among - times if everywhere else np.zeros(names, dtype=np.intp)
         counts |= dict(zip(part.targets, (empty + absent).tolist(), strict=True))
+    counts = {name: max(count - excluded.get(name, 0), 0) for name, count in counts.items()}
     total = sum(counts.values())
     if total == 0:
         return []
-    words = _listed([f"{name} {count}" for name, count in counts.items() if count])
+    words = _listed([f"{count} of target {name}" for name, count in counts.items() if count])
     left = "is missing ({}). It is left out" if total == 1 else "are missing ({}). They are left out"
     return [Notice("missing", f"{counted(total, 'reading')} {left.format(words)}; nothing needs to be done.")]
 

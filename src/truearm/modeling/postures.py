@@ -129,3 +129,16 @@ def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:
             moved = np.where(np.abs(way) <= _ROUNDING, 0.0, np.sign(way))
             signs[row] = np.where(moved == 0.0, signs[before], moved)
     return signs
+
+
+def approach_from(stops: Array, joints: Array) -> Array:
+    """Return the sign of the last move of each joint where an arm stops elsewhere right before, ``(n, joints)``.
+
+    Parameters
+    ----------
+    stops, joints
+        Where it stops right before each configuration, and the configurations, in the order in which it comes to them,
+        ``(n, joints)`` each. A joint that stands there already keeps the sign of its move to that stop.
+    """
+    way = np.stack([stops, joints], axis=1).reshape(-1, joints.shape[1])
+    return approach_of(way, np.arange(len(way)))[1::2]

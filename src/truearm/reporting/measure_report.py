@@ -53,7 +53,7 @@ def measure_report(measured: Measured) -> str:
     if (drift := drift_figure(session)) is not None:
         words = (
             "How far each fixed nest is from where it was read first, and what all of them share: instrument or floor, "
-            "not the robot."
+            "not the robot. It is shown alone: no reading is corrected for it."
         )
         pictures.append(Drawing("drift", "Nests", words, drift))
     if (scatter := quality_figure(session)) is not None:

@@ -140,13 +140,9 @@ class Measured(Record):
             text.append(f"{counted(total, 'reading')} set aside: {why}.")
         if session.left_out:
             places = listed([f"{label}/{name}" for label, name in session.left_out])
-            text.append(f"{counted(len(session.left_out), 'target')} left out (configuration/target): {places}.")
+            text.append(f"{counted(len(session.left_out), 'reading')} left out (configuration/target): {places}.")
         if (drift := self.drift) is not None:
-            repeat = "" if drift.sigma is None else f"; they repeat to {drift.sigma * 1e3:.4f} mm in a coordinate"
-            text.append(
-                f"Nests {listed(drift.names)} in {counted(len(drift.rounds), 'round')}: moved by up to "
-                f"{drift.largest * 1e3:.4f} mm, together by up to {self._together(drift) * 1e3:.4f} mm{repeat}."
-            )
+            text.append(f"Nests {listed(drift.names)} in {counted(len(drift.rounds), 'round')}: {self._how(drift)}.")
         if self._kept():
             size = "" if self.sigma.value is None else f"{self.sigma.value * 1e3:.4f} mm, "
             text.append(f"Standard deviation in the file: {size}{self.sigma.words}.")
@@ -157,6 +153,15 @@ class Measured(Record):
 
     def _measured(self) -> int:
         return len({entry.label for entry in self.session.kept if not entry.is_nest})
+
+    def _how(self, drift: NestDrift) -> str:
+        if len(drift.rounds) == 1:
+            return "whether they move shows from the second round on"
+        repeat = "" if drift.sigma is None else f"; they repeat to {drift.sigma * 1e3:.4f} mm in a coordinate"
+        return (
+            f"moved by up to {drift.largest * 1e3:.4f} mm, together by up to {self._together(drift) * 1e3:.4f} mm"
+            f"{repeat}. No reading is corrected for it"
+        )
 
     @staticmethod
     def _together(drift: NestDrift) -> float:
@@ -184,9 +189,9 @@ class Measured(Record):
         return [
             Notice(
                 "nests-moved",
-                f"The nests moved together by up to {far * 1e3:.3f} mm, and a coordinate of a reading is off by "
-                f"{noise * 1e3:.4f} mm: instrument or floor moved. The readings are not corrected for it. Wait until "
-                "the instrument is warm, fix its stand, and measure again.",
+                f"The nests moved together by up to {far * 1e3:.3f} mm, and by chance a coordinate of a reading is off "
+                f"by no more than {noise * 1e3:.4f} mm: instrument or floor moved. The readings are not corrected for "
+                "it. Wait until the instrument is warm, fix its stand, and measure again.",
             )
         ]
 

@@ -264,6 +264,8 @@ class ProgramCorrection(Record):
         What a simulated robot does with the programs, where there is one.
     inputs
         The files that were read besides the programs: none of them is overwritten.
+    hashes
+        SHA-256 of these files, by the parameters that named them.
     notes
         What the user noted, by its name.
     """
@@ -276,6 +278,7 @@ class ProgramCorrection(Record):
     command: str
     simulated: SimulatedRun | None = None
     inputs: tuple[Path, ...] = ()
+    hashes: dict[str, str] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
@@ -340,6 +343,7 @@ class ProgramCorrection(Record):
             "payload_kg": self._masses(),
             **({"wrenches": self._wrenches()} if self.result.pushed else {}),
             "controller": controller_summary(self.robot.controller.kinematics),
+            "inputs_sha256": self.hashes,
             "tools": frames.tools,
             "frames": frames.frames,
         }

@@ -25,12 +25,15 @@ class Simulation(Record):
         The readings.
     out
         The file that holds them; None if none was written.
+    stopped_before
+        Whether the arm stopped right before each configuration where a plan says so.
     """
 
     robot: str
     truth: str
     data: Dataset
     out: Path | None = None
+    stopped_before: bool = False
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -42,6 +45,7 @@ class Simulation(Record):
             "readings": len(self.data.target),
             "targets": list(self.data.targets),
             "fixtures": list(self.data.fixtures),
+            "stopped_before": self.stopped_before,
         }
 
     def lines(self) -> list[str]:
@@ -51,4 +55,7 @@ class Simulation(Record):
         against = f" against {', '.join(data.fixtures)}" if data.fixtures else ""
         where = "" if self.out is None else f": {self.out}"
         many = counted(data.configurations, "configuration")
-        return [f"{many} of {self.robot} ({self.truth}), {what}{against}{where}"]
+        said = [f"{many} of {self.robot} ({self.truth}), {what}{against}{where}"]
+        if self.stopped_before:
+            said.append("Before each the arm stopped at its approach_i; the order of the data counts these stops, too.")
+        return said

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice, takewhile
 from typing import Final
@@ -14,14 +15,15 @@ from truearm.measurement.measuring.readings import Reading, dwell_figures
 from truearm.measurement.measuring.session import Session
 from truearm.measurement.measuring.sources import Incoming
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import approach_from
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.notices import Notice
 from truearm.simulation.devices import DEVICES
 from truearm.simulation.devices.artefacts import Artefact
 from truearm.simulation.devices.device import Device
-from truearm.simulation.devices.tracker import MeasurementArm, Tracker
-from truearm.simulation.twin import Twin
+from truearm.simulation.devices.tracker import MeasurementArm
+from truearm.simulation.twin import Conditions, Twin
 
 #: Samples of a dwell, and how long it takes [s].
 SAMPLES: Final = 20
@@ -36,10 +38,8 @@ _SCATTER: Final = 8.0
 #: So often a point is read in a row; then it is left out.
 _MOST_TRIES: Final = 20
 
-#: Instruments that read where targets are, without touching them: by name.
-VIRTUAL: Final[dict[str, Device]] = {
-    device.name: device for device in DEVICES if isinstance(device, Tracker | MeasurementArm | Artefact)
-}
+#: Instruments that read where targets are, at whatever configurations the robot comes to: by name.
+VIRTUAL: Final[dict[str, Device]] = {device.name: device for device in DEVICES if not device.no_plan}
 
 
 class VirtualInstrument:
@@ -70,6 +70,13 @@ class VirtualInstrument:
         How far the instrument has moved at the last configuration [m], evenly over the plan.
     sigma
         Standard deviation of a coordinate of a reading [m]; the device's if None.
+    before
+        Where the arm stops right before each configuration, as `joints`; None if it comes from the one before.
+
+    Attributes
+    ----------
+    hides
+        What stands between it and each nest, in words, at each configuration: a nest that is not named is seen.
     """
 
     kind: Final = "virtual"
@@ -85,18 +92,31 @@ class VirtualInstrument:
         disturbed: float = 0.0,
         drift: float = 0.0,
         sigma: float | None = None,
+        before: Array | None = None,
     ) -> None:
         self.device, self.placed = device, placed
         self.sigma = device.sigma if sigma is None else sigma
         self._joints, self._seed, self._disturbed = joints, seed, disturbed
-        self._frames = twin.frames(joints, number=np.arange(float(len(joints))))
+        self.hides: Sequence[Mapping[str, str]] = [{} for _ in joints]
+        conditions = Conditions(number=np.arange(float(len(joints))))
+        if before is not None:
+            count = float(2 * len(joints))
+            conditions = Conditions(approach=approach_from(before, joints), number=np.arange(1.0, count, 2.0))
+        self._frames = twin.frames(joints, **conditions)
         rng = np.random.default_rng([seed, 0])
         way = rng.standard_normal(3)
         self._drift = drift * way / np.linalg.norm(way)
-        turn = 2 * np.pi * np.arange(len(nests)) / max(len(nests), 1)
-        around = _NEST_CIRCLE * np.column_stack([np.cos(turn), np.sin(turn), 0.1 * np.arange(len(nests))])
         base = twin.robot.base
-        self._nests = dict(zip(nests, around @ base.rotation.T + base.translation, strict=True))
+        # From a quarter of a step beside the instrument on, so that none of a few is behind the base.
+        x, y, _ = -base.rotation.T @ np.array(base.translation)
+        turn = np.arctan2(y, x) + 2 * np.pi * (np.arange(len(nests)) + 0.25) / max(len(nests), 1)
+        around = _NEST_CIRCLE * np.column_stack([np.cos(turn), np.sin(turn), 0.1 * np.arange(len(nests))])
+        self.nests = dict(zip(nests, around @ base.rotation.T + base.translation, strict=True))
+
+    @property
+    def looks(self) -> bool:
+        """Whether it needs a line of sight; a measurement arm needs none."""
+        return not isinstance(self.device, MeasurementArm)
 
     @property
     def waiting(self) -> str:
@@ -129,6 +149,8 @@ class VirtualInstrument:
             index = [target.name for target in self.placed.targets].index(name)
             if not self.visible(k)[index]:
                 return [Incoming(left=(step.label, name, f"the {self.device.name} does not see it"))]
+        elif name in self.hides[k]:
+            return [Incoming(left=(step.label, name, f"{self.hides[k][name]} is in the line of sight"))]
         tries = takewhile(lambda entry: (entry.label, entry.name) == (step.label, name), reversed(session.entries))
         if sum(1 for _ in islice(tries, _MOST_TRIES)) == _MOST_TRIES:
             return [Incoming(left=(step.label, name, f"{_MOST_TRIES} readings in a row were set aside"))]
@@ -139,8 +161,8 @@ class VirtualInstrument:
 
     def _read(self, name: str, k: int, rng: np.random.Generator, mishap: int, time: float) -> Reading:
         turned = None
-        if name in self._nests:
-            place = self._nests[name]
+        if name in self.nests:
+            place = self.nests[name]
         else:
             place, turned = self._frames[name][k, :3, 3], self._frames[name][k, :3, :3]
         place = place + self._drift * (k / max(len(self._joints) - 1, 1))
@@ -179,17 +201,17 @@ def virtual_device(name: str) -> Device:
     Raises
     ------
     InputError
-        If there is none of this name, or it touches what it measures: then the postures are its own.
+        If there is none of this name, or it does not go through a plan: then the postures are its own.
     """
     if name in VIRTUAL:
         return VIRTUAL[name]
-    touches = any(device.name == name for device in DEVICES)
+    why = next((device.no_plan for device in DEVICES if device.name == name), "")
     raise InputError(
-        "the arm is brought by hand to what this device reads, so it does not measure a plan by itself"
-        if touches
-        else "there is no device of this name",
+        why or "there is no device of this name",
         parameter="device",
         came=name,
         allowed=", ".join(VIRTUAL),
-        cure="Measure a twin with it by 'truearm simulate'." if touches else did_you_mean(name, VIRTUAL),
+        cure=f"'truearm simulate' finds the postures of {name}, and measures a twin with it."
+        if why
+        else did_you_mean(name, VIRTUAL),
     )

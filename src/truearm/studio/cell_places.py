@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
@@ -160,6 +161,16 @@ def file_for_places(robot: str, name: str, taken: list[str]) -> str:
     stem = stem if robot in taken else name
     names = [f"{stem}{_CELL}.yaml", *(f"{stem}{_CELL}-{k}.yaml" for k in range(2, len(taken) + 3))]
     return next(one for one in names if one not in taken)
+
+
+def free_name(kind: str, taken: Collection[str]) -> str:
+    """Return a name for a new target or fixture, whose parameters have other names than those of the ones there are.
+
+    The parameters of a target ``1`` are called as those of a target ``target_1`` are; with fixtures likewise.
+    """
+    used = {f"{prefix}{name}" for name in taken for prefix in ("", "target_", "fixture_")}
+    names = (f"{kind}_{k}" for k in range(1, len(used) + 2))
+    return next(name for name in names if not {name, f"fixture_{name}"} & used)
 
 
 def _targets(robot: Robot) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from truearm.units import as_number, from_si, sized_si, to_si
 
 #: What a new file begins with.
 _NEW: Final = "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"
-_RANGE: Final = "LOW..HIGH in mm, or nothing where the box does not end"
+_RANGE: Final = "LOW..HIGH in mm, both with a decimal point; or an empty field where the box ends on neither side"
 
 
 @dataclass(frozen=True, eq=False)

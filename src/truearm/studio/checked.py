@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.files import confined_reads
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.excluded import Exclusion
+from truearm.measurement.excluded import Exclusion, Read, numbers_read
 from truearm.modeling.chain import Array
 from truearm.notices import Notice, worst_first
 from truearm.studio.tasks import Outcome, Progress
@@ -36,6 +37,8 @@ class Checked:
     points
         Where the instrument saw it, in the robot's base frame as far as that is known [m], ``(readings, 3)``; NaN where
         it read no place of its own.
+    read
+        What each reading is, as the file of excluded readings notes it.
     joints
         Of the model at each reading's configuration [rad or m], ``(readings, joints)``.
     """
@@ -44,6 +47,7 @@ class Checked:
     findings: tuple[Notice, ...]
     readings: tuple[tuple[str, str], ...]
     points: Array
+    read: tuple[Read, ...]
     joints: Array
 
     def rows_of(self, named: tuple[tuple[str, str], ...]) -> NDArray[np.intp]:
@@ -52,6 +56,14 @@ class Checked:
         wanted = set(named)
         found = [k for k, one in enumerate(self.readings) if one in wanted or one[0] in whole]
         return np.array(found, dtype=np.intp)
+
+    def named(self, rows: Sequence[int]) -> dict[tuple[str, str], tuple[Read, ...]]:
+        """Return the names of readings, and what all readings of each name are."""
+        found: dict[tuple[str, str], tuple[Read, ...]] = {self.readings[k]: () for k in rows}
+        for name, read in zip(self.readings, self.read, strict=True):
+            if name in found and read:
+                found[name] += (read,)
+        return found
 
 
 def checked(folder: Path, robot: str, data: str, exclude: str | None, progress: Progress) -> Checked:
@@ -80,12 +92,20 @@ def checked(folder: Path, robot: str, data: str, exclude: str | None, progress: 
             for c, t in zip(part.configuration.tolist(), part.target.tolist(), strict=True)
         ),
         points,
+        tuple(numbers for part in parts for numbers in numbers_read(part)),
         np.concatenate([read.joints[part.configuration] for part in parts]),
     )
 
 
-def with_exclusions(before: tuple[Exclusion, ...], named: list[tuple[str, str]], reason: str) -> tuple[Exclusion, ...]:
+def with_exclusions(
+    before: tuple[Exclusion, ...], named: Mapping[tuple[str, str], tuple[Read, ...]], reason: str
+) -> tuple[Exclusion, ...]:
     """Return excluded readings with some more; those that are excluded already keep their reason.
+
+    Parameters
+    ----------
+    named
+        Of the further ones, as :meth:`Checked.named` returns them.
 
     Raises
     ------
@@ -101,7 +121,7 @@ def with_exclusions(before: tuple[Exclusion, ...], named: list[tuple[str, str]],
             allowed="what went wrong with the instrument, such as: beam broken",
         )
     known = {(one.configuration, one.target) for one in before}
-    return (*before, *(Exclusion(*one, text) for one in dict.fromkeys(named) if one not in known))
+    return (*before, *(Exclusion(*one, text, read=read) for one, read in named.items() if one not in known))
 
 
 def _base(robot: str, data: Dataset) -> tuple[Array, Array] | None:

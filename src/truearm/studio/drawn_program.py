@@ -13,6 +13,7 @@ import numpy as np
 from truearm.compensation.programs.program import Program
 from truearm.files import confined_reads
 from truearm.modeling.chain import Array
+from truearm.studio.corrected import CellPart, cell_parts
 from truearm.studio.tasks import Outcome, Progress, compensate_command
 
 #: So many moves are drawn at most.
@@ -85,30 +86,30 @@ def corrected_program(
     progress: Progress,
 ) -> DrawnProgram:
     """Correct a program and write it, :func:`truearm.compensate`, and find where the real robot goes with it."""
-    from truearm.compensation.cell import EMPTY_CELL, Cell, read_frames, read_tools
+    from truearm.compensation.cell import Cell, read_frames, read_tools
     from truearm.compensation.correction import way_through
     from truearm.compensation.program_correction import commanded
     from truearm.jobs.compensate import compensate
 
     os.chdir(folder)
     with confined_reads(folder):
+        places: dict[CellPart, str] = {} if cell is None else dict.fromkeys(cell_parts(Path(cell)), cell)
         made = compensate(
             robot,
             [program],
             out=out,
-            tools=cell,
-            frames=cell,
+            tools=places.get("tools"),
+            frames=places.get("frames"),
             taught=taught,
             controller_kinematics=controller_kinematics,
-            command=compensate_command(robot, program, cell, taught, controller_kinematics),
+            command=compensate_command(robot, program, places, taught, controller_kinematics),
             progress=progress,
         )
         progress("drawing the program")
-        places = (
-            EMPTY_CELL if cell is None else Cell(*(read(made.robot, Path(cell)) for read in (read_tools, read_frames)))
-        )
+        tools, frames = (None if part not in places else Path(places[part]) for part in ("tools", "frames"))
+        known = Cell(read_tools(made.robot, tools), read_frames(made.robot, frames))
         before, after = (
-            commanded(made.robot, one, places) for one in (made.result.corrections[0].program, made.as_written()[0])
+            commanded(made.robot, one, known) for one in (made.result.corrections[0].program, made.as_written()[0])
         )
     correction, real_tips = made.result.corrections[0], made.result.real_tips[0]
     (meant, there), (_, then) = real_tips(before), real_tips(after)

@@ -12,6 +12,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import confined_reads
+from truearm.measurement.statistics import Errors, errors_of
 from truearm.modeling.chain import Array
 from truearm.studio.tasks import Progress
 
@@ -52,16 +53,17 @@ def error_vectors(folder: Path, robot: str, data: str, result: str, progress: Pr
     result
         Folder of the result.
     options
-        Of :func:`truearm.calibrate`, those that say what it trains on and what the robot carries.
+        Of :func:`truearm.calibrate`, those that say what it trains on, by which loss the nominal robot is placed, and
+        what it carries.
 
     Raises
     ------
     InputError
-        If the result is of other measurements, or they were split otherwise.
+        If the result is of other measurements, they were split otherwise, or it is of another robot: the errors would
+        not be those of its figures.
     """
     from truearm.jobs.calibrate import calibrate
     from truearm.library import load_robot
-    from truearm.measurement.statistics import errors_of
 
     os.chdir(folder)
     with confined_reads(folder):
@@ -72,14 +74,19 @@ def error_vectors(folder: Path, robot: str, data: str, result: str, progress: Pr
         part = placed.data.of_configurations(seen)
         after = errors_of(load_robot(Path(result) / "calibrated.yaml"), part)
         figures = json.loads((Path(result) / "result.json").read_text(encoding="utf-8"))
-    said = figures["validation" if len(placed.held_out) else "train"]
-    rms = None if said is None else (said.get("position_mm") or {}).get("rms")
-    found = after.position
-    if found is None:
+    if after.position is None:
         raise InputError("no positions were read, so there are no errors of them to draw", where=data)
-    if rms is None or abs(rms - found.rms * 1e3) > _SAME:
+    if not _are_those(after, figures["validation" if len(placed.held_out) else "train"]):
         raise InputError(
             "the result is of other measurements than those that are chosen, or they were split otherwise",
+            where=result,
+            cure="Calibrate again, and draw the errors then.",
+        )
+    if not _are_those(placed.nominal, figures["nominal"]):
+        raise InputError(
+            "the robot that is chosen has other errors before the calibration than the result says: its file was "
+            "changed, or it was placed otherwise, as by another loss",
+            parameter="robot",
             where=result,
             cure="Calibrate again, and draw the errors then.",
         )
@@ -87,3 +94,12 @@ def error_vectors(folder: Path, robot: str, data: str, result: str, progress: Pr
     if before.shape != after.position_errors.shape:
         before = np.full(after.position_errors.shape, np.nan)
     return ErrorVectors(part.position, before, after.position_errors, bool(len(placed.held_out)))
+
+
+def _are_those(errors: Errors, said: dict[str, Any] | None) -> bool:
+    """Return whether errors of positions are those of which a result holds the figures."""
+    found, figures = errors.position, (said or {}).get("position_mm")
+    if found is None or figures is None:
+        return found is None and figures is None
+    pairs = ((found.mean, "mean"), (found.rms, "rms"), (found.max, "max"))
+    return all(abs(value * 1e3 - figures[name]) <= _SAME for value, name in pairs)

@@ -18,7 +18,7 @@ _Whole = Annotated[int, Field(strict=True)]
 Source = Literal["virtual instrument", "watched folder", "port of this machine"]
 #: Where readings come from: the parameter of the job that says it, and those that belong to it.
 SOURCES: Final[dict[Source, tuple[str, ...]]] = {
-    "virtual instrument": ("device", "truth", "noise", "seed", "disturbed", "drift"),
+    "virtual instrument": ("device", "truth", "noise", "seed", "disturbed", "drift", "constraints"),
     "watched folder": ("watch", "mapping"),
     "port of this machine": ("listen",),
 }
@@ -45,6 +45,7 @@ class MeasureFields(BaseModel):
     seed: Annotated[_Whole, Field(ge=0)] = 0
     disturbed: _Number | None = None
     drift: _Number | None = None
+    constraints: _Text | None = None
     watch: _Text | None = None
     mapping: _Text | None = None
     listen: Annotated[_Whole, Field(ge=0, le=65535)] = 0

@@ -55,7 +55,7 @@ class MeasuredPoints:
 
 @dataclass(frozen=True, eq=False)
 class LinesOfSight:
-    """Lines from the instrument to the targets at the next configuration.
+    """Lines from the instrument to the targets at the next configuration, or to the nests in their round.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Measuring:
         project, fields, said = self._project, self.fields, self._said
         plan = fields.planned()
         given = measure_arguments(said)
-        for name in ("watch", "about"):
+        for name in ("watch", "about", "constraints"):
             if name in given:
                 given[name] = project.path(given[name], name)
         for name in ("mapping", "truth"):  # a file of the project, or a name that the job knows
@@ -179,10 +179,13 @@ class Measuring:
             return ["Nothing is left to be measured."]
         still = f"{counted(session.outstanding, 'reading')} still to come."
         if step.kind == "nests":
-            return [f"Next: nests {listed(step.names)}, with the robot at {step.label}. {still}"]
-        number = step.configuration + 1
-        text = [f"Next: {listed(step.names)} at configuration {step.label}, number {number} of the plan. {still}"]
+            text = [f"Next: nests {listed(step.names)}, with the robot at {step.label}. {still}"]
+        else:
+            number = step.configuration + 1
+            text = [f"Next: {listed(step.names)} at configuration {step.label}, number {number} of the plan. {still}"]
         seen = sight(self.campaign)
+        if seen is None and step.kind == "nests":
+            return text
         if seen is None:
             text.append("Where the instrument stands is not known here, nor what it sees.")
             return text
@@ -248,7 +251,7 @@ class Measuring:
         return MeasuredPoints(at[kept], colours.astype(np.uint8), at[aside])
 
     def lines_of_sight(self) -> LinesOfSight | None:
-        """Return lines to the targets at the next configuration; None for a real instrument, or if nothing is left."""
+        """Return lines to what is next; None for a real instrument, or if nothing is left."""
         seen, placed = sight(self.campaign), self.campaign.placed
         if seen is None or placed is None:
             return None
@@ -259,7 +262,7 @@ class Measuring:
         ]
         names = {INSTRUMENT: origin[0]}
         step = self.campaign.session.next
-        if step is not None and step.kind == "configuration":
+        if step is not None:
             k = seen.names.index(step.names[0])  # labels of all of them would cover each other
             names[f"{step.names[0]}, {'next' if seen.visible[k] else 'hidden'}"] = ends[k]
         return LinesOfSight(

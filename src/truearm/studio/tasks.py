@@ -11,12 +11,15 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from truearm.files import confined_reads
 from truearm.notices import Notice
+from truearm.studio.corrected import CellPart
 
 Progress = Callable[[str], None]
+#: Options of `compensate` that have other names than the parameters.
+_PLACES: Final = {"tools": "tool", "frames": "frame"}
 
 
 @dataclass(frozen=True)
@@ -73,11 +76,22 @@ def option_words(options: Mapping[str, Any]) -> list[str]:
 
 
 def compensate_command(
-    robot: str, program: str, cell: str | None, taught: Sequence[str] | None, controller_kinematics: str | None
+    robot: str,
+    program: str,
+    places: Mapping[CellPart, str],
+    taught: Sequence[str] | None,
+    controller_kinematics: str | None,
 ) -> str:
-    """Return the command that does the same in the project's folder, as the report shows it."""
+    """Return the command that does the same in the project's folder, as the report shows it.
+
+    Parameters
+    ----------
+    places
+        The files that say where tools and frames are.
+    """
     words = ["truearm", "compensate", robot, program]
-    words += [] if cell is None else ["--tools", cell, "--frames", cell]
+    for part, file in places.items():
+        words += [f"--{_PLACES[part]}", file]
     words += [] if controller_kinematics is None else ["--controller-kinematics", controller_kinematics]
     words += [] if taught is None else ["--taught", ",".join(taught)]
     return shlex.join([*words, "--out", "DIR"])

@@ -40,13 +40,14 @@ class TypingAtRest:
         def called(event: Any) -> None:
             if getattr(event, "client", None) is None:
                 return
+            typed = event.target.value  # as it is now: the pages may be shown anew before the lock is free
             with self._lock:
                 if key in self._typing:
                     self._typing.pop(key)[0].cancel()
                 self._begun(event.target)
                 timer = threading.Timer(_REST, self._rested, (key,))
                 timer.daemon = True
-                self._typing[key] = (timer, partial(self._take, event.target, event.target.value, do))
+                self._typing[key] = (timer, partial(self._take, event.target, typed, do))
                 timer.start()
 
         return called

@@ -16,6 +16,7 @@ from truearm.files import confined_reads, exists
 from truearm.library import load_robot
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.same_arm import fitted_from
 from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.gate import Gate
@@ -77,14 +78,19 @@ class Window:
     def action(self, do: Callable[[], None]) -> Callable[[Any], None]:
         """Return a callback for an element: `do` is called under the lock, and a refusal is shown below the element.
 
-        It is called for what a user did alone, not where the studio itself sets a value.
+        It is called for what a user did alone, not where the studio itself sets a value. What the user has chosen
+        holds, also where the studio shows the page anew while this waits for the lock.
         """
 
         def called(event: Any) -> None:
             if getattr(event, "client", None) is not None:
+                element = getattr(event, "target", None)
+                chosen = getattr(element, "value", None)
                 with self.lock:
                     if self._typing.take_all():
-                        self._do(do, getattr(event, "target", None))
+                        if element is not None and chosen is not None and element.value != chosen:
+                            element.value = chosen
+                        self._do(do, element)
 
         return called
 
@@ -298,9 +304,17 @@ class Window:
             return load_robot(folder / "calibrated.yaml")
 
     def result_of_another(self) -> str:
-        """Return which robot the result is of, where that is not the robot that is chosen; nothing otherwise."""
+        """Return which robot the result is of, where that is not the robot that is chosen; nothing otherwise.
+
+        Also a robot of the same name is another one where its file has other kinematics than the result began with.
+        """
         calibrated = self.calibrated()
-        return "" if calibrated is None or calibrated.name == self.robot().name else calibrated.name
+        if calibrated is None:
+            return ""
+        robot = self.robot()
+        if calibrated.name != robot.name:
+            return calibrated.name
+        return "" if fitted_from(calibrated, robot) else f"{calibrated.name} with other kinematics"
 
     def refuse_result_of_another(self) -> None:
         """Refuse to go on with the result of another robot than the one that is chosen.

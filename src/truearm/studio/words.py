@@ -59,7 +59,7 @@ def notice(one: Notice) -> str:
 
 def refused(text: str) -> str:
     """Return the words of a refusal, as they stand below an element of a page."""
-    edge = f"border-left:3px solid {_COLOURS['error']};padding-left:0.5em"
+    edge = f"margin:0 0.75em 0.6em;border-left:3px solid {_COLOURS['error']};padding-left:0.5em"
     return f'<p role="alert" style="{_STYLE};{edge}">{plain(text)}</p>'
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -95,6 +96,18 @@ def test_a_reading_of_another_configuration_is_kept_where_it_belongs() -> None:
     assert data.number.tolist() == [0, 1]
 
 
+def test_stops_before_the_configurations_count_in_the_order() -> None:
+    of = session(targets=("a",))
+    for label in LABELS:
+        taken(of, "a", label)
+    data = kept_readings(of, replace(plan(), before=plan()), "kept")
+    assert data is not None
+    assert data.number is not None
+    assert data.approach is not None
+    assert data.number.tolist() == list(range(1, 2 * len(LABELS), 2))
+    assert not data.approach.any()
+
+
 def test_nests_that_are_passed_over_are_counted() -> None:
     of = session(targets=("a",), nests=("n",), every=2)
     for label in LABELS[:3]:
@@ -104,6 +117,33 @@ def test_nests_that_are_passed_over_are_counted() -> None:
     step = of.next
     assert step is not None
     assert step.names == ("n",)  # the second round is still to be measured
+
+
+def test_a_nest_that_is_hidden_is_told_with_its_place_and_the_round_is_not_whole() -> None:
+    of = session(targets=("a",), nests=("n1", "n2"), every=2)
+    of.add(of.leave_out("P1", "n1", "the arm is in the line of sight"))
+    through(of)
+    assert of.done
+    assert of.missed_rounds == 1
+    (notice,) = [n for n in session_notices(of) if n.level == "warning"]
+    assert notice.code == "nests-missed"
+    assert "In 1 of 3 rounds" in notice.message
+    assert "Left out: n1 at P1 (the arm is in the line of sight)." in notice.message
+    assert of.left_out == ()
+
+
+def test_a_plan_that_says_what_is_read_asks_for_nothing_else_and_takes_it_all_the_same() -> None:
+    of = Session(LABELS, ("a", "b"), (), 2, QUALITY, {"P1": ("a",), "P2": ("b",), "P3": ("a", "b"), "P4": ("b",)})
+    assert (of.outstanding, of.planned) == (5, 5)
+    assert taken(of, "b", "P1").kept
+    assert [(label, name) for _, label, name in through(of)] == [
+        ("P1", "a"),
+        ("P2", "b"),
+        ("P3", "a"),
+        ("P3", "b"),
+        ("P4", "b"),
+    ]
+    assert (of.done, len(of.kept), of.left_out) == (True, 6, ())
 
 
 def test_what_is_left_out_is_not_asked_for_but_may_come_all_the_same() -> None:
@@ -344,6 +384,26 @@ def test_the_drift_of_nests_is_what_they_moved() -> None:
     assert drift.time[0] == 0.0
     assert drift.sigma is not None
     assert drift.noise() is None or drift.noise() < 1e-9  # type: ignore[operator]
+
+
+def test_one_nest_tells_its_scatter_from_round_to_round_and_a_drift_beside_it() -> None:
+    rng = np.random.default_rng(2)
+    for drift, most in ((0.0, 1.3e-5), (5e-4, 4e-5)):
+        of = Session([f"P{k}" for k in range(12)], ("a",), ("n",), 1, QUALITY)
+        while (step := of.next) is not None:
+            place = 1e-5 * rng.standard_normal(3) + (1.0 if step.names[0] == "n" else 2.0)
+            place[0] += drift * step.configuration / 11
+            of.add(of.judged(Reading(step.names[0], 1.0, place, label=step.label)))
+        found = nest_drift(of)
+        assert found is not None
+        noise = found.noise()
+        assert noise is not None
+        assert 0.7e-5 < noise < most
+    few = session(nests=("n",))
+    through(few)
+    seldom = nest_drift(few)
+    assert seldom is not None
+    assert seldom.noise() is None
 
 
 def test_no_nest_no_drift() -> None:

@@ -274,3 +274,19 @@ def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such folder") as refusal:
         WatchedFolder(tmp_path / "nowhere", tmp_path / "map.yaml", LABELS)
     assert refusal.value.parameter == "watch"
+
+
+def test_a_line_break_of_two_characters_may_come_in_two_pieces(watched: Folder) -> None:
+    watched.write(HEADER.replace("\n", "\r\n") + row("P1", "a").rstrip("\n") + "\r")
+    assert watched.step() == ["P1/a"]
+    watched.write("\n" + row("P2", "a", 2.0).replace("\n", "\r\n"))
+    assert watched.step() == ["P2/a"]
+    assert watched.codes == []
+
+
+def test_a_file_that_has_no_header_is_named_in_whole_sentences(watched: Folder) -> None:
+    watched.write(row("P1", "a") + row("P2", "a", 2.0))
+    assert watched.step() == []
+    (notice,) = watched.campaign.source.notices
+    assert (notice.code, notice.level) == ("not-read", "note")
+    assert ".." not in notice.message

@@ -107,7 +107,7 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
                 f"The residuals are {fit.excess:.1f} times what the declared deviations"
                 f"{', and errors of the joints that readings of a configuration share,' if shared else ''} allow. "
                 f"Either the robot does something that the {fit.model.name} model cannot express, or sigma is too "
-                "small. The deviations of the parameters allow for it.",
+                "small, or readings are wrong. The deviations of the parameters allow for it.",
             )
         )
     found += _check_effects(fit)

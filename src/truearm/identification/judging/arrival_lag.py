@@ -78,10 +78,14 @@ def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
 
 
 def _last_moves(data: Dataset, number: Array) -> Array:
-    """Return the sign of each joint's move from the configuration measured before, ``(configurations, joints)``."""
+    """Return the sign of each joint's move from the configuration measured before, ``(configurations, joints)``.
+
+    It is 0 where that one is not in the data.
+    """
     order = np.argsort(number, kind="stable")
     moves = np.zeros_like(data.joints)
-    moves[order[1:]] = np.sign(np.diff(data.joints[order], axis=0))
+    follows = np.diff(number[order])[:, None] == 1
+    moves[order[1:]] = np.where(follows, np.sign(np.diff(data.joints[order], axis=0)), 0.0)
     return moves
 
 

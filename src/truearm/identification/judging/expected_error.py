@@ -220,7 +220,7 @@ def moved_lengths(fit: Fit, joints: Array, errors: Mapping[str, Array]) -> Array
     return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
 
 
-def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True) -> ExpectedError:
+def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True, doubted: bool = False) -> ExpectedError:
     """Return the error of the targets' positions to expect over the workspace.
 
     Joint positions are drawn evenly within the limits (or a turn, or 1 m), with payload and gravity of the fit. Base
@@ -233,6 +233,8 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True) -> Expect
         Of joint positions and draws.
     plausible
         Whether what was fitted can be this robot.
+    doubted
+        Whether readings are doubted: then nothing is said of the robot for what they leave.
     """
     robot = fit.robot
     few, many = _CONFIGURATIONS
@@ -250,7 +252,7 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True) -> Expect
         remainder=remainder,
         payload=robot.payload,
         gauge_freedoms=fit.gauge_freedoms,
-        omissions=tuple(_omissions(fit, remainder, overall, plausible=plausible)),
+        omissions=tuple(_omissions(fit, remainder, overall, plausible=plausible, doubted=doubted)),
     )
 
 
@@ -325,7 +327,7 @@ def _remainder(fit: Fit, joints: Array | Postures) -> float:
     return math.sqrt(float(np.mean([np.sum(J**2, axis=(0, 1)) for J in moved])))
 
 
-def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: bool) -> Iterator[str]:
+def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: bool, doubted: bool) -> Iterator[str]:
     """Say what the covariance cannot know."""
     if fit.status is Status.NOT_CONVERGED:
         yield "the fit did not converge"
@@ -335,8 +337,10 @@ def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: b
         yield "the robot's own geometry counts as exact"
     if fit.at_bound:
         yield "values at a bound count as exact"
-    if fit.excess > 1.0:
-        yield "the robot does something that the model cannot express, and it may do more of it elsewhere"
+    if doubted and (fit.excess > 1.0 or remainder**2 > _REMAINDER * overall.mean**2):
+        yield "readings are doubted, and what they do to the fit is in it only as far as they leave it unexplained"
+    elif fit.excess > 1.0:
+        yield "the residuals are larger than the declared deviations, and what makes them so may do more elsewhere"
     elif remainder**2 > _REMAINDER * overall.mean**2:
         yield "what the model cannot express is in it only as far as it was seen where the robot was measured"
 

@@ -36,6 +36,8 @@ from truearm.shown import counted
 
 #: Codes of wrong readings that pull a fit away, and losses that let them.
 _PULLING: Final = frozenset({ORIENTATION_OUTLIERS, *ORIENTATION_SLIPS, "joints-mistaken", "unit-angle"})
+#: The same, and single readings that are far off: what is left is not the robot's.
+_DOUBTING: Final = _PULLING | {"outliers"}
 _PULLED: Final = frozenset({"linear", "huber"})
 
 
@@ -92,21 +94,23 @@ def judge(
     changes = [] if moved_then is None else notices_of_change(*moved_then)
     told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
     noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
-    wrong_robot = check_robot(fit, training) if judges_lengths(fit) else told
+    # A fit that these pull away leaves much and expects much, whatever the model and wherever was measured. Of its
+    # lengths the robust fit of the check knows more.
+    bent = loss in _PULLED and any(notice.code in _PULLING for notice in noticed)
+    wrong_robot = check_robot(fit, training) if judges_lengths(fit) and not bent else told
     if has_error([*noticed, *changes]):  # what is wrong with the data bends the robot too
         wrong_robot = []
     unlike = check_plausible(fit, training, (*noticed, *wrong_robot, *told))
     if unlike:
         wrong_robot = wrong_robot or told
-    expected = expected_error(as_residuals_allow(fit, training), plausible=not unlike)
+    readings_doubted = has_error([*noticed, *changes]) or any(notice.code in _DOUBTING for notice in noticed)
+    expected = expected_error(as_residuals_allow(fit, training), plausible=not unlike, doubted=readings_doubted)
     wrong_sigma = check_sigma(left_over)
     hidden = [] if unlike or has_error(wrong_sigma) else check_sigma_beside_joints(left_over)
     explained = [*changes, *check_arrival_lag(left_over)]
     doubted = has_error([*unlike, *wrong_robot, *noticed])
     if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
         explained = check_remainder(left_over)
-    # A fit that these pull away leaves much and expects much, whatever the model and wherever was measured.
-    bent = loss in _PULLED and any(notice.code in _PULLING for notice in noticed)
     narrow: list[Notice] = []
     if not bent and not unlike and (hidden or not wrong_sigma):  # more configurations do not mend these
         if fit.model.groups and "geometry" not in fit.model.groups:

@@ -25,6 +25,8 @@ _SQUARE: Final = 0.1
 _APART: Final = 5.0
 #: So many configurations are named.
 _MOST_NAMED: Final = 5
+#: No joint turns farther to one side, in turns.
+_MOST_TURNS: Final = 1.5
 #: No instrument reads a robot from farther away [m].
 _FARTHEST: Final = 1e4
 
@@ -185,6 +187,31 @@ def angle_slips(data: Dataset) -> Iterator[Slip]:
             which = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
             words_of = f"{which}: {words}. Mend the unit in the header"
             yield Slip("unit-angle", words_of, replace(data, joints=joints))
+
+
+def mixed_angle_slips(data: Dataset) -> Iterator[Slip]:
+    """Try the other unit of angle at those configurations whose joint positions are of its size, and not at the others.
+
+    No joint turns farther than one and a half turns to one side. Radians that are called degrees lie within 9.4 deg in
+    all joints; degrees that are called radians lie beyond 9.4 rad in some joint.
+    """
+    turning = _turning(data)
+    if not turning:
+        return
+    largest, most = np.abs(data.joints[:, turning]).max(axis=1), _MOST_TURNS * 2.0 * math.pi
+    for mask, factor, words in (
+        (largest > most, math.pi / 180, "degrees are called rad"),
+        (largest <= most * (math.pi / 180), 180 / math.pi, "radians are called deg"),
+    ):
+        which = np.flatnonzero(mask)
+        if not 0 < len(which) < data.configurations:
+            continue
+        joints = data.joints.copy()
+        joints[np.ix_(which, np.array(turning))] *= factor
+        first = ", ".join(data.labels[c] for c in which[:_MOST_NAMED].tolist())
+        some = f"{first} and others" if len(which) > _MOST_NAMED else first
+        words_of = f"The joints: {words}, at some configurations alone ({some}). Mend the numbers of these rows"
+        yield Slip("unit-angle", words_of, replace(data, joints=joints))
 
 
 def controller_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:

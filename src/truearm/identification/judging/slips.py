@@ -23,6 +23,7 @@ from truearm.identification.judging.slip_trials import (
     controller_slips,
     length_slips,
     mirrored,
+    mixed_angle_slips,
     mixed_length_slips,
     order_slips,
     scale_slips,
@@ -47,6 +48,8 @@ _PLACED_WITHIN: Final = 3e-3
 _PLACED_WITHIN_BY_FIXTURES: Final = 6e-3
 #: Distances that are off by so many times that at the least are not looked at more closely.
 _PLAINLY_OFF: Final = 2.0
+#: Share of the rows that stay, beside others in another unit: fewer of a campaign are about zero by chance.
+_MANY_ROWS: Final = 0.05
 #: A slip explains the data if they fit this many times better with it mended.
 _LEAST_IMPROVEMENT: Final = 4.0
 #: Beside a slip whose mending makes the data fit this many times better, nothing else is wrong.
@@ -129,13 +132,20 @@ def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     some = _some(data)
     yield from length_slips(some)
     yield from mixed_length_slips(some)
-    yield from as_noted(robot, some, angle_slips)
+    yield from _angle_slips(robot, some)
     yield from controller_slips(robot, some)
     yield from mirrored(some)
     yield from as_noted(robot, some, sign_slips)
     yield from as_noted(robot, some, order_slips)
     yield from (replace(slip, data=_some(slip.data)) for slip in shifted(data))
     yield from scale_slips(robot, some)
+
+
+def _angle_slips(robot: Robot, data: Dataset) -> list[Slip]:
+    """Try other units of angle, of some rows first where only these can be in it, and the others are many enough."""
+    whole, some = (list(as_noted(robot, data, slips)) for slips in (angle_slips, mixed_angle_slips))
+    first = [slip for slip in some if (slip.data.joints == data.joints).all(axis=1).mean() > _MANY_ROWS]
+    return [*first, *whole, *(slip for slip in some if slip not in first)]
 
 
 def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[[], list[Slip]] = list) -> Slip | None:
@@ -173,7 +183,7 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
         return []
     for slip in (
         *length_slips(data),
-        *as_noted(robot, data, angle_slips),
+        *_angle_slips(robot, data),
         *controller_slips(robot, data),
         *as_noted(robot, data, sign_slips),
         *as_noted(robot, data, order_slips),

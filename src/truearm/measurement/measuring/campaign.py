@@ -142,7 +142,7 @@ def session_notices(session: Session) -> list[Notice]:
             Notice(
                 "many-left-out",
                 f"At {none} of {len(session.labels)} configurations every target was left out: "
-                f"{len(session.left_out)} of {len(session.labels) * len(session.targets)} readings of targets are "
+                f"{len(session.left_out)} of {session.planned} readings of targets are "
                 "missing. If the instrument does not see them there, plan for it: `truearm plan` with `device`.",
             )
         )
@@ -171,7 +171,7 @@ def session_notices(session: Session) -> list[Notice]:
             Notice(
                 "nests-missed",
                 f"In {session.missed_rounds} of {session.rounds} rounds not all nests were measured: what moved in "
-                "between is not known as well.",
+                f"between is not known as well.{_hidden(session)}",
             )
         )
     if readings and not session.nests:
@@ -184,6 +184,15 @@ def session_notices(session: Session) -> list[Notice]:
             )
         )
     return found
+
+
+def _hidden(session: Session) -> str:
+    """Say at which configurations nests were left out, and why."""
+    left = session.nests_left_out
+    if not left:
+        return ""
+    said = _some([f"{e.name} at {e.label}{f' ({e.words})' if e.words else ''}" for e in left])
+    return f" Left out: {said}. Put nests where nothing comes between, or measure them at another configuration."
 
 
 def _gone_back(entries: Sequence[Entry]) -> list[int]:

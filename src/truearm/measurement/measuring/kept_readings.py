@@ -10,7 +10,7 @@ import numpy as np
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.measuring.nest_drift import nest_drift
 from truearm.measurement.measuring.session import Entry, Session
-from truearm.measurement.readers.rows import Configurations, in_order
+from truearm.measurement.readers.rows import Configurations, in_order, places_after_stops
 from truearm.modeling.chain import Array
 from truearm.shown import counted
 
@@ -55,7 +55,9 @@ def kept_readings(session: Session, configurations: Configurations, source: str)
 
     Configurations come in the order in which the robot came to them. One to which it came again has visits. A target
     that was left out at a configuration is a missing reading there. Configurations to which it never came are left out.
-    Nests are reference points, at the configuration at which they were measured.
+    Nests are reference points, at the configuration at which they were measured. Where the plan has stops right before
+    the configurations, these count in the order, so that nobody takes it that a joint came from the configuration
+    before.
 
     Parameters
     ----------
@@ -90,7 +92,8 @@ def kept_readings(session: Session, configurations: Configurations, source: str)
             **_fields([(label, entry.name, entry) for label, entry in zip(labels, nests, strict=True)], visits, sigma),
         )
     data = Dataset(**common, **_fields(rows, visits, sigma), references=references)
-    return in_order(data, np.arange(1, len(places) + 1))
+    count = len(places)
+    return in_order(data, np.arange(1, count + 1) if configurations.before is None else places_after_stops(count))
 
 
 @dataclass(frozen=True)

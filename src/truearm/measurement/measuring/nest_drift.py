@@ -70,11 +70,24 @@ class NestDrift:
         read = np.isfinite(self.moved[:, :, 0])
         freedoms = 3 * int(read.sum() - read.any(axis=1).sum() - read.any(axis=0).sum() + 1)
         if freedoms < _LEAST_FREEDOMS:
-            return None
+            return self._from_round_to_round()
         # Nests that were read in every round: what is left of each round and each nest is scatter alone.
         left = self.moved - np.nanmean(self.moved, axis=0, keepdims=True)
         left = left - np.nanmean(left, axis=1, keepdims=True)
         spread = float(np.sqrt(np.nansum(left**2) / freedoms))
+        return spread if spread > 0.0 else None
+
+    def _from_round_to_round(self) -> float | None:
+        """Return the scatter as one round follows another, the root of half the mean squared step (von Neumann 1941).
+
+        Of a steady drift it holds what one step has of it, so it is rather too large. Steps that share a reading are
+        worth two thirds of steps that share none.
+        """
+        steps = np.diff(self.moved, axis=1)
+        known = int(np.isfinite(steps).sum())
+        if 2 * known < 3 * _LEAST_FREEDOMS:
+            return None
+        spread = float(np.sqrt(np.nansum(steps**2) / (2.0 * known)))
         return spread if spread > 0.0 else None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -18,6 +18,7 @@ Event = Literal["reading", "aside", "left"]
 Kind = Literal["nests", "configuration"]
 #: Kind, number of the round or index of the configuration, and name of a point that is measured there.
 Place = tuple[Kind, int, str]
+_AT: Final[Kind] = "configuration"
 #: Configurations between two rounds of the nests, at most.
 LONGEST_ROUND: Final = 10_000
 #: What may be written of a reading by hand.
@@ -162,12 +163,23 @@ class Session:
         How many configurations lie between two rounds of the nests.
     quality
         What a reading must be to be kept.
+    reads
+        Which of the targets are asked for at each configuration, by its label; all of them where nothing is said. One
+        that is not asked for may be read all the same.
     """
 
     def __init__(
-        self, labels: Sequence[str], targets: Sequence[str], nests: Sequence[str], every: int, quality: Quality
+        self,
+        labels: Sequence[str],
+        targets: Sequence[str],
+        nests: Sequence[str],
+        every: int,
+        quality: Quality,
+        reads: Mapping[str, Collection[str]] | None = None,
     ) -> None:
         self.labels, self.targets, self.nests = tuple(labels), tuple(targets), tuple(nests)
+        some = reads or {}
+        self._asked = [tuple(n for n in self.targets if n in some.get(label, self.targets)) for label in self.labels]
         self.every, self.quality = every, quality
         self._index = {label: number for number, label in enumerate(self.labels)}
         self._entries: list[Entry] = []
@@ -204,15 +216,16 @@ class Session:
 
     @property
     def left_out(self) -> tuple[tuple[str, str], ...]:
-        """Configuration and name of the targets that were left out."""
+        """Configuration and name of the targets that were asked for and left out."""
         gone = sorted(place for place in self._left - {*self._held} if place[0] == "configuration")
-        return tuple((self.labels[k], name) for _, k, name in gone)
+        return tuple((self.labels[k], name) for _, k, name in gone if name in self._asked[k])
 
     @property
     def without_reading(self) -> tuple[str, ...]:
         """Configurations at which every target was left out."""
-        left = Counter(label for label, _ in self.left_out)
-        return tuple(label for label in self.labels if left[label] == len(self.targets))
+        read = {self.labels[k] for kind, k, _ in self._held if kind == "configuration"}
+        left = {label for label, _ in self.left_out} - read
+        return tuple(label for k, label in enumerate(self.labels) if label in left and not self._open(_AT, k))
 
     def reason_of(self, entry: Entry) -> str:
         """Return why a reading is not kept now, empty if it is."""
@@ -247,8 +260,20 @@ class Session:
 
     @property
     def missed_rounds(self) -> int:
-        """How many rounds of the nests were passed over, not measured as a whole."""
-        return sum(bool(self._open("nests", r)) for r in range(min(self._round, self.rounds)))
+        """How many rounds of the nests are over, and were not measured as a whole."""
+        over = [r for r in range(self.rounds) if r < self._round or ("nests", r) in self._whole]
+        return sum(any(("nests", r, name) not in self._held for name in self.nests) for r in over)
+
+    @property
+    def nests_left_out(self) -> tuple[Entry, ...]:
+        """Words that a nest cannot be measured in a round, where it was not measured later."""
+        places = zip(self._entries, self._places, strict=True)
+        return tuple(e for e, at in places if e.event == "left" and e.is_nest and at not in self._held)
+
+    @property
+    def planned(self) -> int:
+        """How many readings of targets are asked for."""
+        return sum(map(len, self._asked))
 
     def round_of(self, entry: Entry) -> int:
         """Return in which round a nest was read, counted from 0."""
@@ -424,7 +449,7 @@ class Session:
         return self._from if self._from < len(self.labels) else None
 
     def _open(self, kind: Kind, k: int) -> tuple[str, ...]:
-        names = self.nests if kind == "nests" else self.targets
+        names = self.nests if kind == "nests" else self._asked[k]
         return tuple(n for n in names if (kind, k, n) not in self._held and (kind, k, n) not in self._left)
 
     def _step(self, kind: Kind, k: int, names: tuple[str, ...]) -> Step:

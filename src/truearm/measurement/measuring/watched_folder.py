@@ -152,7 +152,7 @@ class WatchedFolder:
                 )
             )
         if counts.not_read:
-            words = "; ".join(f"{name}: {why}" for name, why in sorted(counts.not_read.items())[:_NAMED])
+            words = "; ".join(f"{name}: {why.rstrip('.')}" for name, why in sorted(counts.not_read.items())[:_NAMED])
             rest = len(counts.not_read) - _NAMED
             found.append(
                 Notice(
@@ -442,7 +442,8 @@ def _refuse_other_mappings(content: MappingFile, mapping: Path) -> None:
 
 
 def _digest(lines: list[str]) -> bytes:
-    return hashlib.sha256("".join(lines).encode("utf-8", "surrogatepass")).digest()
+    # Without line breaks: of one of two characters the first may come before the second.
+    return hashlib.sha256("\n".join(line.rstrip("\r\n") for line in lines).encode("utf-8", "surrogatepass")).digest()
 
 
 def _mark(line: str) -> str:

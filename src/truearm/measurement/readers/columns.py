@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -13,6 +14,7 @@ from truearm.measurement.readers.canonical import refuse_other_separators
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.rows import Configurations, found_configurations
 from truearm.measurement.readers.sheets import is_workbook, read_sheet
+from truearm.measurement.readers.stops import stops_in
 from truearm.modeling.formats.joint_columns import JOINT_COLUMN, joint_names
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
@@ -142,7 +144,8 @@ def joints_in_file(path: Path) -> tuple[Cells, Configurations]:
             allowed=f"configuration, {_JOINTS}",
             cure="Add it: it holds the labels that the measurements name.",
         )
-    return cells, configurations_of(cells, columns)
+    found = configurations_of(cells, columns)
+    return cells, replace(found, before=stops_in(cells, found))
 
 
 def refuse_repeated(cells: Cells, configurations: Configurations, cure: str) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -12,15 +14,16 @@ from truearm.errors import InputError
 from truearm.files import read_text
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv, refuse_other_separators
-from truearm.measurement.readers.cells import Layout, lines_of, read_cells
-from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations
+from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
+from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
+from truearm.measurement.readers.stops import STOP_COLUMN, stops_in
 from truearm.modeling.formats.joint_columns import JOINT_COLUMN, joint_names
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 _LABEL: Final = "configuration"
-#: Further columns of plans: where to stop before, in which order, under which pull, and what is read.
-_BESIDE: Final = re.compile(r"approach_[1-9][0-9]{0,3}|order|force_[xyz]|reads")
+#: Further columns of plans: in which order, under which pull, and what is read.
+_BESIDE: Final = re.compile(r"order|force_[xyz]|reads")
 #: What nobody has seen.
 _UNSEEN: Final = "unseen"
 
@@ -41,11 +44,46 @@ def read_configurations(path: Path) -> Dataset:
     InputError
         If the file is neither of them, or a cell cannot be used.
     """
+    table = _table_of(path)
+    if table is None:
+        return read_csv(path)
+    return _unseen(table.cells, _found(table))
+
+
+def read_stops(path: Path) -> Dataset | None:
+    """Read where the arm stops right before each configuration of a plan, ``approach_i`` of its table.
+
+    Returns
+    -------
+    Dataset
+        With these joint positions, counted as those of the configurations; None where the file does not have them.
+
+    Raises
+    ------
+    InputError
+        If some of its columns are missing or have no unit, or a cell cannot be used.
+    """
+    table = _table_of(path)
+    stops = None if table is None else stops_in(table.cells, _found(table))
+    return None if table is None or stops is None else _unseen(table.cells, stops)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Cells of a table of configurations, place and unit of each column by its name, and where these stand."""
+
+    cells: Cells
+    columns: Mapping[str, tuple[int, str]]
+    where: str
+
+
+def _table_of(path: Path) -> _Table | None:
+    """Return the table of a plan; None for a canonical CSV."""
     text = read_text(path)
     first = next((number, line) for number, line in enumerate(lines_of(text), 1) if line.strip())
     heads = {one.strip().strip('"').partition("[")[0].strip() for one in first[1].split(",")}
     if "target" in heads or not any(JOINT_COLUMN.fullmatch(name) for name in heads):
-        return read_csv(path)
+        return None
     refuse_other_separators(text, f"{path}, line {first[0]}")
     cells = read_cells(text, str(path), Layout(header=first[0]))
     columns: dict[str, tuple[int, str]] = {}
@@ -57,7 +95,7 @@ def read_configurations(path: Path) -> Dataset:
             raise InputError(f"the column {name} appears twice", where=where, came=heading, cure="Remove one of them.")
         if JOINT_COLUMN.fullmatch(name):
             unit = checked_unit(match and match["unit"], (*ANGLE_UNITS, *LENGTH_UNITS), f"{where}, {heading}")
-        elif name == _LABEL or _BESIDE.fullmatch(name):
+        elif name == _LABEL or STOP_COLUMN.fullmatch(heading) or _BESIDE.fullmatch(name):
             unit = ""
         else:
             raise InputError(
@@ -72,18 +110,27 @@ def read_configurations(path: Path) -> Dataset:
         raise InputError(
             "the column configuration is missing", where=f"{path}, line {first[0]}", cure="Add it: a name in each row."
         )
-    joints_are, names = joint_names(columns, f"{path}, line {first[0]}")
-    labels = cells.texts(columns[_LABEL][0])
-    places, units = zip(*(columns[name] for name in names), strict=True)
-    found = found_configurations(cells, labels, places, units, joints_are)
+    return _Table(cells, columns, f"{path}, line {first[0]}")
+
+
+def _found(table: _Table) -> Configurations:
+    joints_are, names = joint_names(table.columns, table.where)
+    places, units = zip(*(table.columns[name] for name in names), strict=True)
+    labels = table.cells.texts(table.columns[_LABEL][0])
+    return found_configurations(table.cells, labels, places, units, joints_are)
+
+
+def _unseen(cells: Cells, found: Configurations) -> Dataset:
+    """Return joint positions with a missing reading at each."""
+    n = len(found.of_row)
     return dataset_of(
         Readings(
-            source=str(path),
+            source=cells.source,
             lines=cells.lines,
             configuration=found.of_row,
-            targets=(_UNSEEN,) * len(labels),
-            reference=np.zeros(len(labels), bool),
-            position=np.full((len(labels), 3), np.nan),
+            targets=(_UNSEEN,) * n,
+            reference=np.zeros(n, bool),
+            position=np.full((n, 3), np.nan),
         ),
         found,
     )

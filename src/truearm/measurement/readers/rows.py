@@ -40,6 +40,8 @@ class Configurations:
         Configuration of each row they were found in, ``(rows,)``.
     joints_are
         ``model``, or ``controller`` if it shows these joint positions.
+    before
+        Where the arm stops right before each, where a plan says so.
     """
 
     labels: tuple[str, ...]
@@ -47,6 +49,7 @@ class Configurations:
     kinds: tuple[str, ...]
     of_row: IntArray
     joints_are: JointsOf = "model"
+    before: Configurations | None = None
 
 
 def found_configurations(
@@ -190,6 +193,14 @@ def in_order(data: Dataset, order: IntArray | None = None) -> Dataset:
         approach=None if order is None else approach_of(data.joints, order),
         number=None if order is None else before_each(order),
     )
+
+
+def places_after_stops(count: int) -> IntArray:
+    """Return the places of configurations in an order in which a stop stands before each, ``(count,)``.
+
+    Who reads them sees that no joint came from the configuration before.
+    """
+    return np.arange(2, 2 * count + 1, 2)
 
 
 def before_each(order: IntArray) -> Array:

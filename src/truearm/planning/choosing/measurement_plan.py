@@ -59,7 +59,7 @@ class MeasurementPlan:
         Readings [rad or m], ``(n, joints)``.
     before
         Where each joint stops before, so that all come to a configuration moving forward and backlash cancels; as
-        far as the limits allow, those of the constraints too, ``(n, joints)``.
+        far as the limits allow, those of the constraints too, ``(n, joints)``; None where it does not stop there.
     indices
         O1 to O5 of the whole.
     candidates
@@ -90,7 +90,7 @@ class MeasurementPlan:
     labels: tuple[str, ...]
     chosen: NDArray[np.intp]
     joints: Array
-    before: Array
+    before: Array | None
     indices: Mapping[str, float]
     candidates: int
     rejected: Mapping[str, int]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,8 @@ class Artefact(Device):
         Typical distance of a target from the middle of the artefact [m]: what turns a deviation of places into one of
         angles.
     """
+
+    no_plan: ClassVar[str] = ""
 
     normals: tuple[tuple[float, float, float], ...] = ()
     within: float = np.deg2rad(60.0)

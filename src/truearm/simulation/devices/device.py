@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import ClassVar, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +67,13 @@ class Device(ABC):
         Standard deviation of a coordinate, distance or height that it reads [m].
     tool
         What it needs on the flange; None for whatever targets the robot has.
+    no_plan
+        Why it cannot go through a plan of configurations by itself, reading by reading; empty if it can.
     """
+
+    no_plan: ClassVar[str] = (
+        "the arm is jogged to what this device reads, so the joint positions come of measuring and not of a plan"
+    )
 
     name: str
     summary: str

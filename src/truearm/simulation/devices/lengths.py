@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,8 @@ class Strings(Device):
     placed
         How well these are known [m].
     """
+
+    no_plan: ClassVar[str] = "it reads four distances at once, and a plan is gone through by places and poses"
 
     side: float = 1.5
     placed: float = 2e-5

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -50,6 +50,8 @@ class PencilCircle(Device):
     centre
         Of all circles in the base frame [m]; the middle of the robot's reach if None.
     """
+
+    no_plan: ClassVar[str] = "its pages are scanned when all circles are drawn: it reads nothing where the arm stands"
 
     radius: float = 0.1
     slopes: tuple[float, ...] = (float(np.deg2rad(45.0)), float(np.deg2rad(25.0)), float(np.deg2rad(65.0)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ class Tracker(Device):
     at_least
         How many reflectors must be seen at a configuration for it to count.
     """
+
+    no_plan: ClassVar[str] = ""
 
     within: float = np.deg2rad(30.0)
     at_least: int = 1
@@ -57,6 +59,8 @@ class MeasurementArm(Device):
     reach
         How far it reaches [m].
     """
+
+    no_plan: ClassVar[str] = ""
 
     reach: float = 3.0
 

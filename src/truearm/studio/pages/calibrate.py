@@ -12,7 +12,7 @@ from truearm.identification.solving.models import FRAMES, MODELS
 from truearm.jobs.following import FitStep
 from truearm.studio import words
 from truearm.studio.fit_course import fit_course
-from truearm.studio.pages.check import data_of
+from truearm.studio.pages.check import choose_measurements, data_of
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pictures import Picture
 from truearm.studio.tasks import Outcome, calibrate
@@ -42,7 +42,7 @@ class CalibratePage:
         self._shown: tuple[int, bool] = (0, False)
         self._course = Picture(window, "Cost and error, step by step", 0.75)
         self._said = gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))
-        self._data.on_update(window.action(lambda: window.edit(data=chosen(self._data))))
+        self._data.on_update(window.action(lambda: choose_measurements(window, chosen(self._data))))
         self._model.on_update(window.action(lambda: window.edit(model=self._model.value)))
         self._train.on_update(window.settled(lambda: window.edit(train=_train(self._train.value))))
         self._seed.on_update(window.settled(lambda: window.edit(seed=_whole(self._seed.value, "seed"))))

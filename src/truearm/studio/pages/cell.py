@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 from truearm.errors import InputError
+from truearm.jobs.plan_notices import load_notices
 from truearm.jobs.show import show
 from truearm.library import library
+from truearm.modeling.parts import Payload
+from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.cell_rules import CellRules
 from truearm.studio.pages.cell_boxes import CellBoxes
@@ -61,7 +65,26 @@ class CellPage:
             self._about.content = words.paragraph(words.refusal(error))
 
     def _weigh(self) -> None:
-        self._window.edit(payload=self._payload.value.strip() or None)
+        """Take a payload that can be, and say where the arm cannot carry it, or hardly does."""
+        window, text = self._window, self._payload.value.strip() or None
+        payload = None if text is None else Payload.of(text, "payload")
+        changed = text != window.project.settings.payload
+        window.edit(payload=text)
+        if not changed or payload is None:
+            return
+        try:
+            robot = window.robot()
+        except InputError:
+            return  # what is known of the robot says so
+        for one in load_notices(robot):
+            window.tell(one)
+        away, length = math.hypot(*payload.cog), self._scene().length
+        if away > length:
+            text = (
+                f"The centre of the payload is {away * 1e3:.0f} mm from the flange, and {robot.name} is "
+                f"{length * 1e3:.0f} mm long: check the units."
+            )
+            window.tell(Notice("payload-far", text, "warning"))
 
     def _draw_boxes(self, rules: CellRules | None) -> None:
         self._scene().show_boxes({} if rules is None else rules.corners)

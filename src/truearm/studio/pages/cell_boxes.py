@@ -52,7 +52,7 @@ class CellBoxes:
             self._fields = Fields(window, self._lengths, self._set_length)
             self._fields.number("floor", "Floor [mm]", "base frame; below 0 it is kept clear on the ways, too")
             self._fields.number("clearance", "Clearance [mm]", "between middle lines of links, where one measures")
-            self._draws: Any = gui.add_checkbox("Draw the boxes", True)
+            self._draws: Any = gui.add_checkbox("Draw", True, hint="the boxes in the scene")
             self._said = gui.add_html("")
             self._add = gui.add_button("Add a box")
         self._file.on_update(window.action(lambda: window.edit(constraints=chosen(self._file))))
@@ -94,7 +94,9 @@ class CellBoxes:
             with folder:
                 called = gui.add_text("Name", name)
                 x, y, z = (
-                    gui.add_text(f"{axis} [mm]", "", hint="from..to in the base frame, nothing: without end")
+                    gui.add_text(
+                        f"{axis} [mm]", "", hint="from..to in the base frame; empty: without end on both sides"
+                    )
                     for axis in "xyz"
                 )
                 remove = gui.add_button("Remove the box")

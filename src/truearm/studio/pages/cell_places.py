@@ -16,6 +16,7 @@ from truearm.studio.cell_places import (
     THINGS,
     Thing,
     file_for_places,
+    free_name,
     numbers_of,
     placed_text,
     things_of,
@@ -112,7 +113,7 @@ class CellPlaces:
     def _added(self) -> None:
         kind, robot = self._add.value, self._robot()
         taken = {thing.name for thing in things_of(robot)}
-        name = next(f"{kind}_{k}" for k in range(1, len(taken) + 2) if f"{kind}_{k}" not in taken)
+        name = free_name(kind, taken)
         x, y, z = _FIRST
         place = {"target": (0.0, 0.0, 100.0), "plane": (0.0, 0.0, -100.0)}.get(kind, (x, y + _ASIDE * len(taken), z))
         self._write(with_thing(robot, Thing(name, kind, place)))

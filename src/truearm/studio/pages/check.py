@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -23,8 +24,8 @@ _ANY: Final = "(any reading)"
 _ALL: Final = "(all of them)"
 #: So many readings are offered at most.
 _LISTED: Final = 2000
-#: The file of excluded readings, where none is chosen.
-_FILE: Final = "excluded.csv"
+#: The file of excluded readings, where none is chosen and none is there; else it has a number.
+_FILE: Final = "excluded{}.csv"
 #: How other readings, chosen ones and excluded ones are drawn: name, colour, and size by the length of the arm.
 _DRAWN: Final = (
     ("readings", (150, 156, 166), 0.005),
@@ -68,7 +69,7 @@ class CheckPage:
             self._table = gui.add_html("")
             self._back: Any = gui.add_dropdown("Reading", (NONE,), visible=False)
             self._restore: Any = gui.add_button("Restore", visible=False)
-        self._data.on_update(window.action(lambda: window.edit(data=chosen(self._data))))
+        self._data.on_update(window.action(lambda: choose_measurements(window, chosen(self._data))))
         self._file.on_update(window.action(lambda: window.edit(exclude=chosen(self._file))))
         self._run.on_click(window.action(self._check))
         self._finding.on_update(window.action(self._choose))
@@ -193,20 +194,16 @@ class CheckPage:
         rows = [] if found is None else self._chosen(found)
         if found is None or not rows:
             raise InputError("no reading is chosen", parameter="Reading", cure="Choose one, or a finding.")
-        self._write(with_exclusions(self._excluded, [found.readings[k] for k in rows], self._reason.value))
+        self._write(with_exclusions(self._excluded, found.named(rows), self._reason.value))
 
     def _remove(self) -> None:
         kept = [one for one in self._excluded if _reading(one.configuration, one.target) != self._back.value]
         self._write(tuple(kept))
 
     def _write(self, excluded: tuple[Exclusion, ...]) -> None:
-        name = self._window.project.settings.exclude or _FILE
-        if self._window.project.settings.exclude is None and exists(self._window.project.path(name)):
-            raise InputError(
-                "a file of this name stands in the project, and is not overwritten",
-                where=name,
-                cure="Choose it as the file of excluded readings, or rename it.",
-            )
+        project = self._window.project
+        names = (_FILE.format(f"-{k}" if k > 1 else "") for k in count(1))
+        name = project.settings.exclude or next(one for one in names if not exists(project.path(one)))
         self._window.edit({name: exclusions_text(excluded)}, known={name: self._text}, exclude=name)
 
     def _show_excluded(self) -> None:
@@ -228,6 +225,26 @@ class CheckPage:
         stat = None if data is None or not exists(data) else data.stat()
         stamp = stat and (stat.st_size, stat.st_mtime_ns)
         return settings.robot, (settings.data, stamp), self._excluded
+
+
+def choose_measurements(window: Window, name: str | None) -> None:
+    """Choose measurements; what was excluded from other ones is no longer, for it is said of readings by their names.
+
+    Parameters
+    ----------
+    name
+        Of their file; None for none.
+    """
+    settings = window.project.settings
+    if settings.data in (None, name) or settings.exclude is None:
+        window.edit(data=name)
+        return
+    window.edit(data=name, exclude=None)
+    text = (
+        f"{settings.exclude} excludes readings of {settings.data}. Other measurements are chosen, so nothing is "
+        "excluded now. Undo brings both back; if its readings are among these too, choose it again on the page Check."
+    )
+    window.tell(Notice("nothing-excluded", text, "warning"))
 
 
 def data_of(window: Window) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 from truearm.errors import InputError
 from truearm.files import exists
+from truearm.studio import words
 from truearm.studio.arrows import FACTORS, error_arrows
 from truearm.studio.error_vectors import ErrorVectors, error_vectors
 from truearm.studio.pages.check import data_of
@@ -29,6 +30,7 @@ class ErrorArrows:
             self._draw = gui.add_button("Draw the errors")
             self._factor: Any = gui.add_number("Magnified by", 200.0, min=FACTORS[0], max=FACTORS[1], step=1.0)
             self._share: Any = gui.add_slider("Before (0) to after (1)", 0.0, 1.0, 0.05, 1.0)
+            self._said = gui.add_html("", visible=False)
             self._hide = gui.add_button("Take them away")
         self._draw.on_click(window.action(self._find))
         self._factor.on_update(window.action(self._show))
@@ -58,6 +60,7 @@ class ErrorArrows:
             result=settings.result,
             train=settings.train,
             seed=settings.seed or None,
+            loss=settings.loss,
             payload=settings.payload,
             exclude=settings.exclude,
         )
@@ -72,6 +75,7 @@ class ErrorArrows:
             errors = self._vectors.between(float(self._share.value))
             arrows = error_arrows(self._vectors.points, errors, float(self._factor.value))
             self._scene().show_arrows(_NAME, arrows)
+            self._said.content = words.paragraph(f"In the scene: {arrows.words}.")
 
     def _clear(self) -> None:
         self._vectors = None
@@ -81,6 +85,7 @@ class ErrorArrows:
     def _enable(self) -> None:
         for element in (self._factor, self._share, self._hide):
             element.disabled = self._vectors is None
+        self._said.visible = self._vectors is not None
 
     def _scene(self) -> Scene:
         return next(page.scene for page in self._window.pages if isinstance(page, JogPage))

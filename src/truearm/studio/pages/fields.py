@@ -43,7 +43,8 @@ class Fields:
             value = as_number(text)
             if (text or not optional) and (value is None or (whole and value != round(value))):
                 kind = "a whole number" if whole else "a number"
-                raise InputError(f"{kind} belongs here", parameter=name, came=text)
+                cure = "Write a decimal point, and no separators." if "," in text else None
+                raise InputError(f"{kind} belongs here", parameter=name, came=text, cure=cure)
             self._change(name, int(value) if whole and value is not None else value)
 
         element.on_update(self._window.settled(typed))

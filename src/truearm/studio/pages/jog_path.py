@@ -71,7 +71,7 @@ class JogPath:
                 "From here", ("start", "line", "circle", "waypoint"), hint="where the tip is now; a circle takes two"
             )
             self._do: Any = gui.add_button_group("Path", ("play", "stop", "remove last"))
-            self._draws: Any = gui.add_checkbox("Draw the path", True)
+            self._draws: Any = gui.add_checkbox("Draw", True, hint="the path in the scene")
             self._said = gui.add_html(words.paragraph(_NONE))
         self._file.on_update(window.settled(lambda: window.edit(path=self._file.value.strip() or None)))
         self._speed.on_update(window.settled(self._other_speed))

@@ -14,6 +14,7 @@ from truearm.results.measured import DATA, PAGE
 from truearm.studio import words
 from truearm.studio.measure_fields import SOURCES
 from truearm.studio.measuring import HEAD, Measuring
+from truearm.studio.pages.check import choose_measurements
 from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.fields import Fields
 from truearm.studio.pages.measured_with import MeasuredWith
@@ -90,7 +91,7 @@ class MeasurePage:
             self._why: Any = gui.add_text("Why", "", hint="words for the log: the nest was not clean")
             self._act: Any = gui.add_button_group("Do", ("set the reading aside", "leave the point out"))
         self._notices = gui.add_html("")
-        self._drift = Picture(window, "How the nests moved")
+        self._drift = Picture(window, "How the nests moved (no reading is corrected for it)")
         self._quality = Picture(window, "How the readings were taken")
         self.scene = MeasuringScene(window)
         self._file: Any = gui.add_dropdown("File", (NONE,), visible=False)
@@ -110,6 +111,8 @@ class MeasurePage:
                 fields.number("seed", "Seed", "of all that is drawn", optional=False, whole=True)
                 fields.number("disturbed", "Disturbed", "share of readings that go wrong, up to 0.9")
                 fields.number("drift", "Drift [mm]", "how far the instrument moves till the end")
+                boxes = "whose boxes hide nests: of the page Cell, or a file"
+                fields.file("constraints", "Constraints", (".yaml", ".yml"), boxes)
         with self._of_source["watched folder"]:
             fields.text("watch", "Folder", "of the project, into which software writes rows: its name")
             fields.text("mapping", "Mapping", "what the columns mean: a file of the project, or a known program's name")
@@ -242,7 +245,7 @@ class MeasurePage:
             raise InputError(
                 "no reading of a target is kept, so there are no measurements", cure="Go on, or choose another plan."
             )
-        self._window.edit(data=measuring.data)
+        choose_measurements(self._window, measuring.data)
         self._window.tell(Notice("measured", _DONE, "note"))
         self._window.refresh()
 

@@ -82,7 +82,7 @@ class PlanPage:
             self._among: Any = gui.add_checkbox(
                 "All candidates", False, hint="where the flange is at those that are usable"
             )
-            self._line: Any = gui.add_checkbox("Ways that were driven", True)
+            self._line: Any = gui.add_checkbox("Driven ways", True)
             self._speed: Any = gui.add_number("Speed [deg/s, mm/s]", 60.0, min=0.1, max=1000.0, step=1.0)
             self._tour: Any = gui.add_button_group("Ways", ("drive", "stop"))
         self._run.on_click(window.action(self._plan))

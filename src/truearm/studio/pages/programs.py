@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from glob import escape
+from pathlib import Path
 from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
 from truearm.files import exists
+from truearm.manifest import MANIFEST
 from truearm.modeling.formats.controller_entry import STATED
+from truearm.notices import Notice
+from truearm.results.calibration import RESULT_FILES
 from truearm.results.program_correction import REPORT
 from truearm.studio import words
+from truearm.studio.corrected import Corrected, corrected_now, kinematics_files
 from truearm.studio.drawn_program import DrawnProgram, corrected_program, read_program
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.program_in_space import ProgramInSpace
@@ -16,8 +23,14 @@ from truearm.studio.window import Window
 
 #: What stands in a list where nothing was said.
 _UNSAID: Final = "(not said)"
+#: Settings that count for the drawing of a program, and for its correction.
+_DRAWN: Final = ("robot", "program")
+_CORRECTED: Final = (*_DRAWN, "result", "corrected", "cell", "taught", "controller_kinematics")
 #: What was taught at the robot, as the job takes it.
-_TAUGHT: Final = ("none", "tools", "frames", "tools, frames")
+_TAUGHT: Final = (
+    *("none", "points", "tools", "frames"),
+    *("points, tools", "points, frames", "tools, frames", "points, tools, frames"),
+)
 
 
 class ProgramsPage:
@@ -32,12 +45,15 @@ class ProgramsPage:
         self._cell = gui.add_dropdown("Tools and frames", (NONE,), hint="a file of the schema truearm-cell/1")
         self._taught = gui.add_dropdown("Taught", (_UNSAID, *_TAUGHT), hint="what was taught at the robot itself")
         self._kinematics = gui.add_dropdown(
-            "Controller has", (_UNSAID, *STATED), hint="with what the controller turns poses into joint positions"
+            "Controller has", (_UNSAID, *STATED), hint="with what it turns poses into joint positions; or a file"
         )
         self._read = gui.add_button("Draw the program")
         self._run = gui.add_button("Correct the program")
         self._space = ProgramInSpace(window)
-        self._of: tuple[Any, ...] = ()
+        self._of = self._told_of = _Of()
+        self._corrected: Corrected | None = None
+        self._corrected_at: tuple[Any, ...] = ()
+        self._stands = gui.add_html("")
         self._downloads = gui.add_button_group("Download", ("corrected program", "report"), visible=False)
         self._said = gui.add_html("")
         self._program.on_update(window.action(lambda: window.edit(program=chosen(self._program))))
@@ -54,21 +70,27 @@ class ProgramsPage:
         """Offer the files of the folder, and show the settings."""
         from truearm.compensation.programs import LANGUAGES
 
-        project, settings = self._window.project, self._window.project.settings
+        window, project, settings = self._window, self._window.project, self._window.project.settings
         suffixes = tuple(suffix for language in LANGUAGES for suffix in language.suffixes)
         written = f"{settings.corrected}/"
         programs = [name for name in project.names(*suffixes) if not name.startswith(written)]
         offer(self._program, programs, settings.program)
         offer(self._cell, project.names(".yaml", ".yml"), settings.cell)
         offer(self._taught, _TAUGHT, None if settings.taught is None else ", ".join(settings.taught), _UNSAID)
-        offer(self._kinematics, STATED, settings.controller_kinematics, _UNSAID)
-        folder = project.file("corrected")
-        self._downloads.visible = folder is not None and exists(folder / REPORT)
-        if self._of and self._of != self._now():
-            self._of = ()
+        offer(self._kinematics, (*STATED, *kinematics_files(project)), settings.controller_kinematics, _UNSAID)
+        if self._told_of.differs(window):
+            self._said.content, self._told_of = "", _Of()
+        if self._of.differs(window):
+            self._of = _Of()
             self._space.take(None)
         else:
             self._space.show()
+        corrected = self._standing()
+        self._downloads.visible = corrected is not None and not corrected.changed
+        self._stands.content = ""
+        if corrected is not None and corrected.changed:
+            told = f"{corrected.told} It is not handed out: correct the program again."
+            self._stands.content = words.notices([Notice("other-program", told, "warning")])
 
     def _teach(self) -> None:
         said = chosen(self._taught, _UNSAID)
@@ -76,24 +98,32 @@ class ProgramsPage:
 
     def _show(self) -> None:
         window, settings = self._window, self._window.project.settings
+        of = _Of.now(window, _DRAWN)
         window.start(
             "Draw the program",
             read_program,
-            self._take,
+            lambda drawn: self._take(drawn, of),
             folder=window.project.folder,
             robot=settings.robot,
             program=self._chosen(),
         )
 
-    def _take(self, drawn: DrawnProgram) -> None:
-        self._of = self._now()
+    def _take(self, drawn: DrawnProgram, of: _Of) -> None:
+        """Draw a program, as it was when its drawing began."""
+        self._of = of
         self._space.take(drawn)
 
-    def _now(self) -> tuple[Any, ...]:
-        """Return what is drawn: of which robot and which program, as it is now."""
-        project, file = self._window.project, self._window.project.file("program")
-        stat = None if file is None or not exists(file) else file.stat()
-        return project.settings.robot, project.settings.program, stat and (stat.st_size, stat.st_mtime_ns)
+    def _standing(self) -> Corrected | None:
+        """Return the correction of the chosen program that stands in the folder, looked at anew where files changed."""
+        window, project = self._window, self._window.project
+        folder, program = project.file("corrected"), project.file("program")
+        written = () if folder is None or program is None else _stamps(folder / program.name)
+        beside = () if folder is None else (_stamp(folder / REPORT), _stamp(folder / MANIFEST))
+        at = (project.settings, _Of.now(window, _CORRECTED), written, beside)
+        if at != self._corrected_at:
+            self._corrected = corrected_now(project, lambda: (window.calibrated(), window.result_of_another()))
+            self._corrected_at = at
+        return self._corrected
 
     def _chosen(self) -> str:
         program = self._window.project.settings.program
@@ -103,7 +133,8 @@ class ProgramsPage:
 
     def _correct(self) -> None:
         window, settings = self._window, self._window.project.settings
-        program = self._chosen()
+        program, of = self._chosen(), _Of.now(window, _CORRECTED)
+        self._said.content, self._told_of = "", _Of()
         robot = f"{settings.result}/calibrated.yaml"
         if not exists(window.project.path(robot)):
             raise InputError("there is no calibrated robot yet", parameter="robot", cure="Calibrate first.")
@@ -111,7 +142,7 @@ class ProgramsPage:
         window.start(
             "Correct the program",
             corrected_program,
-            self._done,
+            lambda drawn: self._done(drawn, of),
             folder=window.project.folder,
             robot=robot,
             program=program,
@@ -121,17 +152,78 @@ class ProgramsPage:
             controller_kinematics=settings.controller_kinematics,
         )
 
-    def _done(self, drawn: DrawnProgram) -> None:
+    def _done(self, drawn: DrawnProgram, of: _Of) -> None:
         outcome = drawn.outcome
         assert outcome is not None
         written = f"Written to {self._window.project.settings.corrected}: {', '.join(outcome.files)}"
         self._said.content = words.lines([*outcome.lines, written])
-        self._take(drawn)
+        self._told_of = of
+        self._take(drawn, of)
 
     def _download(self) -> None:
-        project, settings = self._window.project, self._window.project.settings
-        folder = project.file("corrected")
-        if folder is None or settings.program is None:
-            return
-        name = REPORT if self._downloads.value == "report" else settings.program.rpartition("/")[2]
-        self._window.download(folder / name)
+        corrected = self._standing()
+        if corrected is None:
+            raise InputError("there is no corrected program yet", parameter="corrected", cure="Correct it first.")
+        corrected.refuse_other()
+        if self._downloads.value != "report":
+            self._window.download(corrected.program)
+        elif corrected.report is not None:
+            self._window.download(corrected.report)
+        else:
+            raise InputError(
+                "the report in this folder is of another correction",
+                parameter="corrected",
+                where=self._window.project.settings.corrected,
+                cure="Correct the program again.",
+            )
+
+
+@dataclass(frozen=True)
+class _Of:
+    """Of which settings and files something is shown: those it was made from, as they were when it was begun.
+
+    Attributes
+    ----------
+    named
+        The settings that count.
+    state
+        What they say, and the files that they name; None where nothing is shown.
+    """
+
+    named: tuple[str, ...] = ()
+    state: tuple[Any, ...] | None = None
+
+    @classmethod
+    def now(cls, window: Window, named: tuple[str, ...]) -> _Of:
+        """Return it as it is now."""
+        project = window.project
+        state: list[Any] = []
+        for name in named:
+            said = getattr(project.settings, name)
+            state.append(said)
+            if name == "result":
+                state += [_stamp(project.path(f"{said}/{file}")) for file in RESULT_FILES[:2]]
+            elif name == "program" and said is not None:
+                state += _stamps(project.path(said))
+            elif isinstance(said, str) and name != "corrected":
+                state.append(_stamp(project.path(said)))
+        return cls(named, tuple(state))
+
+    def differs(self, window: Window) -> bool:
+        """Return whether any of it is not as it was."""
+        return self.state is not None and self != _Of.now(window, self.named)
+
+
+def _stamps(program: Path) -> tuple[Any, ...]:
+    """Return the stamps of a program and of all files of its name: those that belong to it, and its record."""
+    beside = sorted(program.parent.glob(f"{escape(program.stem)}.*")) if exists(program.parent) else []
+    return tuple((path.name, _stamp(path)) for path in beside)
+
+
+def _stamp(path: Path) -> tuple[int, int] | None:
+    """Return size and time of the last change of a file; None if there is none."""
+    try:
+        known = path.stat()
+    except (OSError, ValueError):
+        return None
+    return known.st_size, known.st_mtime_ns

@@ -13,6 +13,7 @@ from truearm.measurement.excluded import read_exclusions
 from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES
 from truearm.studio import words
+from truearm.studio.made_with import MadeWith, made_with
 from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.error_arrows import ErrorArrows
 from truearm.studio.pictures import Picture, report_figures
@@ -47,21 +48,25 @@ class ProofPage:
         self._arrows.refresh()
         folder = project.file("result")
         if folder is None or not exists(folder / "result.json"):
-            self._table.content = words.paragraph("There is no result yet: calibrate first.")
+            self._table.content = words.paragraph(
+                f"There is no result yet in the folder {project.settings.result} of the project: calibrate first."
+            )
             self._notices.content, self._shown, self._figures = "", (), {}
             self._picture.visible = self._files.visible = self._drawn.place.visible = False
             return
         stat = (folder / "result.json").stat()
-        exclude = project.file("exclude")
-        rows = exclude.stat().st_mtime_ns if exclude is not None and exists(exclude) else None
         settings = project.settings
-        shown = (folder, stat.st_mtime_ns, stat.st_size, settings.robot, settings.data, rows, settings.dark)
+        robot = project.path(settings.robot.partition("#")[0])  # no file for a robot of the library
+        others = (folder / "calibrated.yaml", project.file("data"), project.file("exclude"), robot)
+        shown = (folder, stat.st_mtime_ns, stat.st_size, *map(_stamp, others), settings.dark, settings.robot)
+        shown += (settings.model, settings.train, settings.seed, settings.loss, settings.payload, settings.data)
         if shown == self._shown:
             return
         result = _read_result(folder / "result.json")
         try:
-            shown_figures = words.lines([f"Status: {result['status']}"]) + figures_table(result)
-            told = words.notices(self._told(result))
+            made = made_with(result, self._window.calibrated())
+            shown_figures = words.lines([f"Of {made.line()}.", f"Status: {result['status']}"]) + figures_table(result)
+            told = words.notices(self._told(result, made))
             told += words.lines(f"Next: {step['message']}" for step in result.get("next", ()))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise _no_result(folder / "result.json") from error
@@ -75,13 +80,19 @@ class ProofPage:
             self._draw()
         self._shown = shown
 
-    def _told(self, result: dict[str, Any]) -> list[Notice]:
-        """Return the notices of the result, and one if it is of other data than those that are chosen."""
+    def _told(self, result: dict[str, Any], made: MadeWith) -> list[Notice]:
+        """Return the notices of the result, and those that say what it is of, where something else is chosen now."""
         found = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
         other = self._window.result_of_another()
         if other:
-            text = f"This result is of the robot {other}, and {self._window.robot().name} is chosen: calibrate again."
+            name, source = self._window.robot().name, self._window.project.settings.robot
+            chosen_now = name if source == name else f"{name} ({source})"
+            text = f"This result is of the robot {other}, and {chosen_now} is chosen: calibrate again."
             found.append(Notice("other-robot", text, "warning"))
+        if differing := made.differing(self._window.project.settings, self._window.robot()):
+            was, is_now = ("; ".join(f"{name} {pair[i]}" for name, pair in differing.items()) for i in (0, 1))
+            text = f"This result was made with {was}. Chosen now: {is_now}. Calibrate again to see what that is worth."
+            found.append(Notice("other-settings", text, "warning"))
         data = self._window.project.file("data")
         if data is not None and exists(data):
             digest = hashlib.sha256(data.read_bytes()).hexdigest()[:12]
@@ -90,8 +101,8 @@ class ProofPage:
                 found.append(Notice("other-measurements", text, "warning"))
         exclude = self._window.project.file("exclude")
         chosen = read_exclusions(exclude) if exclude is not None and exists(exclude) else ()
-        now = [(one.configuration, one.target, one.reason) for one in chosen]
-        if now != [(one["configuration"], one["target"], one["reason"]) for one in result.get("excluded", ())]:
+        excluded = [(one.configuration, one.target, one.reason) for one in chosen]
+        if excluded != [(one["configuration"], one["target"], one["reason"]) for one in result.get("excluded", ())]:
             text = "This result is without other readings than those that are excluded now: calibrate again."
             found.append(Notice("other-measurements", text, "warning"))
         return found
@@ -132,6 +143,14 @@ def _read_result(path: Path) -> dict[str, Any]:
     if not isinstance(result, dict) or not str(result.get("truearm")).startswith("truearm-result/"):
         raise _no_result(path)
     return result
+
+
+def _stamp(file: Path | None) -> tuple[str, int, int] | None:
+    """Return what tells whether a file has changed."""
+    if file is None or not exists(file):
+        return None
+    stat = file.stat()
+    return str(file), stat.st_mtime_ns, stat.st_size
 
 
 def _no_result(path: Path) -> InputError:

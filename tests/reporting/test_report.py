@@ -25,7 +25,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, quaternion_from_rotation
 from truearm.notices import Notice
-from truearm.reporting.drawing import DARK
+from truearm.reporting.drawing import DARK, logarithmic_axis
 from truearm.reporting.numbers import deserved, significant, student_975
 from truearm.reporting.page import json_for_script
 from truearm.reporting.report import Report, report_html
@@ -370,6 +370,19 @@ def test_histograms_count_every_reading_in_the_same_bins() -> None:
         assert before["x"] == after["x"]
         assert before["width"] == after["width"]
         assert sum(before["y"]) == sum(after["y"]) == 36
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "ticks"),
+    [
+        (0.08, 0.3, [0.1, 0.2]),
+        (0.105, 0.16, [0.11, 0.12, 0.13, 0.14, 0.15, 0.16]),
+        (2.1, 4.9, [2.5, 3.0, 3.5, 4.0, 4.5]),
+        (1300.0, 1310.0, [1300.0, 1302.0, 1304.0, 1306.0, 1308.0, 1310.0]),
+    ],
+)
+def test_a_logarithmic_axis_has_ticks_however_narrow_it_is(low: float, high: float, ticks: list[float]) -> None:
+    assert [tick for tick in logarithmic_axis("error [mm]", low, high)["tickvals"] if low <= tick <= high] == ticks
 
 
 def test_exact_data_can_be_drawn() -> None:

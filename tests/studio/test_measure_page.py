@@ -170,7 +170,14 @@ def test_what_is_next_and_what_came_is_said_and_drawn(page: MeasurePage) -> None
     first = drawn.position[np.flatnonzero(drawn.kept)[0]]
     at = base.rotation.T @ (first - np.array(base.translation))
     assert parts["measured-kept"][0].points[0] == pytest.approx(at, abs=1e-5)
-    assert parts["measured-names"][0].text == "instrument"
+    named = parts["measured-names"][0]
+    assert named.text == "instrument"
+    above = base.rotation.T @ -np.array(base.translation) + [
+        0.0,
+        0.0,
+        0.22 * scene_of(page).length,
+    ]  # at it stands "world"
+    assert named.position == pytest.approx(above, abs=1e-5)
     act(page.scene._points, False)
     assert not parts["measured-kept"]
 

@@ -12,11 +12,11 @@ from websockets.http11 import Response
 _SCRIPT: Final = Path(__file__).with_name("without_webgl.js")
 _BEFORE: Final = b"<head>"
 #: The tabs of all pages stand in one row, a number beside a slider is shown whole, and the buttons of a picture come up
-#: below it, not over its legend.
+#: below its legend.
 _STYLE: Final = (
     b"<style>[role=tab] { padding-left: 6px !important; padding-right: 6px !important }"
     b" .mantine-Slider-root + .mantine-NumberInput-root { width: 4.2rem !important }"
-    b" .modebar-container { top: auto !important; bottom: 28px }</style>"
+    b" .modebar-container { top: 48px !important }</style>"
 )
 
 

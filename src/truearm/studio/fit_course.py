@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -44,8 +45,10 @@ def fit_course(steps: Sequence[FitStep]) -> dict[str, Any]:
 
 def _above(title: str, values: Sequence[float], share: list[float]) -> dict[str, Any]:
     """Return the logarithmic axis of some values, on a share of the height."""
+    low, high = min(values) / _ROOM, max(values) * _ROOM
     return {
-        **logarithmic_axis("", min(values) / _ROOM, max(values) * _ROOM),
+        **logarithmic_axis("", low, high),
+        "range": [math.log10(low), math.log10(high)],
         "title": {"text": title},
         "domain": share,
     }

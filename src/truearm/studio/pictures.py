@@ -15,6 +15,11 @@ _FIGURES: Final = re.compile(r'<script type="application/json" id="figures">(.*?
 #: Where more panels than that stand side by side, letters are so small [px].
 _WIDE: Final = 3
 _SMALL: Final = 8
+#: What comes up over a picture: below each other at its edge, and no more than saving it, zooming and going back.
+_BUTTONS: Final = {
+    "orientation": "v",
+    "remove": ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "toggleSpikelines"],
+}
 
 
 class Picture:
@@ -40,7 +45,7 @@ class Picture:
         if self._window.project.settings.dark:
             drawn = _recoloured(drawn, DARK)
         layout = {name: value for name, value in drawn["layout"].items() if name not in ("width", "height")}
-        layout = _narrow(layout)
+        layout = {**_narrow(layout), "modebar": _BUTTONS}
         figure = go.Figure(data=drawn["data"], layout=layout, skip_invalid=True)
         self.place.visible = True
         if self._plot is None:

@@ -191,6 +191,9 @@ def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyP
     for part in ("nominal", "validation", "train"):
         assert " ".join(f"{result[part]['position_mm'][k]:.3f}" for k in ("mean", "rms", "p95", "max")) in said
     assert all(f"({one['code']})" in said for one in result["warnings"])
+    buttons = person.page.locator(".modebar-btn").evaluate_all("all => all.map((one) => one.dataset.title)")
+    assert "Zoom" in buttons
+    assert not any("Share" in button for button in buttons)
     person.picture("proof")
     with person.page.expect_download() as came:
         person.press("report.html")

@@ -15,10 +15,11 @@ _FIGURES: Final = re.compile(r'<script type="application/json" id="figures">(.*?
 #: Where more panels than that stand side by side, letters are so small [px].
 _WIDE: Final = 3
 _SMALL: Final = 8
-#: What comes up over a picture: below each other at its edge, and no more than saving it, zooming and going back.
+#: What comes up over a picture: below each other at its edge, and no more than saving it, zooming and going back. Of
+#: itself Plotly offers to send the measurements to a server of its maker.
 _BUTTONS: Final = {
     "orientation": "v",
-    "remove": ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "toggleSpikelines"],
+    "remove": ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "toggleSpikelines", "sendChartToCloud"],
 }
 
 

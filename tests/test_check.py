@@ -228,7 +228,7 @@ def test_the_mistaken_reference_readings_are_named(with_references: Dataset) -> 
     assert set(notices) == {"missing", "target-mistaken"}
     for label, is_target in ((22, 3), (51, 3), (136, 2), (400, 2)):
         assert f"{label}/base_3 (is target {is_target})" in notices["target-mistaken"]
-    assert "base_2 1, base_3 8" in notices["missing"]
+    assert "1 of target base_2, 8 of target base_3" in notices["missing"]
 
 
 def test_removing_the_motion_of_the_table_does_not_worsen_the_result(with_references: Dataset) -> None:

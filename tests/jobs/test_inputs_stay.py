@@ -127,7 +127,13 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "poses": EXAMPLES["load_data"](folder)["data"],
         "device": None,
     },
-    "measure": lambda folder: {"robot": _robot(folder), "truth": EXAMPLES["validate"](folder)["robot"]},
+    "measure": lambda folder: {
+        "robot": _robot(folder),
+        "truth": EXAMPLES["validate"](folder)["robot"],
+        "constraints": _written(
+            folder / "c.yaml", f"truearm: truearm-constraints/1\n{_UNITS}limits: {{1: [-99, 99]}}\n"
+        ),
+    },
     "iso9283_plan": lambda folder: {
         "robot": _robot(folder),
         "slow_run": _written(folder / "slow.yaml", "{}"),

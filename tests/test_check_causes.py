@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.far_off import too_few_numbers
+from truearm.identification.judging.few_readings import check_few_to_doubt
 from truearm.identification.solving.fit import Status, identify
 from truearm.identification.solving.models import named_model
 from truearm.jobs.calibrate import calibrate
@@ -267,10 +267,11 @@ def test_a_reading_far_off_is_blamed_once_and_no_good_one_with_it() -> None:
 
 def test_nothing_is_doubted_where_numbers_are_few() -> None:
     few = campaign("fr3", 5, 0.05e-3, 8)[1]
-    assert too_few_numbers(identify(load_robot("fr3"), few, named_model("geometric"), loss="cauchy"), few)
+    assert check_few_to_doubt(identify(load_robot("fr3"), few, named_model("geometric"), loss="cauchy"), few)
     position = few.position.copy()
     position[4] += np.array([0.0, 2e-3, 0.0])
-    assert not check("fr3", one_target_of(replace(few, position=position))).warnings
+    (notice,) = check("fr3", one_target_of(replace(few, position=position))).warnings
+    assert notice.code == "few-readings"
 
 
 def renamed(data: Dataset, readings: list[int], name: str) -> Dataset:

@@ -34,8 +34,6 @@ _OFTEN_SHARE: Final = 0.05
 _MOST_LOOKED_AT: Final = 50
 #: Another unit explains readings that it brings so many times nearer: a target on the axis of a joint hardly moves.
 _LEAST_IMPROVEMENT: Final = 10.0
-#: Nothing is doubted with fewer numbers for each free parameter.
-_LEAST_NUMBERS: Final = 1.5
 #: Distances tell that readings hang together where some are so many times as long as a reading may be off.
 _LONG: Final = 3.0
 
@@ -190,16 +188,6 @@ def _joints_mistaken(data: Dataset, others: dict[int, int], unlike: dict[int, fl
         )
     at = tuple((data.labels[c], "") for c in (*others, *unlike))
     return [Notice("joints-mistaken", " ".join(found), at=at)] if found else []
-
-
-def too_few_numbers(fit: Fit, data: Dataset) -> bool:
-    """Return whether the readings are hardly more numbers than a fit has free parameters.
-
-    It may then leave a good reading far off: others that are as good agree without it.
-    """
-    numbers = 3 * int(data.has_position.sum()) + 3 * int(data.has_orientation.sum())
-    numbers += sum(int(np.isfinite(lengths).sum()) for lengths in (data.distance, data.height) if lengths is not None)
-    return numbers < _LEAST_NUMBERS * len(fit.free.names)
 
 
 def allowed_off(off: Array) -> float:

@@ -12,6 +12,7 @@ from truearm.identification.judging.changes import notices_of_change
 from truearm.identification.judging.curve_range import check_curves
 from truearm.identification.judging.curves_of_loads import check_curves_of_loads
 from truearm.identification.judging.expected_error import ExpectedError, as_residuals_allow, expected_error
+from truearm.identification.judging.few_readings import FEW_READINGS, check_few_readings
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.large_remainder import check_remainder
 from truearm.identification.judging.left_over import LeftOver
@@ -87,7 +88,8 @@ def judge(
         Of the fit.
     """
     # What the robust fit of the check could not explain, the fit itself may.
-    noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
+    # How many readings it is made from, it knows itself.
+    noticed = tuple(n for n in noticed if n.code not in (Status.IMPLAUSIBLE.value, FEW_READINGS))
     left_over = LeftOver.of(fit, data)
     off = off_configurations(left_over)
     moved_then = what_moved(left_over, off)
@@ -122,6 +124,7 @@ def judge(
         *wrong_robot,
         *of_split,
         *check_payload(fit.start),
+        *check_few_readings(fit),
         *(n for n in check_fit(fit, expected, doubted=doubted) if not bent or n.code != "residuals-exceed-sigma"),
         *narrow,
         *(notice for notice in noticed if notice.level != "error"),

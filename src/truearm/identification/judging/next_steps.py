@@ -17,6 +17,7 @@ import numpy as np
 from truearm.identification.judging.changes import LEAST_ARRIVALS, Change, find_change
 from truearm.identification.judging.curve_range import about_curves, has_curves
 from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.judging.few_readings import CURE, FEW_READINGS
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import (
     expected_where_measured,
@@ -61,7 +62,10 @@ _FAR_MORE: Final = 2.0
 _NAMED: Final = 3
 #: Errors that steps of their own are about.
 _OWN_STEP: Final = frozenset(
-    {"instrument-moved", "target-moved", "joint-zero-jumped", "narrow-data", "rank-loss", "not-converged"}
+    {
+        *("instrument-moved", "target-moved", "joint-zero-jumped"),
+        *("narrow-data", "rank-loss", "not-converged", FEW_READINGS),
+    }
 )
 #: Warnings whose cure comes before more configurations.
 _CURED_FIRST: Final = (
@@ -156,6 +160,9 @@ def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
     if judged.status is Status.RANK_LOSS:
         more = NextStep("measure-more", _where(judged, f"determine {listed(left.fit.unobservable)}"))
         return (more, *most_useful_first(steps))[:MOST]
+    if any(notice.code == FEW_READINGS for notice in judged.notices):
+        more = NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters take up.")
+        return (more, *most_useful_first(step for step in steps if step.code != more.code))[:MOST]
     return most_useful_first(steps or [_end(left, judged.training.configurations)])
 
 

@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.judging.far_off import allowed_off, far_off, often_off, too_few_numbers
+from truearm.identification.judging.far_off import allowed_off, far_off, often_off
+from truearm.identification.judging.few_readings import check_few_to_doubt
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.joint_rounding import check_rounding
 from truearm.identification.judging.orientation_slips import ORIENTATION_SLIPS
@@ -109,10 +110,10 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
     unlike_robot = check_plausible(fit, data, wrong)
     if unlike_robot:
         return Comparison([*unlike_robot, *wrong, *found])
-    doubted: list[Notice] = []
+    doubted = check_few_to_doubt(fit, data)
     suspects: list[Suspect] = []
     turned = np.zeros(len(off), dtype=bool)
-    if not too_few_numbers(fit, data):
+    if not doubted:
         turned = orientations_off(errors)
         alone = turned & ~(np.nan_to_num(off) > allowed_off(off))
         mistaken, suspects = far_off(fit, data, off, turned)
@@ -186,8 +187,9 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
 
 def _far_from_fixtures(fit: Fit, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
     """Doubt readings against fixtures that a robust geometric fit leaves far off, and what is said of fixtures."""
-    if too_few_numbers(fit, data):
-        return _unlike_its_readings(fit, data), []
+    few = check_few_to_doubt(fit, data)
+    if few:
+        return [*_unlike_its_readings(fit, data), *few], []
     errors = errors_of(fit.robot, data)
     off = off_by(errors)
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed_off(off)).tolist()

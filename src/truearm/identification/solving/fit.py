@@ -28,12 +28,14 @@ from truearm.identification.solving.redundancy import (
 from truearm.identification.solving.rounds import (
     Redundant,
     Solved,
+    assumed_noise,
     bound_by,
     evaluated,
     excess_of,
     factors_of,
     find_parameters,
     in_the_middle,
+    informed_rows,
     noise_found,
 )
 from truearm.identification.solving.solver import SMALL, Solution
@@ -128,6 +130,14 @@ class Fit:
     weight
         What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
         For sums of absolute values, which have no full weight, relative to the median reading.
+    numbers
+        Of the readings it was made from, and of what is known of fixtures.
+    spent
+        How many of them the parameters took up.
+    assumed
+        The observations whose standard deviation was neither declared nor told by the readings.
+    loss
+        Of the readings.
     steps
         Steps of the solver, over all stages.
     held
@@ -157,6 +167,10 @@ class Fit:
     joint_freedom: Array
     scattered: bool
     weight: Array
+    numbers: int
+    spent: float
+    assumed: tuple[str, ...]
+    loss: Loss
     steps: int
     held: Held = NOTHING_HELD
     bootstrap: int = 0
@@ -377,6 +391,10 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         joint_freedom=joint_freedom,
         scattered=scattered,
         weight=weight,
+        numbers=problem.rows,
+        spent=informed_rows(problem, solution),
+        assumed=assumed_noise(problem),
+        loss=loss,
         steps=solution.steps,
         held=solved.held,
         bootstrap=0 if draws is None else len(draws),

@@ -18,7 +18,7 @@ from truearm.identification.solving.arrivals import Arrivals, WhitenedProblem, W
 from truearm.identification.solving.bounds import Bounds, bound_vectors
 from truearm.identification.solving.curves import NO_CURVES, Curves, with_stiffness
 from truearm.identification.solving.likelihood import Linearised
-from truearm.identification.solving.losses import Loss, meets_exactly, norms_of, scale_of, weighed_together
+from truearm.identification.solving.losses import Loss, norms_of, scale_of, weighed_together
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Evaluation, Problem, check_circumstances, check_solvable
 from truearm.identification.solving.redundancy import Redundancy, find_redundancies
@@ -43,8 +43,11 @@ Redundant = Literal["prior", "drop", "none"]
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
 _FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
 _NOISE_FLOOR: Final = 1e-9
-#: Share of the equations that parameters may use up, for what a sum of absolute numbers leaves to tell the noise.
+#: Share of the equations that parameters may use up, for what a robust loss leaves to tell the noise.
 _LARGEST_SHARE_SPENT: Final = 0.8
+#: Numbers that parameters must leave for a least-squares fit to tell the noise: with fewer, no noise at all and
+#: parameters that meet every reading are as likely as any.
+_FEWEST_LEFT: Final = 2.0
 _LEAST_WIDENED: Final = 1e-12
 #: What the variances of readings with declared deviations are counted under.
 DECLARED: Final = "declared"
@@ -63,7 +66,8 @@ class Solved:
     start
         The robot before: frames in closed form, nominal parameters.
     problem
-        The problem of the last round, at whose deviations and loads the solution is one.
+        The problem of the last round, at whose deviations and loads the solution is one. Deviations that neither the
+        file declares nor the readings tell are those that are assumed at first.
     solution
         Its solution, with the steps of all rounds.
     redundancies
@@ -244,8 +248,46 @@ def _solve_with_noise(
     Deviations are estimated where they are not declared. Declared ones are widened where the residuals are larger than
     they, and errors of the joints that an arrival's readings share, allow: believed to the letter, readings that the
     model cannot follow would overrule every prior, for the sake of directions that they hardly observe. Curves of the
-    joints join in when the first solution has told how stiff they are.
+    joints join in when the first solution has told how stiff they are. Where the readings turn out not to tell a
+    deviation, all is solved once more with it as it was declared, or assumed.
     """
+    untold: frozenset[str] = frozenset()
+    while True:
+        found = _solve_in_rounds(problem, loss, limits, small, shared=shared, joints=joints, untold=untold)
+        more = _untold(found[1], found[2]) - untold
+        if not more:
+            return found
+        untold |= more
+
+
+def _untold(problem: Problem, found: Components | None) -> frozenset[str]:
+    """Return what estimated variances are counted under that the readings do not tell.
+
+    Of declared deviations it is no estimate that would make them smaller.
+    """
+    if found is None:
+        return frozenset()
+    names, _ = factors_of(problem)
+    told = [
+        problem.widened**2 * factor >= 1.0 if name == DECLARED else freedom >= _FEWEST_LEFT
+        for name, factor, freedom in zip(names, found.weighing.factors.tolist(), found.freedom.tolist(), strict=True)
+    ]
+    return frozenset(
+        name for name, estimated, is_told in zip(names, found.estimated, told, strict=True) if estimated and not is_told
+    )
+
+
+def _solve_in_rounds(
+    problem: Problem,
+    loss: Loss,
+    limits: tuple[Array, Array] | None,
+    small: float,
+    *,
+    shared: bool,
+    joints: Array | None,
+    untold: frozenset[str],
+) -> tuple[Solution, Problem, Components | None, Curves]:
+    """Solve in rounds, with the deviations of what is `untold` as they are."""
     every, within = problem, limits
     curves = Curves.none_of(problem)
     if curves:
@@ -257,7 +299,7 @@ def _solve_with_noise(
     components = None
     for _ in range(_ROUNDS + (curves.rounds if curves else 0)):
         if loss == "linear" and shared:
-            components = components_found(problem, solution, limits, components)
+            components = components_found(problem, solution, limits, components, untold)
             there, change, joints = _with_components(problem, components, joints)
         else:
             there, change = _with_scale(problem, solution, loss)
@@ -317,11 +359,16 @@ def evaluated(problem: Problem, solution: Solution) -> Evaluation:
 
 
 def components_found(
-    problem: Problem, solution: Solution, limits: tuple[Array, Array] | None, before: Components | None = None
+    problem: Problem,
+    solution: Solution,
+    limits: tuple[Array, Array] | None,
+    before: Components | None = None,
+    untold: frozenset[str] = frozenset(),
 ) -> Components:
     """Estimate the variances of readings and joints at a solution, those of :func:`factors_of` and of joints alike.
 
-    Declared deviations are widened if residuals are larger than chance allows (1 in 1000), or were before.
+    Declared deviations are widened if residuals are larger than chance allows (1 in 1000), or were before. Variances
+    that are `untold` stay as they are.
     """
     names, of_row = factors_of(problem)
     uncertain = ~bound_by(solution, problem.free, limits)
@@ -341,7 +388,7 @@ def components_found(
     )
     kinds = np.array([joint.kind for joint in problem.robot.joints])
     alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
-    free = [name not in (DECLARED, SETUP) for name in names]
+    free = [name not in (DECLARED, SETUP, *untold) for name in names]
     least = np.array(
         [(_NOISE_FLOOR / problem.noise[n]) ** 2 if f else _LEAST_WIDENED for f, n in zip(free, names, strict=True)]
     )
@@ -349,7 +396,7 @@ def components_found(
         found = variance_components(at, before.estimated, least, alike, before)
     else:
         found = variance_components(at, free, least, alike)
-        if DECLARED in names:
+        if DECLARED in names and DECLARED not in untold:
             place = names.index(DECLARED)
             if beyond_chance(float(found.squares[place]), max(float(found.freedom[place]), 1e-3)):
                 free[place] = True
@@ -429,7 +476,7 @@ def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, t
     components = weighed_together(loss, problem.components)
     of_norms = kinds[np.cumsum(components) - 1]
     norms = norms_of(solution.residual, components)
-    spent = _informed_rows(problem, solution)
+    spent = informed_rows(problem, solution)
     found = {}
     for name in dict.fromkeys(kinds.tolist()):
         if name == SETUP:
@@ -441,13 +488,19 @@ def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, t
         else:
             of_name = of_norms == name
             scale = scale_of(loss, norms[of_name], components[of_name], spent * float(of_name.mean()))
-            if meets_exactly(loss, components) and spent > _LARGEST_SHARE_SPENT * problem.rows:
+            if spent > _LARGEST_SHARE_SPENT * problem.rows:
                 scale = max(scale, 1.0)  # nearly all are met whatever the noise: it stays as it was assumed
             found[name] = (scale, freedom)
     return found
 
 
-def _informed_rows(problem: Problem, solution: Solution) -> float:
+def assumed_noise(problem: Problem) -> tuple[str, ...]:
+    """Return the observations whose deviation is neither declared nor told by the readings: it is as assumed."""
+    undeclared = dict.fromkeys(problem.kind(b) for b in problem.blocks if not b.declared)
+    return tuple(name for name in undeclared if problem.noise[name] == _FIRST_NOISE[name])
+
+
+def informed_rows(problem: Problem, solution: Solution) -> float:
     """Return how many parameters' worth of residual the fit used up."""
     prior = problem.free.prior
     if not problem.priors:

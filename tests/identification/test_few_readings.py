@@ -1,0 +1,96 @@
+"""Readings that are hardly more numbers than parameters: what they cannot tell is assumed, and said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.identification.judging.few_readings import FEW_READINGS, check_few_readings
+from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.losses import Loss
+from truearm.identification.solving.models import named_model
+from truearm.identification.solving.problem import Problem
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.check import check
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+
+NOISE = 0.02e-3
+
+
+def in_turn(poses: int, seed: int, *, declared: bool) -> Dataset:
+    """Return a campaign that reads one of three targets at each configuration."""
+    data = campaign("ur5e", poses, NOISE, seed)[1]
+    position = np.where((data.configuration % 3 == data.target)[:, None], data.position, np.nan)
+    return replace(data, position=position, sigma=data.sigma if declared else None)
+
+
+def fitted(data: Dataset, loss: Loss = "linear") -> Fit:
+    return identify(load_robot("ur5e"), data, named_model("geometric"), loss=loss)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5])
+def test_a_fit_that_leaves_nothing_is_not_taken_for_one_without_noise(seed: int) -> None:
+    """33 numbers for 41 parameters: the expected error was a ten thousandth of the true one, and the advice to stop."""
+    twin = campaign("ur5e", 16, NOISE, seed)[0]
+    found = calibrate("ur5e", in_turn(16, seed, declared=False), seed=seed)
+    q = load_robot("ur5e").random_configurations(100, np.random.default_rng(1))
+    apart = [found.robot.world_poses(q, name)[0] - twin.robot.world_poses(q, name)[0] for name in ("1", "2", "3")]
+    true = float(np.linalg.norm(apart, axis=2).mean())
+    assert found.expected.overall.interval_90[1] > true
+    assert found.expected.overall.mean > 0.1e-3
+    (notice,) = [n for n in found.warnings if n.code == FEW_READINGS]
+    assert notice.level == "warning"
+    assert "The training readings are 33 numbers. The 41 parameters take up 3" in notice.message
+    assert "no deviation is declared: it is assumed, 0.1 mm (position)" in notice.message
+    assert found.next[0].code == "measure-more"
+    assert "read more targets" in found.next[0].message
+    assert not {"stop", "unexplained"} & {step.code for step in found.next}
+
+
+def test_declared_deviations_are_never_made_smaller_by_what_is_left() -> None:
+    """The covariance is that of the readings as declared, (J' J + K)^-1 with J whitened and K of the priors."""
+    data = in_turn(9, 1, declared=True)
+    fit = fitted(data)
+    problem = Problem(fit.robot, data, fit.free, {})
+    J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))[1]
+    expected = np.linalg.inv(J.T @ J + np.diag(fit.free.prior**-2.0))
+    np.testing.assert_allclose(np.diag(fit.covariance), np.diag(expected), rtol=1e-3)
+    (notice,) = check_few_readings(fit)
+    assert "27 numbers" in notice.message
+    assert "assumed" not in notice.message
+    assert "sigma" not in notice.message
+
+
+def test_noise_from_few_numbers_is_said_to_be_uncertain() -> None:
+    (notice,) = check_few_readings(fitted(in_turn(13, 0, declared=False)))
+    assert "so 6.1 are left to judge the fit by" in notice.message
+    assert "The noise may be 1.9 times as large as is estimated" in notice.message
+    assert "column sigma" in notice.message
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy", "l1", "l1-components"])
+def test_other_losses_say_nothing_of_so_few(loss: Loss) -> None:
+    fit = fitted(in_turn(11, 0, declared=False), loss)
+    assert fit.sigma["position"] >= 0.99e-4
+    (notice,) = check_few_readings(fit)
+    assert notice.level == "error"
+    assert "Use the linear loss" in notice.message
+
+
+def test_readings_enough_are_no_notice() -> None:
+    data = replace(campaign("ur5e", 11, NOISE, 0)[1], sigma=None)
+    fit = fitted(data)
+    assert not check_few_readings(fit)
+    assert fit.numbers == 99
+    assert fit.spent == pytest.approx(33.0, abs=0.1)
+    assert not fit.assumed
+
+
+def test_a_check_counts_the_numbers() -> None:
+    (notice,) = check("ur5e", in_turn(16, 0, declared=False)).warnings[-1:]
+    assert notice.code == FEW_READINGS
+    assert "48 numbers, for 41 parameters of the geometric model" in notice.message

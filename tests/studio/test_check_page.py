@@ -135,9 +135,11 @@ def test_a_calibration_is_without_what_is_excluded_and_says_so(
     assert [step.number for step in calibrating._steps][:2] == [1, 2]
     assert calibrating._steps[-1].error < calibrating._steps[0].error
     assert calibrating._course.place.visible
-    assert "other readings than those that are excluded now" not in proof._notices.content
+    assert "other readings than those that are excluded now" not in proof._now.content
+    assert calibrating._now.content == ""
     act(page._restore)
-    assert "other readings than those that are excluded now" in proof._notices.content
+    assert "other readings than those that are excluded now" in proof._now.content
+    assert "(other-settings)" in calibrating._now.content
 
 
 def test_other_measurements_are_calibrated_without_what_was_excluded_from_the_first(window: Window) -> None:

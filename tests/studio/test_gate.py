@@ -24,6 +24,7 @@ from tests.studio.talking import (
     eventually,
     get,
     is_closed,
+    messages_of,
     own,
     send,
     shown,
@@ -236,6 +237,26 @@ def test_a_second_window_reads_until_it_takes_over(serving: Serving) -> None:
         send(first, type="GuiUpdateMessage", uuid=robot, updates={"value": "ur5"})
         send(second, type="GuiUpdateMessage", uuid=robot, updates={"value": "ur10"})
         assert eventually(lambda: studio.window.project.settings.robot == "ur10")
+
+
+def test_a_window_that_reads_shows_again_what_holds_and_bothers_nobody(serving: Serving) -> None:
+    """What was refused stayed in its fields, and looked true once the window had taken over."""
+    said: list[str] = []
+    studio = serving(say=said.append)
+    handle = studio.window.server.scene.add_transform_controls("/tip", position=(0.1, 0.2, 0.3))
+    payload = element(studio, "Payload")
+    with window(studio) as first, window(studio) as second:
+        working(studio, first)
+        send(second, **CAMERA)
+        assert eventually(lambda: len(studio.window._windows.banners) == 1)
+        send(second, type="GuiUpdateMessage", uuid=payload, updates={"value": "9kg,0,0,0"})
+        back = messages_of(second, "GuiUpdateMessage", lambda m: m["uuid"] == payload)[-1]
+        assert back["updates"] == {"value": ""}
+        moved = {"wxyz": [0.0, 1.0, 0.0, 0.0], "position": [1.0, 1.0, 1.0]}
+        send(second, type="TransformControlsUpdateMessage", name="/tip", owner="", **moved)
+        messages_of(second, "SetPositionMessage", lambda m: m["name"] == "/tip" and m["position"] == [0.1, 0.2, 0.3])
+    assert tuple(handle.position) == (0.1, 0.2, 0.3)
+    assert not said
 
 
 def test_the_same_refusal_is_said_once_in_a_second(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

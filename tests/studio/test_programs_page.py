@@ -86,9 +86,9 @@ def test_a_program_is_drawn_before_and_after_its_correction(
     act(page._run)
     assert "the result is of another robot than the one that is chosen; got &#x27;irb120&#x27;" in notices(window)
     (proof,) = (page for page in window.pages if isinstance(page, ProofPage))
-    assert "This result is of the robot irb120, and gp25 is chosen" in proof._notices.content
+    assert "This result is of the robot irb120, and gp25 is chosen" in proof._now.content
     window.edit(robot="irb120")
-    assert "This result is of the robot" not in proof._notices.content
+    assert "This result is of the robot" not in proof._now.content
     act(page._run)
     made = compensate(
         folder / "result/calibrated.yaml", [folder / "plate.mod"], taught=["none"], controller_kinematics="nominal"

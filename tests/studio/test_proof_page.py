@@ -63,29 +63,38 @@ def test_what_a_result_is_of_stands_on_the_page(window: Window) -> None:
         "Of irb120, data.csv (trained on 17 of 24 configurations, seed 0), model offsets, loss linear, payload none, "
         "no reading excluded."
     ) in proof._table.content
-    assert "other-" not in proof._notices.content
+    assert "other-" not in proof._now.content
+
+
+def test_a_robot_that_is_gone_does_not_make_the_result_none(window: Window) -> None:
+    file = window.project.folder / "truearm-studio.yaml"
+    file.write_text(file.read_text().replace("robot: arm.yaml", "robot: gone.yaml"))
+    assert "gone.yaml" in file.read_text()
+    window._reload()
+    assert "gone.yaml" in window._notices.content
+    assert "this is no result" not in window._notices.content
 
 
 def test_other_settings_than_those_of_the_result_are_told(window: Window) -> None:
     proof = proof_of(window)
     window.edit(model="elastic", payload="2kg,0mm,0mm,50mm")
-    assert "(other-settings)" in proof._notices.content
+    assert "(other-settings)" in proof._now.content
     assert "made with model offsets; payload none. Chosen now: model elastic; payload 2kg,0mm,0mm,50mm." in (
-        proof._notices.content
+        proof._now.content
     )
     assert "model offsets, loss linear, payload none" in proof._table.content
     window.edit(model="offsets", payload=None, train=17)
-    assert "other-settings" not in proof._notices.content
+    assert "other-settings" not in proof._now.content
     window.edit(train="all", seed=2, loss="huber")
     assert "made with training part 17; seed 0; loss linear. Chosen now: training part 24; seed 2; loss huber" in (
-        proof._notices.content
+        proof._now.content
     )
     window.edit(train=99, seed=0, loss="linear")
-    assert "Chosen now: training part 99." in proof._notices.content
+    assert "Chosen now: training part 99." in proof._now.content
     window.edit(train=None)
-    assert "other-settings" not in proof._notices.content
+    assert "other-settings" not in proof._now.content
     edit_the_robot(window, "masses:", "gravity: [0, 0, 9.81]\nmasses:")
-    assert "made with gravity 0,0,-9.80665. Chosen now: gravity 0,0,9.81." in proof._notices.content
+    assert "made with gravity 0,0,-9.80665. Chosen now: gravity 0,0,9.81." in proof._now.content
 
 
 def test_readings_that_were_excluded_and_the_payload_stand_in_the_line(window: Window) -> None:
@@ -104,7 +113,7 @@ def test_readings_that_were_excluded_and_the_payload_stand_in_the_line(window: W
     proof = proof_of(window)
     assert "trained on 24 of 24 configurations" in proof._table.content
     assert "payload 1.3kg,1mm,2mm,3.7mm, 1 reading excluded." in proof._table.content
-    assert "other-" not in proof._notices.content
+    assert "other-" not in proof._now.content
 
 
 def test_a_result_whose_history_is_written_otherwise_is_shown_with_what_it_says(window: Window) -> None:
@@ -114,7 +123,7 @@ def test_a_result_whose_history_is_written_otherwise_is_shown_with_what_it_says(
     proof = proof_of(window)
     assert "Of irb120, model offsets, payload none, no reading excluded." in proof._table.content
     window.edit(model="geometric", seed=3)
-    assert "made with model offsets. Chosen now: model geometric." in proof._notices.content
+    assert "made with model offsets. Chosen now: model geometric." in proof._now.content
 
 
 def test_an_edited_robot_of_the_same_name_is_another_robot(window: Window) -> None:
@@ -123,9 +132,9 @@ def test_an_edited_robot_of_the_same_name_is_another_robot(window: Window) -> No
     edit_the_robot(window, "a: 270.0", "a: 290.0")
     assert (
         "This result is of the robot irb120 with other kinematics, and irb120 (arm.yaml) is chosen"
-        in proof._notices.content
+        in proof._now.content
     )
-    assert "(other-robot)" in proof._notices.content
+    assert "(other-robot)" in proof._now.content
     (window.project.folder / "part.mod").write_text("MODULE m\nENDMODULE\n")
     window.edit(program="part.mod")
     act(programs._run)
@@ -133,7 +142,7 @@ def test_an_edited_robot_of_the_same_name_is_another_robot(window: Window) -> No
     act(proof._arrows._draw)
     assert "the result is of another robot than the one that is chosen" in below(window, proof._arrows._draw)
     edit_the_robot(window, "a: 290.0", "a: 270.0")
-    assert "other-robot" not in proof._notices.content
+    assert "other-robot" not in proof._now.content
 
 
 def test_errors_before_that_are_not_those_of_the_figures_are_not_drawn(
@@ -180,11 +189,11 @@ def test_a_robot_with_other_things_around_it_is_the_same_one(window: Window) -> 
     (window.project.folder / "irb120-cell.yaml").write_text(robot_text(robot))
     window.project.look()
     window.edit(robot="irb120-cell.yaml")
-    assert "other-" not in proof._notices.content
+    assert "other-" not in proof._now.content
     window.edit(robot="irb120")
-    assert "other-" not in proof._notices.content
+    assert "other-" not in proof._now.content
     window.edit(robot="result/calibrated.yaml")
-    assert "other-robot" not in proof._notices.content
+    assert "other-robot" not in proof._now.content
 
 
 def test_a_fit_is_of_the_robot_that_it_began_with(tmp_path: Path) -> None:

@@ -213,12 +213,15 @@ def test_so_many_files_come_at_once_and_those_that_have_stopped_make_room(
 def test_nothing_that_takes_no_file_is_sent_one_nor_is_one_taken_of_a_window_that_reads(serving: Serving) -> None:
     said: list[str] = []
     studio = serving(say=said.append)
+    blocked: list[str] = []
+    studio.window.gate.blocked = lambda _, why, message: blocked.append(why)
     with window(studio) as first, window(studio) as second:
         working(studio, first)
         upload(first, element(studio, "Robot"), "a.csv", b"x", 1)
         assert eventually(lambda: any("a file for nothing that takes files" in text for text in said))
         upload(second, element(studio, BUTTON), "b.csv", b"x", 1)
-        assert eventually(lambda: any("this window only reads" in text for text in said))
+        assert eventually(lambda: any("this window only reads" in text for text in blocked))
+    assert not any("only reads" in text for text in said)
     assert studio.window.project.names() == []
 
 

@@ -70,7 +70,8 @@ class Gate:
     say
         Called with every refusal in words; from the server's thread.
     blocked
-        Called with the connection of a window of which something was refused, and why; from the server's thread.
+        Called with the connection of a window of which something was refused, why, and the message, empty where it was
+        not read; from the server's thread.
     offers
         Elements that a window which only reads may use: those with which it takes over.
     fits
@@ -80,7 +81,7 @@ class Gate:
     access: Access
     uploads: Uploads
     say: Callable[[str], None] = lambda _: None
-    blocked: Callable[[ServerConnection, str], None] = lambda *_: None
+    blocked: Callable[[ServerConnection, str, Mapping[str, Any]], None] = lambda *_: None
     offers: set[str] = field(default_factory=set)
     fits: Callable[[str, object], bool] = lambda *_: True
     _working: ServerConnection | None = None
@@ -171,21 +172,23 @@ class Gate:
             checked(message, kind, closely=False)
             return True
         if kind not in _WORKING:
-            return self._block(connection, f"the message {_shown(str(kind))} is not taken from a window")
+            return self._block(connection, f"the message {_shown(str(kind))} is not taken from a window", {})
         if not self.is_working(connection) and message.get("uuid") not in self.offers:
             if kind in _FILES and not self.uploads.turned_away(connection, message):
                 return False  # a part of a file of which that was said
-            return self._block(connection, "this window only reads; take over to work in it")
+            checked(message, kind, closely=kind != "GuiUpdateMessage")
+            self.blocked(connection, "this window only reads; take over to work in it", message)  # no other's business
+            return False
         if kind == "GuiUpdateMessage" and (
             not isinstance(message.get("updates"), dict) or set(message["updates"]) != {"value"}
         ):
-            return self._block(connection, "an element was to be changed otherwise than by its value")
+            return self._block(connection, "an element was to be changed otherwise than by its value", {})
         checked(message, kind, closely=kind != "GuiUpdateMessage")
         if kind in _FILES:
             self._take(connection, message, kind)
             return False
         if kind == "GuiUpdateMessage" and not self.fits(message["uuid"], message["updates"]["value"]):
-            return self._block(connection, "an element was to have a value that it cannot have")
+            return self._block(connection, "an element was to have a value that it cannot have", message)
         return True
 
     def _take(self, connection: ServerConnection, message: Mapping[str, Any], kind: str) -> None:
@@ -193,11 +196,11 @@ class Gate:
         uploads = self.uploads
         why = (uploads.begins if kind == "FileTransferStartUpload" else uploads.goes_on)(connection, message)
         if why is not None:
-            self._block(connection, why)
+            self._block(connection, why, {})
 
-    def _block(self, connection: ServerConnection, why: str) -> bool:
+    def _block(self, connection: ServerConnection, why: str, message: Mapping[str, Any]) -> bool:
         self._tell(f"refused: {why}")
-        self.blocked(connection, why)
+        self.blocked(connection, why, message)
         return False
 
     def connection_class(self) -> type[ServerConnection]:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import viser
-from viser._messages import FileTransferPartAck, RemoveNotificationMessage
+from viser._messages import (
+    FileTransferPartAck,
+    GuiUpdateMessage,
+    Message,
+    RemoveNotificationMessage,
+    SetOrientationMessage,
+    SetPositionMessage,
+)
 from websockets.asyncio.server import ServerConnection
 
 from truearm.files import read_bytes
@@ -98,10 +105,23 @@ class Windows:
 
     # What the gate says to one window ----------------------------------------------------------------------------
 
-    def _say_blocked(self, connection: ServerConnection, why: str) -> None:
+    def _say_blocked(self, connection: ServerConnection, why: str, message: Mapping[str, Any]) -> None:
+        """Tell a window what was refused, and let the element that it changed show again what holds."""
         for client, mine in [*self._open.values()]:
             if mine is connection:
                 client.add_notification("Refused", why, color="orange", auto_close_seconds=10)
+                for back in self._as_they_are(message):
+                    client.gui._websock_interface.queue_message(back)
+
+    def _as_they_are(self, message: Mapping[str, Any]) -> Iterator[Message]:
+        """Go through the messages that undo in one window what a message to the server has changed there."""
+        element = self._server.gui._gui_input_handle_from_uuid.get(str(message.get("uuid")))
+        if element is not None and not element._impl.is_button:
+            yield GuiUpdateMessage(element._impl.uuid, {"value": element.value})
+        handle = self._server.scene._handle_from_node_name.get(str(message.get("name")))
+        if handle is not None:
+            yield SetPositionMessage(handle.name, tuple(handle.position.tolist()))
+            yield SetOrientationMessage(handle.name, tuple(handle.wxyz.tolist()))
 
     def _say_came(self, connection: object, number: str, element: str, upload: Upload | None) -> None:
         """Tell a window how much of its file has come; None lets it forget the file."""

@@ -6,10 +6,12 @@ import time
 from typing import Any, ClassVar, Final
 
 from truearm.errors import InputError
+from truearm.files import exists, read_text
 from truearm.identification.choosing.choice import AUTO
 from truearm.identification.solving.losses import LOSSES
 from truearm.identification.solving.models import FRAMES, MODELS
 from truearm.jobs.following import FitStep
+from truearm.notices import Notice
 from truearm.studio import words
 from truearm.studio.fit_course import fit_course
 from truearm.studio.pages.check import choose_measurements, data_of
@@ -21,6 +23,11 @@ from truearm.studio.window import Window
 #: The course of a fit is drawn so often at most [s].
 _PAUSE: Final = 0.5
 _MODELS: Final = (*(model.name for model in MODELS), AUTO, FRAMES.name)
+_STALE: Final = Notice(
+    "other-settings",
+    "The figures below were made with other settings than those above. Calibrate again, or look at the page Proof: its "
+    "first line says what the result is of.",
+)
 
 
 class CalibratePage:
@@ -40,8 +47,11 @@ class CalibratePage:
         self._steps: list[FitStep] = []
         self._drawn = 0.0
         self._shown: tuple[int, bool] = (0, False)
+        self._lines, self._made = "", self._asked()
         self._course = Picture(window, "Cost and error, step by step", 0.75)
-        self._said = gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))
+        self._now = gui.add_html("")
+        gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))
+        self._said = gui.add_html("")
         self._data.on_update(window.action(lambda: choose_measurements(window, chosen(self._data))))
         self._model.on_update(window.action(lambda: window.edit(model=self._model.value)))
         self._train.on_update(window.settled(lambda: window.edit(train=_train(self._train.value))))
@@ -58,14 +68,24 @@ class CalibratePage:
         offer(self._loss, LOSSES, settings.loss, None)
         self._train.value = "" if settings.train is None else str(settings.train)
         self._seed.value = str(settings.seed)
+        self._said.content, stale = self._lines, bool(self._lines) and self._made != self._asked()
+        self._now.content = words.notice(_STALE) if stale else ""
+
+    def _asked(self) -> tuple[object, ...]:
+        """Return what is calibrated with now."""
+        project = self._window.project
+        of, excluded = project.settings, project.file("exclude")
+        without = read_text(excluded) if excluded is not None and exists(excluded) else ""
+        return of.robot, of.data, of.model, of.train, of.seed, of.loss, of.payload, without, of.result
 
     def _calibrate(self) -> None:
         window, settings = self._window, self._window.project.settings
         self._steps, self._shown = [], (0, False)
+        asked = self._asked()
         window.start(
             "Calibrate",
             calibrate,
-            self._done,
+            lambda outcome: self._done(outcome, asked),
             self._told,
             folder=window.project.folder,
             robot=settings.robot,
@@ -93,10 +113,10 @@ class CalibratePage:
             self._course.show(fit_course(self._steps))
             self._drawn = time.monotonic()
 
-    def _done(self, outcome: Outcome) -> None:
+    def _done(self, outcome: Outcome, asked: tuple[object, ...]) -> None:
         self._draw()
         written = f"Written to {self._window.project.settings.result}: {', '.join(outcome.files)}"
-        self._said.content = words.lines([*outcome.lines, written])
+        self._lines, self._made = words.lines([*outcome.lines, written]), asked
 
 
 def _train(text: str) -> int | str | None:

@@ -33,6 +33,7 @@ class ProofPage:
         gui = window.gui
         self._figures: dict[str, Any] = {}
         self._shown: tuple[Any, ...] = ()
+        self._now = gui.add_html("")
         self._table = gui.add_html("")
         self._picture = gui.add_dropdown("Picture", (NONE,), visible=False)
         self._drawn = Picture(window, "Picture")
@@ -51,7 +52,7 @@ class ProofPage:
             self._table.content = words.paragraph(
                 f"There is no result yet in the folder {project.settings.result} of the project: calibrate first."
             )
-            self._notices.content, self._shown, self._figures = "", (), {}
+            self._now.content, self._notices.content, self._shown, self._figures = "", "", (), {}
             self._picture.visible = self._files.visible = self._drawn.place.visible = False
             return
         stat = (folder / "result.json").stat()
@@ -66,11 +67,14 @@ class ProofPage:
         try:
             made = made_with(result, self._window.calibrated())
             shown_figures = words.lines([f"Of {made.line()}.", f"Status: {result['status']}"]) + figures_table(result)
-            told = words.notices(self._told(result, made))
+            warnings = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
+            now, told = words.notices(self._differing(result, made)), words.notices(warnings)
             told += words.lines(f"Next: {step['message']}" for step in result.get("next", ()))
+        except InputError:  # of the robot or the measurements that are chosen
+            raise
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise _no_result(folder / "result.json") from error
-        self._table.content, self._notices.content = shown_figures, told
+        self._now.content, self._table.content, self._notices.content = now, shown_figures, told
         self._figures = report_figures(folder / "report.html")
         self._files.visible = True
         self._picture.visible = self._drawn.place.visible = bool(self._figures)
@@ -80,9 +84,9 @@ class ProofPage:
             self._draw()
         self._shown = shown
 
-    def _told(self, result: dict[str, Any], made: MadeWith) -> list[Notice]:
-        """Return the notices of the result, and those that say what it is of, where something else is chosen now."""
-        found = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
+    def _differing(self, result: dict[str, Any], made: MadeWith) -> list[Notice]:
+        """Return the notices that say what the result is of, where something else is chosen now."""
+        found = []
         other = self._window.result_of_another()
         if other:
             name, source = self._window.robot().name, self._window.project.settings.robot

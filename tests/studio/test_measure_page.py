@@ -461,7 +461,7 @@ def test_a_nest_that_a_box_hides_is_said_before_it_is_left_out_and_its_line_is_r
         "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\nkeep_out: {shed: {z: [-1, 2000]}}\n"
     )
     project.look()
-    ask(page, **{**ARM, "device": "tracker", "constraints": "boxes.yaml"})
+    ask(page, **{**ARM, "device": "optical-cmm-spatial", "constraints": "boxes.yaml"})
     measuring = Measuring(project, studio.window.robot())
     try:
         assert measuring.next_words()[-1] == "It does not see n1, n2 there."

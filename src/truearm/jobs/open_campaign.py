@@ -22,6 +22,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.measured_extent import extent_notices
+from truearm.jobs.measured_sight import sight_notices
 from truearm.jobs.measuring_begun import BEGUN, begin
 from truearm.jobs.measuring_sources import (
     AskedOfSource,
@@ -117,16 +118,20 @@ class OpenCampaign(Campaign):
         placed: Robot | None,
         plan: _Plan,
         said: _Said,
+        sighted: tuple[Notice, ...],
     ) -> None:
         super().__init__(session, source, folder)
         self.robot, self.placed, self.joints = robot, placed, plan.joints
-        self._plan, self._said, self._folder = plan, said, folder
+        self._plan, self._said, self._folder, self._sighted = plan, said, folder, sighted
         self._flange = robot.world_poses(plan.joints)[0]
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """What to know so far about how it was measured, and whether its lengths can be meant."""
-        return (*extent_notices(self.session, self._flange), *super().notices)
+        """What to know so far: what cannot be read, whether lengths can be meant, and how it was measured."""
+        told = super().notices
+        if any(one.level == "warning" for one in self._sighted):  # it says what that one would say again
+            told = tuple(one for one in told if one.code != "many-left-out")
+        return (*self._sighted, *extent_notices(self.session, self._flange), *told)
 
     def measured(self) -> Measured:
         """Return what has come of it so far."""
@@ -239,6 +244,9 @@ def open_campaign(
         names = targets or (tuple(target.name for target in nominal.targets) if virtual is None else ()) or known
         _refuse_names(names, nests)
         session = Session(planned.configurations.labels, names, nests, between, quality, planned.reads_of(names))
+        sighted = ()
+        if virtual is not None:
+            sighted = sight_notices(session, virtual.source.device, virtual.placed, planned.joints)
         begin(folder, planned.begun, nominal, session, None if virtual is None else virtual.entries, said)
         return OpenCampaign(
             session,
@@ -248,6 +256,7 @@ def open_campaign(
             placed=None if virtual is None else virtual.placed,
             plan=planned,
             said=_Said(said, instrument, call),
+            sighted=sighted,
         )
     except BaseException:
         source.close()

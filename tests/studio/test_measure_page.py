@@ -308,14 +308,16 @@ def test_readings_of_a_former_folder_are_no_longer_shown_for_another(page: Measu
     assert "begins with the first" in page._next.content
 
 
-@pytest.mark.parametrize("every", [0, -3, 10001])
-def test_a_number_of_configurations_between_nests_that_cannot_be_is_refused_where_it_is_typed(
-    page: MeasurePage, every: int
-) -> None:
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [("every", 0), ("every", -3), ("every", 10001), ("fewest_samples", 0), ("fewest_samples", 10**7)],
+)
+def test_a_whole_number_that_cannot_be_is_refused_where_it_is_typed(page: MeasurePage, name: str, number: int) -> None:
+    before = page._now()
     with pytest.raises(InputError, match=r"too (small|large)") as refusal:
-        page._change("every", every)
-    assert refusal.value.came == every
-    assert page._now()["every"] == 10
+        page._change(name, number)
+    assert refusal.value.came == number
+    assert page._now() == before
 
 
 def test_rows_of_a_watched_folder_are_taken_and_broken_ones_named(page: MeasurePage, tmp_path: Path) -> None:

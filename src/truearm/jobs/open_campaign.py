@@ -38,7 +38,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.measuring.about import About, read_about
 from truearm.measurement.measuring.campaign import Campaign
 from truearm.measurement.measuring.reading_log import LOG
-from truearm.measurement.measuring.readings import Quality
+from truearm.measurement.measuring.readings import MOST_SAMPLES, Quality
 from truearm.measurement.measuring.session import LONGEST_ROUND, Session
 from truearm.measurement.measuring.sources import Source
 from truearm.measurement.readers.columns import joints_in_file
@@ -50,7 +50,6 @@ from truearm.printable import is_one_line
 from truearm.results.measured import DATA, PAGE, Measured
 
 _LONGEST_NAME: Final = 100
-_MOST_SAMPLES: Final = 1_000_000
 #: Configurations between two rounds of the nests, where nothing is said.
 _EVERY: Final = 10
 #: Column of a plan that names what a device reads at a configuration, and what separates the names.
@@ -244,7 +243,7 @@ def open_campaign(
         names = targets or (tuple(target.name for target in nominal.targets) if virtual is None else ()) or known
         _refuse_names(names, nests)
         session = Session(planned.configurations.labels, names, nests, between, quality, planned.reads_of(names))
-        sighted = ()
+        sighted: tuple[Notice, ...] = ()
         if virtual is not None:
             sighted = sight_notices(session, virtual.source.device, virtual.placed, planned.joints)
         begin(folder, planned.begun, nominal, session, None if virtual is None else virtual.entries, said)
@@ -347,7 +346,7 @@ def _quality(asked: Asked) -> Quality:
     return Quality(
         None if deviation is None else length_argument(deviation, "most_deviation", 0.0),
         None if settling is None else length_argument(settling, "most_settling", 0.0),
-        1 if samples is None else whole_argument(samples, "fewest_samples", 1, _MOST_SAMPLES),
+        1 if samples is None else whole_argument(samples, "fewest_samples", 1, MOST_SAMPLES),
     )
 
 

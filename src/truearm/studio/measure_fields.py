@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.errors import InputError
+from truearm.measurement.measuring.readings import MOST_SAMPLES
 from truearm.measurement.measuring.session import LONGEST_ROUND
 from truearm.units import sized_si, to_si
 
@@ -54,7 +55,7 @@ class MeasureFields(BaseModel):
     every: Annotated[_Whole, Field(ge=1, le=LONGEST_ROUND)] = EVERY
     most_deviation: _Number | None = None
     most_settling: _Number | None = None
-    fewest_samples: _Whole | None = None
+    fewest_samples: Annotated[_Whole, Field(ge=1, le=MOST_SAMPLES)] | None = None
     about: _Text | None = None
     out: _Text = "measured"
 

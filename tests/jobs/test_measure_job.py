@@ -480,6 +480,10 @@ def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Pat
     ("given", "parameter", "word"),
     [
         ({"device": None}, "device, watch, listen", "nobody says"),
+        ({"device": None, "mapping": "m.yaml"}, "watch", "no folder is given, and `mapping` belongs to one"),
+        ({"device": None, "token": "x" * 20}, "listen", "no port is given, and `token` belongs to one"),
+        ({"device": None, "seed": 1}, "device", "no virtual device is given, and `seed` belongs to one"),
+        ({"device": None, "watch": "", "mapping": "m.yaml"}, "watch", "no folder is given; got ''"),
         ({"listen": 0}, "device, listen", "one source"),
         ({"device": "traker"}, "device", "Did you mean tracker"),
         ({"mapping": "m.yaml"}, "mapping", "belongs to `watch`"),

@@ -80,7 +80,18 @@ class MeasureFields(BaseModel):
         ----------
         payload
             What a virtual robot carries, as the job takes it.
+
+        Raises
+        ------
+        InputError
+            If a folder shall be watched, and none is named.
         """
+        if self.source == "watched folder" and self.watch is None:
+            raise InputError(
+                "no folder is given",
+                parameter="watch",
+                cure="Write into the field Folder the name of the project's folder into which software writes rows.",
+            )
         virtual = self.source == "virtual instrument"
         given = {
             **{name: getattr(self, name) for name in SOURCES[self.source]},

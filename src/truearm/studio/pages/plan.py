@@ -120,8 +120,8 @@ class PlanPage:
         if name == "constraints":
             self._window.edit(constraints=value)
             return
-        if name == "poses" and value is not None:
-            read_poses(value)  # what it refuses is told where it is typed
+        if name == "poses":
+            read_poses(value or "")  # what it refuses is told where it is typed
         said = self._window.project.settings.plan.model_dump(mode="json")
         self._window.edit(plan={**said, name: value})
 

@@ -131,6 +131,8 @@ def test_files_of_a_virtual_instrument_are_those_of_the_command(
     assert (page._stop.visible, page._end_all.visible, page.settings.visible) == (False, True, False)
     act(page._end_all)
     assert page.measuring is None
+    assert told(studio.window).count("3 of 3 configurations measured") == 1
+    assert told(studio.window).count("the page Check tells") == 1
     assert (page._stop.visible, page._end_all.visible, page.settings.visible) == (False, False, True)
     assert studio.window.project.changes() == ()
     other = tmp_path / "other"
@@ -234,6 +236,9 @@ def test_a_measuring_that_was_stopped_goes_on_in_another_studio(
     frozen(page, 7)
     act(page._stop, "stop")
     assert studio.window.project.settings.data is None
+    assert re.search(r"are still to be taken; next is P\d, \w+\. Start goes on there\.", told(studio.window))
+    assert "same command" not in told(studio.window)
+    assert "The same command goes on there." in (tmp_path / "project" / "measured" / "measure.html").read_text()
     assert "Start goes on where it stood" in page._next.content
     del page._run
     page._pace._impl.value = 1

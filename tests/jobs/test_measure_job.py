@@ -246,6 +246,7 @@ def test_a_program_sends_readings_to_a_port(plan: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("device", VIRTUAL)
 def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_path: Path) -> None:
+    assert VIRTUAL[device].reads_where
     plan = seen_by(device, 12, tmp_path)
     with open_campaign(plan, "irb120", tmp_path / "out", device=device, truth="nominal", noise=1e-9) as campaign:
         source = campaign.source

@@ -15,7 +15,7 @@ from tests.cli.conftest import Truearm
 from tests.cli.conftest import truearm as truearm
 from tests.jobs.examples import MEASURED_PLAN
 from tests.studio.conftest import Serving
-from tests.studio.pressing import act
+from tests.studio.pressing import act, below
 
 from truearm.errors import InputError
 from truearm.jobs.measure import open_campaign
@@ -221,6 +221,24 @@ def test_what_the_job_refuses_is_said_in_its_words(page: MeasurePage, fields: di
     assert page.measuring is None
     assert said in told(page._window)
     assert page.settings.visible
+
+
+def test_how_much_of_a_plan_is_seen_is_told_at_the_start_and_a_blind_one_is_refused(
+    page: MeasurePage, tmp_path: Path
+) -> None:
+    ask(page, plan="plan.csv", device="tracker")
+    act(page._begin)
+    assert page.measuring is None
+    refusal = below(page._window, page._begin)
+    assert "plan: nothing of this plan can be read with the tracker" in refusal
+    assert "device=tracker, on the page Plan of the studio the field Instrument" in refusal
+    assert not (tmp_path / "project" / "measured").exists()
+    plan = tmp_path / "project" / "plan.csv"
+    plan.write_text(plan.read_text() + "P4,180,0,0,0,0,0\n")
+    ask(page, plan="plan.csv", device="markers", truth="nominal")
+    frozen(page, 0)
+    assert "Warning (not-seen) : With the markers 2 of 4 pairs of configuration and target" in told(page._window)
+    assert "none at 2 of 4 configurations" in page._notices.content
 
 
 @pytest.mark.parametrize("name", ["plan", "watch", "mapping", "about", "out"])

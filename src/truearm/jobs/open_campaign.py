@@ -105,6 +105,8 @@ class OpenCampaign(Campaign):
         The same where a virtual instrument sees it; None for a real instrument, which nobody has placed.
     joints
         Of the plan, as the model counts them [rad or m], ``(n, joints)``.
+    sighted
+        What a virtual instrument cannot read of the plan, known before the first reading.
     """
 
     def __init__(
@@ -120,17 +122,17 @@ class OpenCampaign(Campaign):
         sighted: tuple[Notice, ...],
     ) -> None:
         super().__init__(session, source, folder)
-        self.robot, self.placed, self.joints = robot, placed, plan.joints
-        self._plan, self._said, self._folder, self._sighted = plan, said, folder, sighted
+        self.robot, self.placed, self.joints, self.sighted = robot, placed, plan.joints, sighted
+        self._plan, self._said, self._folder = plan, said, folder
         self._flange = robot.world_poses(plan.joints)[0]
 
     @property
     def notices(self) -> tuple[Notice, ...]:
         """What to know so far: what cannot be read, whether lengths can be meant, and how it was measured."""
         told = super().notices
-        if any(one.level == "warning" for one in self._sighted):  # it says what that one would say again
+        if any(one.level == "warning" for one in self.sighted):  # it says what that one would say again
             told = tuple(one for one in told if one.code != "many-left-out")
-        return (*self._sighted, *extent_notices(self.session, self._flange), *told)
+        return (*self.sighted, *extent_notices(self.session, self._flange), *told)
 
     def measured(self) -> Measured:
         """Return what has come of it so far."""

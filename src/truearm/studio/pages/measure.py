@@ -168,6 +168,8 @@ class MeasurePage:
         before = measuring.campaign.before
         if before:
             window.tell_lines("Measure", [f"Going on after {before} entries of the log."])
+        for notice in measuring.campaign.sighted:
+            window.tell(notice)
         self._noted()
         window.refresh()
         threading.Thread(target=self._run, args=(measuring,), daemon=True).start()

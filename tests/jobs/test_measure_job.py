@@ -79,7 +79,7 @@ def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(
     reasons = found.session.aside_by_reason
     assert {*reasons} == {"beam-break", "not-settled", "scatter"}
     assert sum(reasons.values()) > 3
-    assert [notice.code for notice in found.warnings] == ["not-said"]
+    assert [(notice.code, notice.level) for notice in found.warnings] == [("not-seen", "note"), ("not-said", "note")]
     assert {p.name for p in tmp_path.iterdir()} == {BEGUN, DATA, LOG, PAGE, "truearm.manifest.json"}
     data = read_csv(tmp_path / DATA)
     assert data.sigma is not None
@@ -246,6 +246,7 @@ def test_a_program_sends_readings_to_a_port(plan: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("device", VIRTUAL)
 def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_path: Path) -> None:
+    assert VIRTUAL[device].reads_where
     plan = seen_by(device, 12, tmp_path)
     with open_campaign(plan, "irb120", tmp_path / "out", device=device, truth="nominal", noise=1e-9) as campaign:
         source = campaign.source
@@ -324,6 +325,79 @@ def test_a_nest_behind_the_arm_or_a_box_is_left_out_and_told(planned: Path, tmp_
     assert "the box 'shed' is in the line of sight" in notice.message
     with pytest.raises(InputError, match="another source of readings"):
         truearm.measure(planned, "irb120", out=tmp_path / "shed", **given)
+
+
+#: Joint positions [deg] of an IRB 120 at which a device reads its target, at which it reads none, and why not.
+SEEN_AND_BLIND: dict[str, tuple[str, str, str]] = {
+    "measurement-arm": ("0,0,0,0,0,0", "-160,90,-90,0,0,0", "a target must be within 3000 mm of the base of the arm"),
+    "optical-cmm-planar": ("0,0,0,0,0,0", "180,0,0,0,0,0", "9 targets of the artefact or more must look at the"),
+    "markers": ("10,10,5,20,29,40", "180,0,0,0,0,0", "must look at the cameras within 60 deg"),
+}
+
+
+def plan_of(folder: Path, *rows: str) -> Path:
+    path = folder / "few.csv"
+    path.write_text("\n".join([MEASURED_PLAN.splitlines()[0], *(f"{k},{row}" for k, row in enumerate(rows, 1))]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("device", ["tracker", *SEEN_AND_BLIND])
+def test_a_plan_of_which_an_instrument_sees_nothing_is_refused_before_anything_is_logged(
+    device: str, tmp_path: Path
+) -> None:
+    why = "a reflector must look at the tracker within 30 deg"
+    _, blind, why = SEEN_AND_BLIND.get(device, ("", "180,0,0,0,0,0", why))
+    few, pairs = plan_of(tmp_path, blind, blind.replace("0,0,0", "0,0,9")), 6 if device == "tracker" else 2
+    with pytest.raises(InputError, match=f"nothing of this plan can be read with the {device}") as refusal:
+        truearm.measure(few, "irb120", out=tmp_path / "out", device=device, truth="nominal", nests=["n"])
+    assert refusal.value.parameter == "plan"
+    assert why in str(refusal.value)
+    assert f"got 0 of {pairs} pairs of configuration and target" in str(refusal.value)
+    assert f"`truearm plan` with `device={device}`" in str(refusal.value)
+    assert "on the page Plan of the studio the field Instrument" in str(refusal.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("device", SEEN_AND_BLIND)
+def test_what_an_instrument_does_not_see_of_a_plan_is_counted_before_the_first_reading(
+    device: str, tmp_path: Path
+) -> None:
+    seen, blind, why = SEEN_AND_BLIND[device]
+    few = plan_of(tmp_path, blind, seen, blind.replace("0,0,0", "0,0,9"))
+    with open_campaign(few, "irb120", tmp_path / "out", device=device, truth="nominal") as campaign:
+        assert len(campaign.session) == 0
+        (notice,) = [one for one in campaign.notices if one.code == "not-seen"]
+        assert notice.level == "warning"
+        assert f"{device} 1 of 3 pairs of configuration and target can be read, none at 2 of 3" in notice.message
+        assert why in notice.message
+        while not campaign.session.done:
+            campaign.step()
+        assert len(campaign.session.kept) == 1
+        codes = [one.code for one in campaign.measured().warnings]
+    assert "not-seen" in codes
+    assert "many-left-out" not in codes  # it would say the same again
+
+
+def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is_not_judged(
+    planned: Path, tmp_path: Path
+) -> None:
+    given: dict[str, Any] = {"device": "tracker", "truth": "nominal"}
+    with open_campaign(planned, "irb120", tmp_path / "all", **given) as campaign:
+        (notice,) = [one for one in campaign.notices if one.code == "not-seen"]
+        assert isinstance(campaign.source, VirtualInstrument)
+        names = np.array(campaign.session.targets)
+        seen = [names[campaign.source.visible(k)] for k in range(24)]
+    assert notice.level == "note"
+    assert f"{sum(map(len, seen))} of 72 pairs of configuration and target can be read, some at every" in notice.message
+    head, *rows = planned.read_text().splitlines()
+    reads = (f"{row},{'; '.join(at)}" for row, at in zip(rows, seen, strict=True))
+    path = tmp_path / "reads.csv"
+    path.write_text("\n".join([f"{head},reads", *reads]) + "\n")
+    with open_campaign(path, "irb120", tmp_path / "reads", **given) as campaign:
+        assert "not-seen" not in {one.code for one in campaign.notices}
+    few = plan_of(tmp_path, "180,0,0,0,0,0")
+    with open_campaign(few, "irb120", tmp_path / "port", listen=0, targets=["1"]) as campaign:
+        assert "not-seen" not in {one.code for one in campaign.notices}
 
 
 def test_what_an_arm_touches_needs_no_line_of_sight(plan: Path, tmp_path: Path) -> None:
@@ -407,6 +481,10 @@ def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Pat
     ("given", "parameter", "word"),
     [
         ({"device": None}, "device, watch, listen", "nobody says"),
+        ({"device": None, "mapping": "m.yaml"}, "watch", "no folder is given, and `mapping` belongs to one"),
+        ({"device": None, "token": "x" * 20}, "listen", "no port is given, and `token` belongs to one"),
+        ({"device": None, "seed": 1}, "device", "no virtual device is given, and `seed` belongs to one"),
+        ({"device": None, "watch": "", "mapping": "m.yaml"}, "watch", "no folder is given; got ''"),
         ({"listen": 0}, "device, listen", "one source"),
         ({"device": "traker"}, "device", "Did you mean tracker"),
         ({"mapping": "m.yaml"}, "mapping", "belongs to `watch`"),

@@ -267,6 +267,8 @@ def test_the_guides_examples_all_say_the_same(guide: Path) -> None:
         (LONG, MAP.replace("  unit: deg\n", ""), ["map.yaml, joints", "give either unit:", "units:"]),
         (LONG, MAP.replace("unit: deg", "units: [deg]"), ["map.yaml, joints", "2 columns and 1 unit"]),
         (LONG, MAP + "  key: pose\n", ["map.yaml, joints", "name it with file:"]),
+        (LONG, MAP.partition("joints:")[0], ["map.yaml, joints: this entry is missing", "Only `truearm measure`"]),
+        (LONG, MAP.replace("joints:", "joint:"), ["map.yaml, joint", "not known", "Did you mean joints"]),
         (LONG, MAP.replace("{column: pose}", "{}"), ["map.yaml, configuration", "each: row"]),
         (LONG, MAP.replace("configuration: {column: pose}\n", ""), ["map.yaml", "from one place", "?P<configuration>"]),
         (LONG, MAP.replace("target_column: ball, ", ""), ["target of readings[1]", "one place", "target_column"]),

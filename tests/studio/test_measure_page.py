@@ -15,7 +15,7 @@ from tests.cli.conftest import Truearm
 from tests.cli.conftest import truearm as truearm
 from tests.jobs.examples import MEASURED_PLAN
 from tests.studio.conftest import Serving
-from tests.studio.pressing import act
+from tests.studio.pressing import act, below
 
 from truearm.errors import InputError
 from truearm.jobs.measure import open_campaign
@@ -131,6 +131,8 @@ def test_files_of_a_virtual_instrument_are_those_of_the_command(
     assert (page._stop.visible, page._end_all.visible, page.settings.visible) == (False, True, False)
     act(page._end_all)
     assert page.measuring is None
+    assert told(studio.window).count("3 of 3 configurations measured") == 1
+    assert told(studio.window).count("the page Check tells") == 1
     assert (page._stop.visible, page._end_all.visible, page.settings.visible) == (False, False, True)
     assert studio.window.project.changes() == ()
     other = tmp_path / "other"
@@ -206,7 +208,9 @@ def test_lines_of_sight_lead_to_the_targets_of_the_arm_at_the_next_configuration
         ({"plan": "plan.csv", "targets": "9"}, "targets: the tool has no such target"),
         ({"plan": "plan.csv", "disturbed": 2.0}, "disturbed: too many readings would be disturbed"),
         ({"plan": "plan.csv", "nests": "1"}, "a name stands for a target and for a nest"),
-        ({"plan": "plan.csv", "source": "watched folder"}, "nobody says where readings come from"),
+        ({"plan": "plan.csv", "source": "watched folder"}, "watch: no folder is given. Write into the field Folder"),
+        ({"plan": "plan.csv", "source": "watched folder", "mapping": "m.yaml"}, "watch: no folder is given"),
+        ({"plan": "plan.csv", "source": "watched folder", "watch": "rows"}, "mapping: nobody says what the columns"),
         ({"plan": "plan.csv", "source": "watched folder", "watch": "none", "mapping": "m.yaml"}, "no such folder"),
         ({"plan": "gone.csv"}, "gone.csv: there is no such file"),
     ],
@@ -217,6 +221,24 @@ def test_what_the_job_refuses_is_said_in_its_words(page: MeasurePage, fields: di
     assert page.measuring is None
     assert said in told(page._window)
     assert page.settings.visible
+
+
+def test_how_much_of_a_plan_is_seen_is_told_at_the_start_and_a_blind_one_is_refused(
+    page: MeasurePage, tmp_path: Path
+) -> None:
+    ask(page, plan="plan.csv", device="tracker")
+    act(page._begin)
+    assert page.measuring is None
+    refusal = below(page._window, page._begin)
+    assert "plan: nothing of this plan can be read with the tracker" in refusal
+    assert "device=tracker, on the page Plan of the studio the field Instrument" in refusal
+    assert not (tmp_path / "project" / "measured").exists()
+    plan = tmp_path / "project" / "plan.csv"
+    plan.write_text(plan.read_text() + "P4,180,0,0,0,0,0\n")
+    ask(page, plan="plan.csv", device="markers", truth="nominal")
+    frozen(page, 0)
+    assert "Warning (not-seen) : With the markers 2 of 4 pairs of configuration and target" in told(page._window)
+    assert "none at 2 of 4 configurations" in page._notices.content
 
 
 @pytest.mark.parametrize("name", ["plan", "watch", "mapping", "about", "out"])
@@ -232,6 +254,9 @@ def test_a_measuring_that_was_stopped_goes_on_in_another_studio(
     frozen(page, 7)
     act(page._stop, "stop")
     assert studio.window.project.settings.data is None
+    assert re.search(r"are still to be taken; next is P\d, \w+\. Start goes on there\.", told(studio.window))
+    assert "same command" not in told(studio.window)
+    assert "The same command goes on there." in (tmp_path / "project" / "measured" / "measure.html").read_text()
     assert "Start goes on where it stood" in page._next.content
     del page._run
     page._pace._impl.value = 1
@@ -308,14 +333,16 @@ def test_readings_of_a_former_folder_are_no_longer_shown_for_another(page: Measu
     assert "begins with the first" in page._next.content
 
 
-@pytest.mark.parametrize("every", [0, -3, 10001])
-def test_a_number_of_configurations_between_nests_that_cannot_be_is_refused_where_it_is_typed(
-    page: MeasurePage, every: int
-) -> None:
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [("every", 0), ("every", -3), ("every", 10001), ("fewest_samples", 0), ("fewest_samples", 10**7)],
+)
+def test_a_whole_number_that_cannot_be_is_refused_where_it_is_typed(page: MeasurePage, name: str, number: int) -> None:
+    before = page._now()
     with pytest.raises(InputError, match=r"too (small|large)") as refusal:
-        page._change("every", every)
-    assert refusal.value.came == every
-    assert page._now()["every"] == 10
+        page._change(name, number)
+    assert refusal.value.came == number
+    assert page._now() == before
 
 
 def test_rows_of_a_watched_folder_are_taken_and_broken_ones_named(page: MeasurePage, tmp_path: Path) -> None:
@@ -461,7 +488,7 @@ def test_a_nest_that_a_box_hides_is_said_before_it_is_left_out_and_its_line_is_r
         "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\nkeep_out: {shed: {z: [-1, 2000]}}\n"
     )
     project.look()
-    ask(page, **{**ARM, "device": "tracker", "constraints": "boxes.yaml"})
+    ask(page, **{**ARM, "device": "optical-cmm-spatial", "constraints": "boxes.yaml"})
     measuring = Measuring(project, studio.window.robot())
     try:
         assert measuring.next_words()[-1] == "It does not see n1, n2 there."

@@ -102,6 +102,11 @@ def test_fields_are_kept_are_undone_and_shown_again(studio: Studio) -> None:
         ("noise", "", "a number belongs here"),
         ("candidates", "12.5", "a whole number belongs here"),
         ("candidates", "0", "too small"),
+        ("candidates", "1e999", "a whole number belongs here"),
+        ("poses", "2 0", "poses: a number of poses belongs here; got &#x27;2 0&#x27;; allowed: a whole"),
+        ("poses", "12.5", "a number of poses belongs here"),
+        ("poses", "0", "poses: the number is out of range; got 0; allowed: 1 to 50000"),
+        ("poses", "", "a number of poses belongs here"),
     ],
 )
 def test_what_is_no_number_is_refused_below_its_field_and_stays_there_to_be_mended(

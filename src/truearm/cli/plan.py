@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -11,7 +11,7 @@ from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_be
 from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
-from truearm.jobs.texts import read_region, read_seed, read_speed
+from truearm.jobs.texts import read_poses, read_region, read_seed, read_speed
 
 
 def plan(
@@ -188,7 +188,7 @@ def plan(
     with progress() as say:
         planned = run(
             robot,
-            poses=_poses(poses),
+            poses=read_poses(poses),
             out=out,
             candidates_from=candidates_from,
             objective=objective,
@@ -226,11 +226,3 @@ def plan(
         print_line(f"Written: {out}, {', '.join(str(out.with_name(out.stem + end)) for end in ends)}")
     else:
         print_line(f"Written to {out}: {', '.join(planned.contents())}")
-
-
-def _poses(text: str) -> Any:
-    """Return a number where the text is one; the job refuses what is neither that nor auto."""
-    try:
-        return int(text)
-    except ValueError:
-        return text

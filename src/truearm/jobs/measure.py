@@ -70,7 +70,8 @@ def measure(
     out
         Folder for the log, the measurements and the report.
     device
-        Readings of a virtual instrument: one of ``truearm.devices()`` that reads where targets are.
+        Readings of a virtual instrument: one of ``truearm.devices()`` that reads where targets are. A plan of which it
+        can read nothing is refused.
     truth, noise, seed, payload
         The twin that it measures, its standard deviation of a coordinate [m], what is drawn, and what the robot
         carries, as for :func:`truearm.simulate`; a random truth, the device's deviation and seed 0 if None.
@@ -83,7 +84,8 @@ def measure(
     watch
         Or readings that an instrument's software writes into this folder, in files or rows at the end of files.
     mapping
-        What their columns mean, as for :func:`truearm.import_table`; the joint positions are the plan's.
+        What their columns mean, as for :func:`truearm.import_table`; the joint positions are the plan's, so that
+        the entry ``joints`` may be left out.
     listen
         Or readings that programs of this machine send to this port of 127.0.0.1; 0 for any that is free.
     token

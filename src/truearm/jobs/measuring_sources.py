@@ -60,6 +60,8 @@ _OF: Final[Mapping[Kind, tuple[str, ...]]] = {
     "watch": ("mapping",),
     "listen": ("token",),
 }
+#: What each source is, where it is not given.
+_CALLED: Final[Mapping[Kind, str]] = {"device": "virtual device", "watch": "folder", "listen": "port"}
 
 
 def source_kind(asked: Mapping[str, object]) -> Kind:
@@ -71,6 +73,12 @@ def source_kind(asked: Mapping[str, object]) -> Kind:
         If it is none, or more than one, or something is asked for that belongs to another one.
     """
     given = [kind for kind in _OF if asked.get(kind) is not None]
+    for of, names in _OF.items() if not given else ():
+        for name in names:
+            if asked.get(name) is not None:
+                raise InputError(
+                    f"no {_CALLED[of]} is given, and `{name}` belongs to one", parameter=of, cure="Name it."
+                )
     if len(given) != 1:
         raise InputError(
             "readings come from one source" if given else "nobody says where readings come from",
@@ -211,6 +219,8 @@ def watched_source(watch: object, mapping: object, labels: tuple[str, ...], out:
     """Return the folder that is watched, its rows read as a mapping says."""
     from truearm.measurement.measuring.watched_folder import WatchedFolder
 
+    if watch == "":  # a variable of the shell that is not set
+        raise InputError("no folder is given", parameter="watch", came=watch)
     folder = path_argument(watch, "watch")
     if mapping is None:
         raise InputError(

@@ -22,6 +22,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.measured_extent import extent_notices
+from truearm.jobs.measured_sight import sight_notices
 from truearm.jobs.measuring_begun import BEGUN, begin
 from truearm.jobs.measuring_sources import (
     AskedOfSource,
@@ -37,7 +38,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.measuring.about import About, read_about
 from truearm.measurement.measuring.campaign import Campaign
 from truearm.measurement.measuring.reading_log import LOG
-from truearm.measurement.measuring.readings import Quality
+from truearm.measurement.measuring.readings import MOST_SAMPLES, Quality
 from truearm.measurement.measuring.session import LONGEST_ROUND, Session
 from truearm.measurement.measuring.sources import Source
 from truearm.measurement.readers.columns import joints_in_file
@@ -49,7 +50,6 @@ from truearm.printable import is_one_line
 from truearm.results.measured import DATA, PAGE, Measured
 
 _LONGEST_NAME: Final = 100
-_MOST_SAMPLES: Final = 1_000_000
 #: Configurations between two rounds of the nests, where nothing is said.
 _EVERY: Final = 10
 #: Column of a plan that names what a device reads at a configuration, and what separates the names.
@@ -105,6 +105,8 @@ class OpenCampaign(Campaign):
         The same where a virtual instrument sees it; None for a real instrument, which nobody has placed.
     joints
         Of the plan, as the model counts them [rad or m], ``(n, joints)``.
+    sighted
+        What a virtual instrument cannot read of the plan, known before the first reading.
     """
 
     def __init__(
@@ -117,16 +119,20 @@ class OpenCampaign(Campaign):
         placed: Robot | None,
         plan: _Plan,
         said: _Said,
+        sighted: tuple[Notice, ...],
     ) -> None:
         super().__init__(session, source, folder)
-        self.robot, self.placed, self.joints = robot, placed, plan.joints
+        self.robot, self.placed, self.joints, self.sighted = robot, placed, plan.joints, sighted
         self._plan, self._said, self._folder = plan, said, folder
         self._flange = robot.world_poses(plan.joints)[0]
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """What to know so far about how it was measured, and whether its lengths can be meant."""
-        return (*extent_notices(self.session, self._flange), *super().notices)
+        """What to know so far: what cannot be read, whether lengths can be meant, and how it was measured."""
+        told = super().notices
+        if any(one.level == "warning" for one in self.sighted):  # it says what that one would say again
+            told = tuple(one for one in told if one.code != "many-left-out")
+        return (*self.sighted, *extent_notices(self.session, self._flange), *told)
 
     def measured(self) -> Measured:
         """Return what has come of it so far."""
@@ -239,6 +245,9 @@ def open_campaign(
         names = targets or (tuple(target.name for target in nominal.targets) if virtual is None else ()) or known
         _refuse_names(names, nests)
         session = Session(planned.configurations.labels, names, nests, between, quality, planned.reads_of(names))
+        sighted: tuple[Notice, ...] = ()
+        if virtual is not None:
+            sighted = sight_notices(session, virtual.source.device, virtual.placed, planned.joints)
         begin(folder, planned.begun, nominal, session, None if virtual is None else virtual.entries, said)
         return OpenCampaign(
             session,
@@ -248,6 +257,7 @@ def open_campaign(
             placed=None if virtual is None else virtual.placed,
             plan=planned,
             said=_Said(said, instrument, call),
+            sighted=sighted,
         )
     except BaseException:
         source.close()
@@ -338,7 +348,7 @@ def _quality(asked: Asked) -> Quality:
     return Quality(
         None if deviation is None else length_argument(deviation, "most_deviation", 0.0),
         None if settling is None else length_argument(settling, "most_settling", 0.0),
-        1 if samples is None else whole_argument(samples, "fewest_samples", 1, _MOST_SAMPLES),
+        1 if samples is None else whole_argument(samples, "fewest_samples", 1, MOST_SAMPLES),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from truearm.errors import InputError
 
@@ -50,6 +50,27 @@ def read_numbers(text: str, parameter: str, allowed: str) -> list[float]:
     if len(known) < len(numbers):
         raise InputError("numbers separated by commas belong here", parameter=parameter, came=text, allowed=allowed)
     return known
+
+
+def read_poses(text: str) -> int | Literal["auto"]:
+    """Return how many poses a text names, or ``auto``.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or there cannot be so many.
+    """
+    from truearm.jobs.arguments import count_argument
+    from truearm.units import as_number
+
+    if text.strip() == "auto":
+        return "auto"
+    number = as_number(text.strip())
+    if number is None or not number.is_integer():
+        raise InputError(
+            "a number of poses belongs here", parameter="poses", came=text, allowed="a whole number, or auto"
+        )
+    return count_argument(int(number), "poses")
 
 
 def read_seed(robot: str | Path, text: str | None, joints: str | None, parameter: str = "seed") -> list[float] | None:

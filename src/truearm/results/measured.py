@@ -23,6 +23,8 @@ from truearm.writing import write_files
 
 DATA: Final = "measurements.csv"
 PAGE: Final = "measure.html"
+#: How a measuring goes on that is not finished.
+GOES_ON: Final = "The same command goes on there."
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -175,7 +177,7 @@ class Measured(Record):
             Notice(
                 "unfinished",
                 f"{counted(self.session.outstanding, 'reading')} are still to be taken; next is {step.label}, "
-                f"{step.names[0]}. The same command goes on there.",
+                f"{step.names[0]}. {GOES_ON}",
             )
         ]
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.errors import InputError
+from truearm.measurement.measuring.readings import MOST_SAMPLES
 from truearm.measurement.measuring.session import LONGEST_ROUND
 from truearm.units import sized_si, to_si
 
@@ -54,7 +55,7 @@ class MeasureFields(BaseModel):
     every: Annotated[_Whole, Field(ge=1, le=LONGEST_ROUND)] = EVERY
     most_deviation: _Number | None = None
     most_settling: _Number | None = None
-    fewest_samples: _Whole | None = None
+    fewest_samples: Annotated[_Whole, Field(ge=1, le=MOST_SAMPLES)] | None = None
     about: _Text | None = None
     out: _Text = "measured"
 
@@ -79,7 +80,18 @@ class MeasureFields(BaseModel):
         ----------
         payload
             What a virtual robot carries, as the job takes it.
+
+        Raises
+        ------
+        InputError
+            If a folder shall be watched, and none is named.
         """
+        if self.source == "watched folder" and self.watch is None:
+            raise InputError(
+                "no folder is given",
+                parameter="watch",
+                cure="Write into the field Folder the name of the project's folder into which software writes rows.",
+            )
         virtual = self.source == "virtual instrument"
         given = {
             **{name: getattr(self, name) for name in SOURCES[self.source]},

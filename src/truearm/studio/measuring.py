@@ -17,7 +17,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.notices import Notice
-from truearm.results.measured import DATA, Measured
+from truearm.results.measured import DATA, GOES_ON, Measured
 from truearm.shown import counted, listed
 from truearm.studio.arrows import coloured
 from truearm.studio.measure_fields import MeasureFields, measure_arguments, measure_command
@@ -32,6 +32,8 @@ _HIDDEN: Final = (214, 69, 61)
 _OTHER: Final = (150, 158, 170)
 #: What the instrument is called among the lines of sight.
 INSTRUMENT: Final = "instrument"
+#: How it goes on in the window, where no command is typed.
+_START: Final = "Start goes on there."
 #: What stands above the columns of the last readings.
 HEAD: Final = ("no.", "at", "point", "dev. [mm]", "settling [mm]", "breaks", "became")
 
@@ -147,6 +149,10 @@ class Measuring:
         found = self.measured()
         found.write()
         return found
+
+    def outcome(self, found: Measured) -> list[str]:
+        """Return what the command prints of what came of it, in the words of the window."""
+        return [line.replace(GOES_ON, _START) for line in found.lines()]
 
     def measured(self) -> Measured:
         """Return what came of it so far; places are named as they are called in the folder."""

@@ -63,6 +63,7 @@ def planned(
         Of the project.
     """
     from truearm.jobs.plan import plan
+    from truearm.jobs.texts import read_poses
     from truearm.reporting.plan_report import number_figure
 
     os.chdir(folder)
@@ -70,7 +71,7 @@ def planned(
     with confined_reads(folder):
         found = plan(
             robot,
-            poses=int(poses) if poses.isdecimal() else poses,  # type: ignore[arg-type]
+            poses=read_poses(poses),
             out=fields.place,
             command=plan_command(robot, poses, said),
             progress=progress,

@@ -102,6 +102,12 @@ def test_rows_are_read_as_they_come_and_half_a_line_waits(watched: Folder) -> No
     assert reading.origin == "points.csv, line 3"
 
 
+def test_a_mapping_needs_no_joints_where_the_plan_has_them(made: Callable[..., Folder]) -> None:
+    watched = made(MAPPING.replace("joints: {file: plan.csv}\n", ""))
+    watched.write(HEADER + row("P1", "n1") + row("P1", "a"))
+    assert watched.step() == ["P1/n1", "P1/a"]
+
+
 def test_a_thread_that_writes_is_followed_to_the_end(watched: Folder) -> None:
     text = HEADER + "".join(row(label, name, at=k) for k, label in enumerate(LABELS) for name in ("n1", "a"))
 

@@ -25,6 +25,8 @@ REASONS: Final[dict[str, str]] = {
 }
 #: How far two halves of a dwell may be apart by scatter alone, in deviations of a sample over the root of samples.
 _HALVES: Final = 2.0
+#: So many samples of a dwell can be asked for.
+MOST_SAMPLES: Final = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)

@@ -271,6 +271,11 @@ class Session:
         return tuple(e for e, at in places if e.event == "left" and e.is_nest and at not in self._held)
 
     @property
+    def asked(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the targets that are asked for at each configuration."""
+        return tuple(self._asked)
+
+    @property
     def planned(self) -> int:
         """How many readings of targets are asked for."""
         return sum(map(len, self._asked))

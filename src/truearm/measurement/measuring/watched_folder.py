@@ -432,12 +432,12 @@ def _refuse_other_mappings(content: MappingFile, mapping: Path) -> None:
             where=f"{mapping}, layout.sheet",
             cure="Let the software write text, or import the workbook when all is measured.",
         )
-    if content.joints.columns and content.joints.file is None:
+    if content.joints is not None and content.joints.file is None:
         raise InputError(
             "the joint positions are those of the plan, and the mapping takes them from the table",
             where=f"{mapping}, joints",
-            allowed="joints: {file: plan.csv}",
-            cure="Name the plan under joints.file; or import the table when all is measured.",
+            allowed="no entry joints, or joints: {file: plan.csv}",
+            cure="Leave joints out; or import the table when all is measured.",
         )
 
 

@@ -207,7 +207,7 @@ def _yes_or_no(value: object) -> object:
 
 
 class MappingFile(Entry):
-    """Schema ``truearm-mapping/1``."""
+    """Schema ``truearm-mapping/1``. A table is read with ``joints`` alone; a plan that is measured has its own."""
 
     truearm: Literal["truearm-mapping/1"]
     layout: LayoutEntry = LayoutEntry()
@@ -216,7 +216,7 @@ class MappingFile(Entry):
     length_unit: Literal["mm", "m", "um", "in"]
     readings: list[ReadingEntry] = Field(min_length=1)
     references: list[Text] = Field(default=[])
-    joints: JointsEntry
+    joints: JointsEntry | None = None
     sigma: SigmaEntry | None = None
     sigma_rot: SigmaRotEntry | None = None
     missing: list[Text] = Field(default=[])
@@ -271,8 +271,9 @@ class MappingFile(Entry):
             used.append((self.temperature.column, "temperature.column"))
         if self.visit is not None:
             used.append((self.visit.column, "visit.column"))
-        joints = [(column, f"joints.columns[{number}]") for number, column in enumerate(self.joints.columns, 1)]
-        for group in [[*used, *joints]] if self.joints.file is None else [used, joints]:
+        of_joints = [] if self.joints is None else self.joints.columns
+        joints = [(column, f"joints.columns[{number}]") for number, column in enumerate(of_joints, 1)]
+        for group in [[*used, *joints]] if self.joints is None or self.joints.file is None else [used, joints]:
             first: dict[str, str] = {}
             for column, entry in group:
                 if column in first:

@@ -12,7 +12,7 @@ import numpy as np
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.dataset import IntArray
 from truearm.measurement.readers.cells import Cells, column_letters
-from truearm.measurement.readers.mapping import MappingFile, ReadingEntry
+from truearm.measurement.readers.mapping import JointsEntry, MappingFile, ReadingEntry
 from truearm.measurement.readers.mapping_entries import SigmaColumns, SigmaRotColumns, TemperatureEntry
 from truearm.measurement.readers.orientation_columns import quaternions_of_angles, quaternions_of_vectors
 from truearm.measurement.readers.rows import Configurations
@@ -67,7 +67,8 @@ def numbers_of(
 def refuse_second_header(cells: Cells, content: MappingFile) -> None:
     """Refuse a table whose first row below the header holds no number where all numbers belong: more headings."""
     columns = [column for entry in content.readings for column in (entry.position | entry.turned).values()]
-    columns += content.joints.columns if content.joints.file is None else []
+    if content.joints is not None and content.joints.file is None:
+        columns += content.joints.columns
     places = [cells.names.index(column) for column in columns if column in cells.names]
     texts = [cells.columns[place][0].replace(",", ".") for place in places]
     absent = {"", *(cells.absent or ())}
@@ -155,36 +156,36 @@ def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list
     return found
 
 
-def unlikely_radians(cells: Cells, content: MappingFile, joints: Cells | None, mapping: Path) -> list[Notice]:
+def unlikely_radians(
+    cells: Cells, content: MappingFile, entry: JointsEntry, joints: Cells | None, mapping: Path
+) -> list[Notice]:
     """Say if numbers that are read as radians go beyond a full turn, as degrees do.
 
     An angle of an orientation never needs to. A joint may, so that half of the rows must have one.
 
     Parameters
     ----------
+    entry
+        What the mapping says of the joints.
     joints
-        The table that has the columns of the joints that the mapping names; None if it names none.
+        The table that has the columns that it names; None if it names none.
     """
     found: list[Notice] = []
     for number, reading in enumerate(content.readings, 1):
-        for name, entry in (("angles", reading.angles), ("rotation_vector", reading.rotation_vector)):
-            if entry is not None and entry.unit == "rad":
-                read = numbers_of(cells, reading.turned, entry.unit, mapping, f"readings[{number}]")
+        for name, turned in (("angles", reading.angles), ("rotation_vector", reading.rotation_vector)):
+            if turned is not None and turned.unit == "rad":
+                read = numbers_of(cells, reading.turned, turned.unit, mapping, f"readings[{number}]")
                 large = np.nanmax(np.abs(read), axis=1, initial=0.0)
                 if (large > _FULL_TURN).any():
                     found.append(
                         _of_radians(
-                            large, f"orientations ({', '.join(entry.columns)})", f"readings[{number}].{name}.unit"
+                            large, f"orientations ({', '.join(turned.columns)})", f"readings[{number}].{name}.unit"
                         )
                     )
-    turning = [
-        column
-        for column, unit in zip(content.joints.columns, content.joints.unit_of_each, strict=True)
-        if unit == "rad"
-    ]
+    turning = [column for column, unit in zip(entry.columns, entry.unit_of_each, strict=True) if unit == "rad"]
     if joints is not None and turning:
         named = {f"columns[{n}]": column for n, column in enumerate(turning, 1)}
-        of_unit = "joints.unit" if content.joints.units is None else "joints.units"
+        of_unit = "joints.unit" if entry.units is None else "joints.units"
         large = np.abs(numbers_of(joints, named, "rad", mapping, "joints")).max(axis=1)
         if float(np.mean(large > _FULL_TURN)) >= _OFTEN:
             found.append(_of_radians(large, f"joints ({', '.join(turning)})", of_unit))

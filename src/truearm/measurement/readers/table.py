@@ -17,7 +17,7 @@ from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.canonical_rows import visits_of
 from truearm.measurement.readers.cells import Cells, read_cells
 from truearm.measurement.readers.columns import joints_in_file
-from truearm.measurement.readers.mapping import MappingFile, NamesEntry, name_pattern
+from truearm.measurement.readers.mapping import JointsEntry, MappingFile, NamesEntry, name_pattern
 from truearm.measurement.readers.mapping_entries import LayoutEntry
 from truearm.measurement.readers.measuring_order import measuring_order, refuse_returns
 from truearm.measurement.readers.presets import PRESETS, is_preset, mapping_path
@@ -67,6 +67,11 @@ class TableFiles:
         mapping = () if is_preset(self.mapping) else (self.mapping,)
         return (self.table, *mapping, *(() if self.joints is None else (self.joints,)))
 
+    @property
+    def of_joints(self) -> JointsEntry:
+        """Return what the mapping says of the joints, or refuse one that says nothing."""
+        return _of_joints(self.content, self.mapping)
+
 
 def read_mapping(mapping: Path) -> MappingFile:
     """Return what a mapping file, or a preset, says, or refuse one that nobody confirmed."""
@@ -94,7 +99,7 @@ def read_mapping(mapping: Path) -> MappingFile:
 def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
     """Return the files of a table, or refuse a mapping that nobody confirmed."""
     path, content = mapping_path(mapping), read_mapping(mapping)
-    named = content.joints.file
+    named = _of_joints(content, path).file
     if joints is not None and named is None:
         raise InputError(
             "the mapping takes the joint positions from the table itself",
@@ -106,6 +111,17 @@ def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
     beside = table if is_preset(mapping) else path
     found = joints if joints is not None or named is None else beside.parent / named
     return TableFiles(table, Path(mapping), content, found)
+
+
+def _of_joints(content: MappingFile, mapping: Path) -> JointsEntry:
+    if content.joints is None:
+        raise InputError(
+            "this entry is missing",
+            where=f"{mapping}, joints",
+            allowed="joints: {columns: [..], unit: deg} of the table, or joints: {file: FILE.csv}",
+            cure="Add it. Only `truearm measure` reads without: there the joint positions are those of the plan.",
+        )
+    return content.joints
 
 
 def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None) -> Dataset:
@@ -142,7 +158,7 @@ def read_noting(
 def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Dataset, tuple[Notice, ...]]:
     """Read a table with its mapping, see :func:`read_noting`."""
     path, content, mapping = files.table, files.content, files.mapping
-    whose = _whose(content.joints.are, joints_are, f"{mapping}, joints.are")
+    whose = _whose(files.of_joints.are, joints_are, f"{mapping}, joints.are")
     cells, labels, found = _named_rows(_read(path, content.layout, f"{mapping}, layout"), content, mapping)
     if labels is None:
         labels = [str(number) for number in range(1, len(cells.lines) + 1)]
@@ -184,7 +200,7 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
     noticed = (
         *uneven_deviations(cells, content, mapping),
-        *unlikely_radians(cells, content, of_joints, mapping),
+        *unlikely_radians(cells, content, files.of_joints, of_joints, mapping),
     )
     if content.temperature is None:
         return data, noticed
@@ -385,7 +401,7 @@ def _configurations(
     asked: JointsOf | None,
 ) -> tuple[Configurations, IntArray]:
     """Return the configurations and which of them each row of the table belongs to."""
-    entry, mapping = files.content.joints, files.mapping
+    entry, mapping = files.of_joints, files.mapping
     if files.joints is not None and of_joints is None:
         table, configurations = joints_in_file(files.joints)
         if asked is not None:
@@ -414,7 +430,7 @@ def _configurations(
 
 def _table_of_joints(cells: Cells, files: TableFiles) -> Cells | None:
     """Return the table that has the columns of the joints; None if the mapping names none."""
-    entry = files.content.joints
+    entry = files.of_joints
     if not entry.columns:
         return None
     if files.joints is None:

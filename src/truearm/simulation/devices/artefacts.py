@@ -42,6 +42,12 @@ class Artefact(Device):
     at_least: int = 3
     size: float = 0.075
 
+    @property
+    def reads_where(self) -> str:
+        """How many targets of the artefact must look at the cameras, and how far past them they may look."""
+        within = f"{np.rad2deg(self.within):.3g} deg"
+        return f"{self.at_least} targets of the artefact or more must look at the cameras within {within}"
+
     def counted(self, robot: Robot, joints: Array) -> NDArray[np.intp]:
         """Return how many targets of the artefact are seen, ``(n,)``."""
         place, rotation = robot.world_poses(joints, robot.targets[0].name)

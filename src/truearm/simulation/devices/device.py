@@ -81,6 +81,11 @@ class Device(ABC):
     sigma: float
     tool: Tool | None = None
 
+    @property
+    def reads_where(self) -> str:
+        """What must be so for a target to be read, in words; empty for a device that reads all."""
+        return ""
+
     def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
         """Return which readings the device cannot have read, ``(readings,)``; one without a range reads all."""
         return np.zeros(len(data.target), dtype=bool)

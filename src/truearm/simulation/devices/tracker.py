@@ -32,6 +32,11 @@ class Tracker(Device):
     within: float = np.deg2rad(30.0)
     at_least: int = 1
 
+    @property
+    def reads_where(self) -> str:
+        """How far a reflector may look past the tracker."""
+        return f"a reflector must look at the tracker within {np.rad2deg(self.within):.3g} deg"
+
     def visible(self, robot: Robot, joints: Array) -> NDArray[np.bool_]:
         """Return which targets the tracker sees, none where they are fewer than asked for, ``(n, targets)``."""
         rotation = robot.world_poses(joints)[1]
@@ -63,6 +68,11 @@ class MeasurementArm(Device):
     no_plan: ClassVar[str] = ""
 
     reach: float = 3.0
+
+    @property
+    def reads_where(self) -> str:
+        """How far a target may be."""
+        return f"a target must be within {self.reach * 1e3:.4g} mm of the base of the arm"
 
     def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
         """Return which places are out of reach of its base."""

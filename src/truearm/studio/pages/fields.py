@@ -41,7 +41,7 @@ class Fields:
         def typed() -> None:
             text = element.value.strip()
             value = as_number(text)
-            if (text or not optional) and (value is None or (whole and value != round(value))):
+            if (text or not optional) and (value is None or (whole and not value.is_integer())):
                 kind = "a whole number" if whole else "a number"
                 cure = "Write a decimal point, and no separators." if "," in text else None
                 raise InputError(f"{kind} belongs here", parameter=name, came=text, cure=cure)

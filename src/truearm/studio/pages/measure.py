@@ -52,6 +52,7 @@ class MeasurePage:
         self._window = window
         self.measuring: Measuring | None = None
         self._written = False
+        self._told: list[str] = []  # what came of it, as it stands in the notices
         self._shown: str | None = None  # the folder whose readings are shown
         self._turn = 0
         self._due = 0.0
@@ -161,12 +162,14 @@ class MeasurePage:
             return
         window = self._window
         self.measuring = measuring = Measuring(window.project, window.robot())
-        self._written = measuring.campaign.session.done
+        self._written, self._told = measuring.campaign.session.done, []
         if measuring.address:
             window.show_once("Programs of this machine send lines to", [*measuring.address, "It is shown once."])
         before = measuring.campaign.before
         if before:
             window.tell_lines("Measure", [f"Going on after {before} entries of the log."])
+        for notice in measuring.campaign.sighted:
+            window.tell(notice)
         self._noted()
         window.refresh()
         threading.Thread(target=self._run, args=(measuring,), daemon=True).start()
@@ -234,19 +237,24 @@ class MeasurePage:
         measuring = self._going()
         found = measuring.finish()
         self._close()
-        self._window.tell_lines("Measure", found.lines())
+        self._window.tell_lines("Measure", measuring.outcome(found))
         self._window.refresh()
 
     def _hand_over(self, measuring: Measuring) -> None:
+        """Write what is there and choose it as the project's measurements; say what came of it, unless that stands."""
         found = measuring.finish()
         self._noted()
-        self._window.tell_lines("Measure", found.lines())
+        outcome, before = measuring.outcome(found), self._told
+        self._told = outcome
+        if outcome != before:
+            self._window.tell_lines("Measure", outcome)
         if not found.files:
             raise InputError(
                 "no reading of a target is kept, so there are no measurements", cure="Go on, or choose another plan."
             )
         choose_measurements(self._window, measuring.data)
-        self._window.tell(Notice("measured", _DONE, "note"))
+        if outcome != before:
+            self._window.tell(Notice("measured", _DONE, "note"))
         self._window.refresh()
 
     def _close(self) -> None:

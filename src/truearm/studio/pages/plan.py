@@ -10,6 +10,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.identification.solving.models import MODELS
+from truearm.jobs.texts import read_poses
 from truearm.manifest import MANIFEST
 from truearm.modeling.chain import Array
 from truearm.planning.choosing.measurement_plan import ERROR
@@ -119,6 +120,8 @@ class PlanPage:
         if name == "constraints":
             self._window.edit(constraints=value)
             return
+        if name == "poses":
+            read_poses(value or "")  # what it refuses is told where it is typed
         said = self._window.project.settings.plan.model_dump(mode="json")
         self._window.edit(plan={**said, name: value})
 

@@ -418,6 +418,12 @@ def test_the_column_reads_of_a_plan_says_what_is_asked_for(planned: Path, tmp_pa
         assert campaign.session.outstanding == 24
     with open_campaign(path, "irb120", tmp_path / "beside", listen=0, targets=["2", "smr"]) as campaign:
         assert campaign.session.outstanding == 25
+    truearm.measure(path, "irb120", out=tmp_path / "virtual", device="tracker", targets=["1", "2", "3"])
+    head, *lines = (tmp_path / "virtual/measurements.csv").read_text().splitlines()
+    at = head.split(",").index("target")
+    read = {(line.split(",")[0], line.split(",")[at]) for line in lines}
+    first = rows[0].split(",")[0]
+    assert not any(target == "2" and label != first for label, target in read)  # nobody asked for it
 
 
 @pytest.mark.parametrize(("unit", "told"), [("mm", False), ("m", True), ("um", True)])

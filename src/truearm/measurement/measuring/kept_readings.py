@@ -74,7 +74,11 @@ def kept_readings(session: Session, configurations: Configurations, source: str)
     places = [*index]
     names = [name for name in session.targets if any(entry.name == name for entry in targets)]
     found = {(entry.label, entry.name): entry for entry in targets}
-    rows = [(label, name, found.get((label, name))) for label in visits.order for name in names]
+    asked = dict(zip(session.labels, session.asked, strict=True))
+    rows = []
+    for label in visits.order:  # what nobody asked for is not missing
+        of = [name for name in names if name in asked[label] or (label, name) in found]
+        rows += [(label, name, found.get((label, name))) for name in of or names]
     sigma = stated_sigma(session)
     common: dict[str, Any] = {
         "source": source,

@@ -43,10 +43,20 @@ def test_corrected_commands_are_ten_times_as_accurate_and_as_repeatable(calibrat
         truearm.iso9283_simulate("irb120", plan, truth=TRUTH, seed=5, corrected=robot) for robot in (None, calibrated)
     )
     assert before.tie == after.tie
+    assert not after.warnings
     for pose in ("P1", "P2", "P3", "P4", "P5"):
         (far, spread), (near, again) = accuracy(before, pose), accuracy(after, pose)
         assert far > 10 * near
         assert 0.4 < again / spread < 2.5
+
+
+def test_a_calibration_of_another_truth_is_told(calibrated: Robot) -> None:
+    plan = small_plan(["AP"], cycles={"AP": 1})
+    found = truearm.iso9283_simulate("irb120", plan, truth="random", seed=1, corrected=calibrated)
+    (notice,) = found.warnings
+    assert (notice.code, notice.level) == ("another-truth", "warning")
+    assert "calibrated on another truth" in found.lines()[-1]
+    assert found.summary()["warnings"][0]["code"] == "another-truth"
 
 
 def test_a_path_is_corrected_as_well(calibrated: Robot) -> None:

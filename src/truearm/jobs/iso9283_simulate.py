@@ -29,6 +29,7 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_vector, rotation_vector
 from truearm.modeling.wrench import STANDARD_GRAVITY
+from truearm.notices import Notice
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_simulation import FILES, Iso9283Simulation, StatedTie
 from truearm.simulation.gear_errors import DRAWN
@@ -52,6 +53,8 @@ _LOCATED: Final = 30
 _SAME_PLACE: Final = (20e-3, math.radians(1.0))
 #: Which numbers of a seed say how far joints give way.
 _PUSHED: Final = 1
+#: Share of the error of the nominal robot that a calibration of the truth leaves, at most.
+_NO_BETTER: Final = 0.5
 #: Arms are the same whose flanges are nearer than this [m].
 _SAME_ARM: Final = 1e-6
 
@@ -143,12 +146,12 @@ def iso9283_simulate(
     drawn = truth == "nominal" or _is_drawn(truth)
     base, tip = _frames_of(planned, twin, drawn=drawn)
     tie = _stated(base, rng)
-    correct = None
+    correct, warnings = None, list[Notice]()
     if corrected is not None:
         with refusals_of("corrected"):
             calibrated = robot_argument(corrected, "corrected")
             _check_kinds(planned.robot, calibrated)
-            correct = _correction(planned, calibrated, TrueRobot(twin, tip), base, tie, tracker, rng)
+            correct, warnings = _correction(planned, calibrated, TrueRobot(twin, tip), base, tie, tracker, rng)
     lever = float(np.linalg.norm(planned.cube.centre))
     weight = STANDARD_GRAVITY * (planned.rated_load or 1.0)
     # Drawn by itself, so that the seed draws the rest as it does without it.
@@ -168,6 +171,7 @@ def iso9283_simulate(
         folder,
         call,
         files_of(robot, plan, truth, corrected),
+        tuple(warnings),
     )
     if folder is not None:
         progress("writing")
@@ -279,8 +283,11 @@ def _correction(
     tie: StatedTie,
     tracker: Tracker,
     rng: np.random.Generator,
-) -> Corrected:
-    """Return how commands are corrected: with the tie as it is stated, and a tool that was located by readings."""
+) -> tuple[Corrected, list[Notice]]:
+    """Return how commands are corrected: with the tie as it is stated, and a tool that was located by readings.
+
+    The notice says if the calibrated robot meets these no better than the nominal one: it is that of another truth.
+    """
     q = plan.robot.random_configurations(5, np.random.default_rng(0))
     other = nominal_robot(calibrated).forward(q)[0] - plan.robot.forward(q)[0]
     if np.abs(other).max() > _SAME_PLACE[0]:
@@ -300,7 +307,11 @@ def _correction(
             allowed=f"up to {1e3 * _SAME_PLACE[0]:g} mm and {math.degrees(_SAME_PLACE[1]):g} deg",
             cure="Calibrate it from readings of the same truth ('truearm simulate').",
         )
-    tip = _located(plan, calibrated, true, tracker, rng)
+    q = calibrated.random_configurations(_LOCATED, rng)
+    position, rotation = _read(q, true, tracker, rng)
+    tip, off = _located(*calibrated.with_payload(Payload()).world_poses(q), position, rotation)
+    flange, faces = plan.robot.forward(q)
+    nominal = _located(flange @ base[:3, :3].T + base[:3, 3], base[:3, :3] @ faces, position, rotation)[1]
     to_flange = np.linalg.inv(tip.matrix)
     in_identified = np.linalg.inv(tie.T_base_instrument.matrix @ calibrated.base.matrix)
 
@@ -318,22 +329,40 @@ def _correction(
             )
         return found.joints
 
-    return corrected
+    return corrected, [] if off <= max(_NO_BETTER * nominal, 3.0 * tracker.sigma) else [_of_another(off, nominal)]
 
 
-def _located(
-    plan: PerformancePlan, calibrated: Robot, true: TrueRobot, tracker: Tracker, rng: np.random.Generator
-) -> Transform:
-    """Return where the tip is on the flange of a calibrated robot, found from readings of it without a load."""
-    joints = calibrated.random_configurations(_LOCATED, rng)
+def _of_another(off: float, nominal: float) -> Notice:
+    return Notice(
+        "another-truth",
+        f"The calibrated robot misses this twin by {1e3 * off:.2g} mm, the nominal one by {1e3 * nominal:.2g} mm (root "
+        f"mean square at {_LOCATED} configurations): it was calibrated on another truth, or badly. Correcting with it "
+        "tells nothing of the robot that was measured. Give the truth, and its seed, that the measurements are of.",
+    )
+
+
+def _read(joints: Array, true: TrueRobot, tracker: Tracker, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return what the instrument reads of the tip without a load: ``(n, 3)`` [m] and ``(n, 3, 3)``."""
     robot = true.twin.robot
     placed = robot.with_frames(robot.base, {"tip": true.tip})
     twin = replace(true.twin, robot=replace(placed, payload=Payload(), wrench=None))
     frames = twin.frames(joints, approach=np.zeros_like(joints))["tip"]
-    position = frames[:, :3, 3] + rng.normal(0.0, tracker.sigma, (_LOCATED, 3))
-    rotation = rotation_from_vector(rng.normal(0.0, tracker.sigma_rot, (_LOCATED, 3))) @ frames[:, :3, :3]
-    at, turned = calibrated.with_payload(Payload()).world_poses(joints)
+    position = frames[:, :3, 3] + rng.normal(0.0, tracker.sigma, (len(joints), 3))
+    return position, rotation_from_vector(rng.normal(0.0, tracker.sigma_rot, (len(joints), 3))) @ frames[:, :3, :3]
+
+
+def _located(at: Array, turned: Array, position: Array, rotation: Array) -> tuple[Transform, float]:
+    """Return where the tip is on a flange, and by how much readings of it are off, as a root mean square [m].
+
+    Parameters
+    ----------
+    at, turned
+        The flange in the instrument's frame: ``(n, 3)`` [m] and ``(n, 3, 3)``.
+    position, rotation
+        Readings of the tip.
+    """
     across = turned.transpose(0, 2, 1)
-    offset = np.einsum("nij,nj->i", across, position - at) / _LOCATED
+    offset = np.einsum("nij,nj->i", across, position - at) / len(at)
     U, _, Vt = np.linalg.svd((across @ rotation).sum(axis=0))
-    return Transform.from_matrix(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt, offset)
+    off = float(np.sqrt(np.mean(np.sum((position - at - turned @ offset) ** 2, axis=1))))
+    return Transform.from_matrix(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt, offset), off

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from truearm.measurement.performance.writing import forces_text, poses_text, samples_text
 from truearm.modeling.transform import Transform
-from truearm.results.record import Record
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted
 from truearm.units import from_si
 from truearm.validation.iso9283.simulated_readings import SimulatedCampaign, Tracker
@@ -77,6 +78,8 @@ class Iso9283Simulation(Record):
         How to simulate it again.
     inputs
         The files that were read: none of them is overwritten.
+    warnings
+        What speaks against it.
     """
 
     robot: str
@@ -89,6 +92,7 @@ class Iso9283Simulation(Record):
     out: Path | None
     command: str
     inputs: tuple[Path, ...] = ()
+    warnings: tuple[Notice, ...] = ()
 
     def _counts(self) -> dict[str, int]:
         campaign = self.campaign
@@ -112,6 +116,7 @@ class Iso9283Simulation(Record):
             "noise_rot_deg": from_si(self.tracker.sigma_rot, "deg"),
             "hours": self.campaign.duration / 3600.0,
             "files": [] if self.out is None else [str(self.out / name) for name in self.files()],
+            "warnings": notice_summaries(self.warnings),
         }
 
     def lines(self) -> list[str]:
@@ -126,7 +131,7 @@ class Iso9283Simulation(Record):
         text.append(f"  {self.campaign.duration / 3600.0:.1f} hours in the cell")
         if self.out is not None:
             text.append(f"Written to {self.out}: {', '.join(self.files())}")
-        return text
+        return text + notice_lines(self.warnings)
 
     def files(self) -> tuple[str, ...]:
         """Return the names of the files that hold it."""

@@ -237,6 +237,10 @@ def test_a_second_window_reads_until_it_takes_over(serving: Serving) -> None:
         send(first, type="GuiUpdateMessage", uuid=robot, updates={"value": "ur5"})
         send(second, type="GuiUpdateMessage", uuid=robot, updates={"value": "ur10"})
         assert eventually(lambda: studio.window.project.settings.robot == "ur10")
+        (banner,) = studio.window._windows.banners.values()
+        assert "Another window works" in banner[0].content
+        second.close()
+        assert eventually(lambda: "No window works on this project now" in banner[0].content)
 
 
 def test_a_window_that_reads_shows_again_what_holds_and_bothers_nobody(serving: Serving) -> None:

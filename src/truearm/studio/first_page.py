@@ -1,4 +1,5 @@
-"""The page as it is served: viser's, with a few styles, and what a browser without WebGL needs to show anything."""
+"""The page as it is served: viser's, with a few styles, what a browser without WebGL needs to show anything, and what
+brings the page back after the studio was away."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from typing import Final
 
 from websockets.http11 import Response
 
-_SCRIPT: Final = Path(__file__).with_name("without_webgl.js")
+_SCRIPTS: Final = tuple(Path(__file__).with_name(name) for name in ("without_webgl.js", "comes_back.js"))
 _BEFORE: Final = b"<head>"
 #: The tabs of all pages stand in one row, a number beside a slider is shown whole, and the buttons of a picture come up
 #: below its legend.
@@ -21,7 +22,7 @@ _STYLE: Final = (
 
 
 def complete(response: Response) -> None:
-    """Put the script that speaks for browsers without WebGL before everything else in viser's page."""
+    """Put the scripts before everything else in viser's page."""
     packed = response.headers.get("Content-Encoding") == "gzip"
     if response.headers.get("Content-Type", "").startswith("text/html"):
         response.body = _completed(bytes(response.body), packed)
@@ -36,5 +37,6 @@ def _completed(body: bytes, packed: bool) -> bytes:
     if not found:
         return body
     title = rest.replace(b"<title>Viser</title>", b"<title>truearm studio</title>", 1)
-    whole = head + found + b"\n<script>\n" + _SCRIPT.read_bytes() + b"</script>" + _STYLE + title
+    scripts = b"".join(b"\n<script>\n" + script.read_bytes() + b"</script>" for script in _SCRIPTS)
+    whole = head + found + scripts + _STYLE + title
     return gzip.compress(whole) if packed else whole

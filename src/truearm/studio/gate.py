@@ -33,6 +33,8 @@ from truearm.studio.first_page import complete
 from truearm.studio.uploads import Uploads
 from truearm.studio.values import checked
 
+#: Where the page asks whether somebody is there.
+_ALIVE: Final = "/alive"
 #: A message of the window is small; files come in parts of half a megabyte.
 _MESSAGE_SIZE: Final = 4_000_000
 #: What any window may send: where it looks from, and answers that viser asked for.
@@ -100,6 +102,8 @@ class Gate:
                 self._tell(f"refused: {refused.why}")
                 text = f"truearm studio refused this: {refused.why}.\n"
                 response = connection.respond(http.HTTPStatus(refused.status), text)
+            elif request.path == _ALIVE:
+                response = connection.respond(http.HTTPStatus.OK, "yes\n")
             elif self.access.enters(request):
                 response = self.access.entered()
             else:

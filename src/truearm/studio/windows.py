@@ -82,6 +82,7 @@ class Windows:
         self.banners.pop(client.client_id, None)
         if connection is not None:
             self._gate.gone(connection)
+            self._show_who_works()
 
     def _show_who_works(self) -> None:
         """Let every window that only reads say so, and offer to take over."""
@@ -92,12 +93,15 @@ class Windows:
                     self._gate.offers.discard(element._impl.uuid)
                     element.remove()
             elif not working and not shown:
-                text = Notice("read-only", "Another window works on this project; this one only reads.", "warning")
-                said = client.gui.add_html(words.notice(text), order=-2.0)
+                said = client.gui.add_html("", order=-2.0)
                 button = client.gui.add_button("Take over", order=-1.0, color="orange")
                 self._gate.offers.add(button._impl.uuid)
                 button.on_click(partial(self._take_over, connection))
                 self.banners[number] = [said, button]
+        who = "Another window works on this project" if self._gate.has_worker else "No window works on this project now"
+        text = words.notice(Notice("read-only", f"{who}; this one only reads.", "warning"))
+        for said, _ in [*self.banners.values()]:
+            said.content = text
 
     def _take_over(self, connection: ServerConnection, _: Any) -> None:
         self._gate.take_over(connection)

@@ -1,5 +1,4 @@
-"""The page as it is served: viser's, with a few styles, what a browser without WebGL needs to show anything, and what
-brings the page back after the studio was away."""
+"""The page as it is served: viser's, with styles, and with scripts for what viser's page does not know to do."""
 
 from __future__ import annotations
 

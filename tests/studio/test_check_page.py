@@ -205,7 +205,7 @@ def test_where_a_file_excludes_nothing_nothing_is_said_of_it_when_other_measurem
     page._reason._impl.value = "beam broken"
     act(page._exclude)
     act(page._restore)
-    assert window.project.settings.exclude == "excluded.csv"
+    assert page._file.value == "excluded.csv"
     act(page._data, "other.csv")
     assert (window.project.settings.data, window.project.settings.exclude) == ("other.csv", None)
     assert "nothing-excluded" not in notices(window)

@@ -191,9 +191,19 @@ def test_the_page_says_what_its_result_is_of_and_what_of_that_is_not_chosen_now(
     (tested / "iso9283" / ROBOT).write_text(f"{robot}\n")
     window.refresh()
     assert "robot iso9283/robot.yaml as it was then. Chosen now: robot iso9283/robot.yaml as it is" in page._of.content
+    (tested.parent / "outside.yaml").write_text(robot)
+    (tested / "iso9283" / ROBOT).unlink()
+    (tested / "iso9283" / ROBOT).symlink_to(tested.parent / "outside.yaml")
+    window.refresh()
+    assert "Chosen now: robot iso9283/robot.yaml, which cannot be read." in page._of.content
+    (tested / "iso9283" / ROBOT).unlink()
     (tested / "iso9283" / ROBOT).write_text(robot)
 
     held = json.loads((tested / "of/iso9283.json").read_text())
+    held["inputs"]["robot"]["file"] = ""  # of another program
+    (tested / "of/iso9283.json").write_text(json.dumps(held))
+    window.refresh()
+    assert first in page._of.content
     del held["inputs"]
     (tested / "of/iso9283.json").write_text(json.dumps(held))
     window.refresh()

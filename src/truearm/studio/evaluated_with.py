@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Iterator
 from functools import lru_cache
@@ -10,6 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from truearm.errors import InputError
+from truearm.files import read_bytes
+from truearm.manifest import hash_of
 from truearm.modeling.robot import Robot
 from truearm.modeling.same_arm import fitted_from
 from truearm.notices import Notice
@@ -127,15 +128,14 @@ def _other_files(names: tuple[str, ...], inputs: dict[str, ReadFile], project: P
 def _other_robot_file(inputs: dict[str, ReadFile], project: Project) -> Iterator[tuple[str, str]]:
     """Return the robot file beside the plan, where it has changed."""
     then, plan = inputs.get("robot"), project.settings.performance.plan
-    if then is not None and plan is not None:
+    if then is not None and plan is not None and Path(then.file).name:
         path = project.path(plan).with_name(Path(then.file).name)
         yield from _changed("robot", then, project.relative(path), path, project.folder)
 
 
 def _changed(name: str, then: ReadFile, now: str, path: Path, folder: Path) -> Iterator[tuple[str, str]]:
     """Return a file as it was and as it is, where the two differ."""
-    stamp = stamp_of(path)
-    content = None if stamp is None else _hash(path, stamp)
+    content = _hash(path)
     if content == then.sha256:
         return
     if content is None:
@@ -169,13 +169,16 @@ def _near(one: float | None, other: float) -> bool:
     return one is not None and math.isclose(one, other, rel_tol=_SAME)
 
 
-@lru_cache(maxsize=64)
-def _hash(path: Path, stamp: tuple[int, int]) -> str | None:
-    """Return the hash of a file as it is with a stamp; None if it cannot be read."""
+def _hash(path: Path) -> str | None:
+    """Return the hash of a file as it is now; None if it cannot be read."""
+    stamp = stamp_of(path)
     try:
-        if not path.is_file():
-            return None
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError:
+        return None if stamp is None else _hash_at(path, stamp)
+    except InputError:
         return None
+
+
+@lru_cache(maxsize=64)
+def _hash_at(path: Path, stamp: tuple[int, int]) -> str:
+    """Return the hash of a file as it is with a stamp: large ones are not read anew at every edit."""
+    return hash_of(read_bytes(path, "samples_size"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import hashlib
 import inspect
 import json
 import re
@@ -107,6 +108,11 @@ def test_every_criterion_has_a_value_and_the_files_hold_it(found: Iso9283Evaluat
     keys = {"id", "component", "where", "value", "unit", "interval_95", "cycles", "conditions", "status"}
     assert all(keys <= {*entry} <= keys | {"range", "bandwidth_hz"} for entry in held["criteria"])
     assert held["alignment"]["kind"] == "base-features"
+    given = {**campaign, "robot": campaign["plan"].with_name("robot.yaml")}
+    assert held["inputs"] == {
+        name: {"file": str(given[name]), "sha256": hashlib.sha256(Path(given[name]).read_bytes()).hexdigest()}
+        for name in ("plan", "poses", "paths", "settling", "forces", "alignment", "robot")
+    }
 
 
 def test_pose_accuracy_is_what_the_twin_truly_misses(found: Iso9283Evaluation) -> None:

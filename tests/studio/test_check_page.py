@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -101,6 +102,7 @@ def test_readings_are_excluded_with_a_reason_undone_and_restored(window: Window)
     assert "1 reading is excluded: beam broken (1)." in page._found.content
     act(page._restore)
     assert file.read_text() == "configuration,target,reason\n"
+    assert page._excluded == ()
     assert window.project.changes() == ()
     file.write_text("configuration,target,reason\n1,1,by another program\n")
     with pytest.raises(InputError, match="another program has changed this file, and it is not overwritten"):
@@ -176,6 +178,57 @@ def test_other_measurements_are_calibrated_without_what_was_excluded_from_the_fi
     assert "nothing-excluded" not in notices(window)[told:]
 
 
+def test_a_reason_is_that_of_the_readings_for_which_it_was_given(window: Window) -> None:
+    page, _ = page_of(window)
+    (window.project.folder / "other.csv").write_text(csv_text(DATA))
+    act(page._run)
+
+    def given(do: Callable[[], None]) -> str:
+        """Return what is left of a reason after something is done."""
+        page._reason._impl.value = "beam broken"
+        do()
+        return str(page._reason.value)
+
+    assert given(window.refresh) == "beam broken"
+    assert given(lambda: act(page._reading, "3/2")) == ""
+    assert given(lambda: act(page._finding, "(any reading)")) == ""
+    assert given(lambda: act(page._exclude)) == "beam broken"  # refused: no reading is chosen
+    act(page._reading, "3/2")
+    assert given(lambda: act(page._exclude)) == ""
+    assert [one.reason for one in page._excluded] == ["beam broken"]
+    assert given(lambda: act(page._file, "(none)")) == ""
+    assert given(lambda: act(page._data, "other.csv")) == ""
+
+
+def test_where_a_file_excludes_nothing_nothing_is_said_of_it_when_other_measurements_are_chosen(window: Window) -> None:
+    page, _ = page_of(window)
+    (window.project.folder / "other.csv").write_text(csv_text(DATA))
+    act(page._run)
+    page._reason._impl.value = "beam broken"
+    act(page._exclude)
+    act(page._restore)
+    assert page._file.value == "excluded.csv"
+    act(page._data, "other.csv")
+    assert (window.project.settings.data, window.project.settings.exclude) == ("other.csv", None)
+    assert "nothing-excluded" not in notices(window)
+
+
+def test_the_worst_finding_is_chosen_also_where_it_names_no_readings(window: Window) -> None:
+    page, jog = page_of(window)
+    scaled = replace(DATA, position=DATA.position * 1e-3)
+    (window.project.folder / "data.csv").write_text(csv_text(scaled))
+    act(page._run)
+    assert page._finding.value == "1. error unit-length"
+    assert (page._reading.value, page._reading.options) == ("(none)", ("(none)",))
+    assert "This finding names no readings." in page._drawn.content
+    act(page._draws, True)
+    assert "This finding names no readings. 0 readings chosen" in page._drawn.content
+    assert jog.scene._parts["finding"] == []
+    page._reason._impl.value = "beam broken"
+    act(page._exclude)
+    assert "no reading is chosen" in notices(window)
+
+
 def test_where_nothing_is_wrong_nothing_is_drawn_before_it_is_asked_for(window: Window) -> None:
     page, jog = page_of(window)
     (window.project.folder / "data.csv").write_text(csv_text(DATA))
@@ -183,7 +236,12 @@ def test_where_nothing_is_wrong_nothing_is_drawn_before_it_is_asked_for(window: 
     assert (page._finding.value, page._draws.value) == ("(any reading)", False)
     assert jog.scene._parts.get("readings", []) == []
     act(page._draws, True)
-    assert len(jog.scene._parts["readings"][0].points) == len(DATA.position) - 1
+    assert len(jog.scene._parts["readings"][0].points) == len(DATA.position)
+    page._reason._impl.value = "beam broken"
+    act(page._exclude)  # nobody has chosen a reading
+    assert "no reading is chosen" in notices(window)
+    assert page._excluded == ()
+    act(page._reading, "1/1")
     page._reason._impl.value = "beam broken"
     act(page._exclude)
     window.edit(robot="irb1600")

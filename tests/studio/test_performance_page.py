@@ -19,6 +19,7 @@ from truearm.modeling.formats.robot_file import robot_text
 from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text, read_plan
 from truearm.results.iso9283_table import conditions_summary, values_of, worst_places
 from truearm.studio.cube_in_space import cube_in_space
+from truearm.studio.pages.choices import NONE
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.performance import PerformancePage
 from truearm.studio.window import Window
@@ -72,7 +73,10 @@ def test_the_values_of_the_command_stand_in_the_table_and_in_space(
         assert all(cell in shown for k, cell in enumerate(worst.cells) if k != 4)
     act(page._criterion, "AP")
     assert page._table.content.count("<tr>") == 1 + sum(value.id == "AP" for value in values_of(result))
-    assert all(f"({one.code})" in page._notices.content for one in result.warnings)
+    assert result.warnings
+    assert all(f"({one.code})" in page._of.content for one in result.warnings)
+    assert page._of.order < page._table.order
+    assert "(other-" not in page._of.content
     assert page._picture.visible
     assert "accuracy" in page._picture.options
 
@@ -112,7 +116,8 @@ def test_a_result_of_another_plan_is_not_drawn_and_one_that_is_none_is_refused(t
     page, jog = page_of(window)
     window.edit(performance={"plan": f"other/{PLAN}", "result": "kept"})
     act(page._drawn._draw, True)
-    assert "(other-plan)" in page._drawn._said.content
+    assert "its errors are not drawn" in page._drawn._said.content
+    assert "(other-plan)" in page._of.content
     assert jog.scene._parts["tests-errors"] == []
     assert len(jog.scene._parts["tests-frame"]) == 1
     window.edit(robot="kr5")
@@ -122,6 +127,99 @@ def test_a_result_of_another_plan_is_not_drawn_and_one_that_is_none_is_refused(t
     assert "this is no result of tests by ISO 9283" in notices(window)
     with pytest.raises(Exception, match="no place in the project"):
         window.edit(performance={"plan": "../plan.yaml"})
+
+
+def test_the_page_says_what_its_result_is_of_and_what_of_that_is_not_chosen_now(
+    tested: Path, serving: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window = serving(tested).window
+    page, _ = page_of(window)
+    at_once(window, monkeypatch)
+    poses = (tested / "measured/poses.csv").read_text()
+    (tested / "mine.csv").write_text(poses)
+    (tested / "other.csv").write_text(poses + "\n")
+    (tested / "none.csv").write_text("criterion,pose\n")
+    files = {"plan": f"iso9283/{PLAN}", "alignment": "measured/alignment.yaml"}
+    window.edit(robot="irb120", performance={**files, "poses": "mine.csv", "result": "of"})
+    act(page._run)
+    first = (
+        "Of irb120, plan iso9283/plan.yaml, poses mine.csv, alignment measured/alignment.yaml, "
+        "noise 0.01 mm and 0.005 deg."
+    )
+    assert first in page._of.content
+    assert "(other-" not in page._of.content
+    assert page._said.content.count("Written to of") == 1
+    table = page._table.content
+
+    act(page._choices["poses"], "other.csv")
+    said = "(other-measurements)</b>: This result is of poses mine.csv. Chosen now: poses other.csv. Evaluate again."
+    assert said in page._of.content
+    act(page._choices["poses"], "none.csv")
+    act(page._run)
+    assert "(refused)" in notices(window)
+    assert page._table.content == table
+    assert first in page._of.content
+    assert "Chosen now: poses none.csv." in page._of.content
+    act(page._choices["poses"], "measured/poses.csv")  # the same readings under another name
+    assert "(other-" not in page._of.content
+    act(page._choices["forces"], "other.csv")
+    assert "is of no forces. Chosen now: forces other.csv." in page._of.content
+    act(page._choices["forces"], NONE)
+    act(page._choices["poses"], "mine.csv")
+    (tested / "mine.csv").write_text(poses + "\n\n")
+    window.refresh()
+    assert "is of poses mine.csv as it was then. Chosen now: poses mine.csv as it is now." in page._of.content
+    (tested / "mine.csv").unlink()
+    window.refresh()
+    assert "Chosen now: poses mine.csv, which cannot be read." in page._of.content
+    (tested / "mine.csv").write_text(poses)
+    window.edit(performance={**files, "poses": "mine.csv", "result": "of", "noise_mm": 0.05, "alignment": None})
+    said = (
+        "(other-settings)</b>: This result was made with alignment measured/alignment.yaml; noise 0.01 mm and 0.005 "
+        "deg. Chosen now: no alignment; noise 0.05 mm and 0.005 deg. Evaluate again."
+    )
+    assert said in page._of.content
+    window.edit(performance={**files, "poses": "mine.csv", "result": "of"})
+    assert "(other-" not in page._of.content
+
+    assert not page._drawn._draw.value
+    window.edit(robot="ur5e")
+    said = "The plan that is chosen and this result are of the robot irb120, and ur5e is chosen."
+    assert f"(other-plan)</b>: {said}" in page._of.content
+    window.edit(robot="irb120")
+    robot = (tested / "iso9283" / ROBOT).read_text()
+    (tested / "iso9283" / ROBOT).write_text(f"{robot}\n")
+    window.refresh()
+    assert "robot iso9283/robot.yaml as it was then. Chosen now: robot iso9283/robot.yaml as it is" in page._of.content
+    (tested.parent / "outside.yaml").write_text(robot)
+    (tested / "iso9283" / ROBOT).unlink()
+    (tested / "iso9283" / ROBOT).symlink_to(tested.parent / "outside.yaml")
+    window.refresh()
+    assert "Chosen now: robot iso9283/robot.yaml, which cannot be read." in page._of.content
+    (tested / "iso9283" / ROBOT).unlink()
+    (tested / "iso9283" / ROBOT).write_text(robot)
+
+    held = json.loads((tested / "of/iso9283.json").read_text())
+    held["inputs"]["robot"]["file"] = ""  # of another program
+    (tested / "of/iso9283.json").write_text(json.dumps(held))
+    window.refresh()
+    assert first in page._of.content
+    del held["inputs"]
+    (tested / "of/iso9283.json").write_text(json.dumps(held))
+    window.refresh()
+    assert "does not say which files it is of" in page._of.content
+    assert page._said.content == ""  # what the evaluation printed is no longer of the file that stands there
+
+
+def test_a_plan_of_an_arm_of_the_same_name_with_other_kinematics_is_told(tested: Path, serving: Serving) -> None:
+    text = (tested / "iso9283" / ROBOT).read_text()
+    (tested / "longer.yaml").write_text(text.replace("270", "275"))
+    assert (tested / "longer.yaml").read_text() != text
+    window = serving(tested).window
+    page, _ = page_of(window)
+    window.edit(robot="longer.yaml", performance={"plan": f"iso9283/{PLAN}"})
+    told = "The plan that is chosen is of the robot irb120 with other kinematics, and irb120 (longer.yaml) is chosen."
+    assert told in page._of.content
 
 
 def test_a_plan_is_simulated_and_what_was_read_is_chosen(
@@ -139,6 +237,7 @@ def test_a_plan_is_simulated_and_what_was_read_is_chosen(
     assert "there is no calibrated robot yet" in notices(window)
     act(page._corrected, False)
     act(page._simulate_button)
+    assert page._said.content.count("Written to iso9283/simulated") == 1
     chosen = window.project.settings.performance
     assert (chosen.poses, chosen.paths) == ("iso9283/simulated/poses.csv", "iso9283/simulated/paths.csv")
     assert (chosen.alignment, chosen.settling, chosen.forces) == ("iso9283/simulated/alignment.yaml", None, None)

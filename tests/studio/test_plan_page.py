@@ -12,7 +12,7 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.cli.conftest import truearm as truearm
 from tests.studio.conftest import Serving
-from tests.studio.pressing import below
+from tests.studio.pressing import at_once, below
 from tests.studio.test_jog_page import act, eventually
 from tests.studio.typing_in import typed as type_in
 
@@ -159,6 +159,27 @@ def test_a_plan_is_written_where_it_is_said(studio: Studio) -> None:
     assert f"Written: {', '.join(names)}" in page._said.content
     assert window.project.changes() == ()
     assert "Another program has changed files: plan.csv (new). The pages show them as they are now." in said(studio)
+
+
+def test_a_plan_from_a_file_has_ways_where_they_are_asked_for(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    window, page = studio.window, page_of(studio)
+    at_once(window, monkeypatch)
+    rows = [f"{k},{','.join(str(10 + 7 * ((k * j) % 5)) for j in range(1, 7))}" for k in range(1, 13)]
+    head = f"configuration,{','.join(f'joint_{j} [deg]' for j in range(1, 7))}"
+    (window.project.folder / "mine.csv").write_text("\n".join([head, *rows]) + "\n")
+    window.edit(plan={"poses": "8", "candidates_from": "mine.csv"})
+    act(page._run)
+    assert page._file.options == ("plan.csv", "plan.html")
+    act(page._tour, "drive")
+    told = "plan.csv: no ways stand beside this plan. Say a clearance, a floor, no floor or home"
+    assert told in below(window, page._tour)
+    window.edit(plan={"poses": "8", "candidates_from": "mine.csv", "clearance": 10.0})
+    act(page._run)
+    assert "plan-ways.csv" in page._file.options
+    act(page._tour, "drive")
+    jog = next(page for page in window.pages if isinstance(page, JogPage))
+    assert jog._playing is not None
+    act(page._tour, "stop")
 
 
 def test_the_ways_are_driven_from_home_and_shown_after_reopening(

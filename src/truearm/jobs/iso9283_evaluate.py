@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, get_args
 
 from truearm.errors import InputError, refusals_of
-from truearm.files import path_argument
+from truearm.files import noted_reads, path_argument
 from truearm.jobs.arguments import (
     command_argument,
     deviation_argument,
@@ -31,6 +31,7 @@ from truearm.validation.iso9283.alignment import Alignment, read_alignment, refu
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.copied import copied_blocks
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
+from truearm.validation.iso9283.result_file import ReadFile
 from truearm.validation.iso9283.said_of_drift import said_of_drift
 from truearm.validation.iso9283.said_of_pushes import said_of_pushes
 from truearm.validation.iso9283.said_of_rounding import said_of_rounding
@@ -99,38 +100,49 @@ def iso9283_evaluate(
         noise_rot=noise_rot,
         compare=compare,
     )
-    with refusals_of("plan"):
-        planned = read_plan(plan_path)
-    tie: Alignment | None = None
-    if tie_path is not None:
-        with refusals_of("alignment"):
-            tie = read_alignment(tie_path)
-    read: dict[str, Any] = {}
-    for name, file in files.items():
-        if file is None:
-            continue
-        progress(f"reading {file.name}")
-        with refusals_of(name):
-            read[name] = _READERS[name](file)
-    if tie is not None and read:
-        _refuse_far_files(tie, planned.cube, read, str(tie_path))
-    instrument = Instrument(sigma, sigma_rot)
-    found = evaluated(planned, Measurements(**read), tie, instrument, progress)
-    warnings = (
-        *_warnings(planned, found, read, instrument),
-        *_of_plan(plan_path),
-        *said_of_pushes(planned, found.pushes, instrument),
-        *said_of_drift(planned, found.drift),
-    )
-    made = Iso9283Evaluation(planned, found, instrument, None, call, warnings, inputs)
-    if other is not None:
-        with refusals_of("compare"):
-            made = replace(made, comparison=compared(made.summary(), other))
-        made = replace(made, warnings=(*made.warnings, *_warnings_of_comparison(made)))
+    with noted_reads() as noted:
+        with refusals_of("plan"):
+            planned = read_plan(plan_path)
+        tie: Alignment | None = None
+        if tie_path is not None:
+            with refusals_of("alignment"):
+                tie = read_alignment(tie_path)
+        read: dict[str, Any] = {}
+        for name, file in files.items():
+            if file is None:
+                continue
+            progress(f"reading {file.name}")
+            with refusals_of(name):
+                read[name] = _READERS[name](file)
+        if tie is not None and read:
+            _refuse_far_files(tie, planned.cube, read, str(tie_path))
+        instrument = Instrument(sigma, sigma_rot)
+        found = evaluated(planned, Measurements(**read), tie, instrument, progress)
+        warnings = (
+            *_warnings(planned, found, read, instrument),
+            *_of_plan(plan_path),
+            *said_of_pushes(planned, found.pushes, instrument),
+            *said_of_drift(planned, found.drift),
+        )
+        made = Iso9283Evaluation(planned, found, instrument, None, call, warnings, inputs)
+        if other is not None:
+            with refusals_of("compare"):
+                made = replace(made, comparison=compared(made.summary(), other))
+            made = replace(made, warnings=(*made.warnings, *_warnings_of_comparison(made)))
+    named = {"plan": plan_path, **files, "alignment": tie_path, "compare": other}
+    made = replace(made, read=_read_files(named, noted))
     if folder is not None:
         progress("writing the report")
         made.save(folder)
     return made
+
+
+def _read_files(named: Mapping[str, Path | None], noted: Mapping[Path, Sequence[str]]) -> dict[str, ReadFile]:
+    """Return the files that were read, by their parameters; the one beside the plan that nobody named is the robot."""
+    given = {name: path for name, path in named.items() if path is not None}
+    beside = next(path.name for path in noted if path not in {one.absolute() for one in given.values()})
+    given["robot"] = given["plan"].parent / beside
+    return {name: ReadFile(file=str(path), sha256=noted[path.absolute()][0]) for name, path in given.items()}
 
 
 def _refuse_far_files(tie: Alignment, cube: Cube, read: Mapping[str, Any], where: str) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +18,7 @@ from truearm.shown import counted
 from truearm.validation.iso9283.comparable import plan_summary
 from truearm.validation.iso9283.comparison import Comparison
 from truearm.validation.iso9283.evaluation import Evaluation
+from truearm.validation.iso9283.result_file import ReadFile
 from truearm.validation.iso9283.values import Conditions, Instrument, Value
 from truearm.writing import output_folder, write_files
 
@@ -46,6 +48,8 @@ class Iso9283Evaluation(Record):
         What to know about it.
     inputs
         The files that were read: none of them is overwritten.
+    read
+        Their names and hashes, by the parameters that named them; ``robot`` is the robot file of the plan.
     """
 
     plan: PerformancePlan
@@ -55,6 +59,7 @@ class Iso9283Evaluation(Record):
     command: str
     warnings: tuple[Notice, ...] = ()
     inputs: tuple[Path, ...] = ()
+    read: Mapping[str, ReadFile] = field(default_factory=dict)
 
     @property
     def values(self) -> tuple[Value, ...]:
@@ -77,6 +82,7 @@ class Iso9283Evaluation(Record):
                 "sigma_mm": self.instrument.sigma * 1e3,
                 "sigma_rot_deg": None if self.instrument.sigma_rot is None else math.degrees(self.instrument.sigma_rot),
             },
+            "inputs": {name: one.model_dump() for name, one in self.read.items()},
             "rated": {"load_kg": self.plan.rated_load, "velocity_mm_s": self.plan.rated_velocity * 1e3},
             "plan": plan_summary(self.plan),
             "criteria": [value_summary(value) for value in self.values],

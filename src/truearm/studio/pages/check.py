@@ -32,6 +32,7 @@ _DRAWN: Final = (
     ("finding", (214, 69, 61), 0.016),
     ("excluded", (230, 140, 0), 0.012),
 )
+_NAMELESS: Final = "This finding names no readings."
 _RULE: Final = (
     "Exclude readings for reasons of the instrument alone, such as a broken beam. To exclude what fits badly, or to "
     "measure it again, falsifies the proof. Nothing is deleted: the reasons stand in a file of the project, and the "
@@ -51,6 +52,7 @@ class CheckPage:
         self._shown: tuple[Any, ...] = ()
         self._excluded: tuple[Exclusion, ...] = ()
         self._text: str | None = None  # of their file
+        self._reason_of: tuple[str | None, str | None] = (None, None)  # measurements, and the file of excluded readings
         gui = window.gui
         self._data: Any = gui.add_dropdown("Measurements", (NONE,), hint="a CSV file of the project")
         self._file: Any = gui.add_dropdown("Exclude", (NONE,), hint="a file of readings that are excluded")
@@ -73,7 +75,7 @@ class CheckPage:
         self._file.on_update(window.action(lambda: window.edit(exclude=chosen(self._file))))
         self._run.on_click(window.action(self._check))
         self._finding.on_update(window.action(self._choose))
-        self._reading.on_update(window.action(self._draw))
+        self._reading.on_update(window.action(self._choose_reading))
         self._draws.on_update(window.action(self._draw))
         self._arm.on_click(window.action(self._go))
         self._exclude.on_click(window.action(self._add))
@@ -85,6 +87,8 @@ class CheckPage:
         offer(self._data, project.names(".csv"), settings.data)
         offer(self._file, project.names(".csv"), settings.exclude)
         self._show_excluded()
+        if self._reason_of != (settings.data, settings.exclude):
+            self._reason.value, self._reason_of = "", (settings.data, settings.exclude)
         if self._checked is not None and self._of != self._now():
             changed = "Exclusions" if self._of[:2] == self._now()[:2] else "Robot or measurements"
             self._found.content = words.paragraph(f"{changed} have changed: check again.")
@@ -107,9 +111,9 @@ class CheckPage:
             messages = [one.message for one in found.findings]
             rest = [line for line in found.outcome.lines[1:] if not any(text in line for text in messages)]
             self._found.content = shown + words.lines(rest)
-            names = (_ANY, *(_name(number, one) for number, one in enumerate(found.findings, 1) if one.at))
-            offer(self._finding, names, names[1] if len(names) > 1 else _ANY, None)
-            self._draws.value = len(names) > 1  # where nothing is wrong, nothing stands in the way
+            names = [_name(number, one) for number, one in enumerate(found.findings, 1)]
+            offer(self._finding, (_ANY, *names), next(iter(names), _ANY), None)
+            self._draws.value = any(one.at for one in found.findings)  # what is right does not stand in the way
             self._choose()
 
         window.start(
@@ -123,14 +127,18 @@ class CheckPage:
         )
 
     def _choose(self) -> None:
-        """Offer the readings of the chosen finding, and draw them."""
+        """Offer the readings of the chosen finding, and draw them; where none is chosen, no reading is either."""
         found = self._checked
         if found is None:
             return
         named = self._named(found)[:_LISTED]
-        every = () if self._finding.value == _ANY else (_ALL,)
-        names = [*every, *(_reading(*found.readings[k]) for k in named)]
-        offer(self._reading, dict.fromkeys(names), next(iter(names), _ALL), None)
+        first = _ALL if self._finding.value != _ANY and named else NONE
+        offer(self._reading, (first, *(_reading(*found.readings[k]) for k in named)), first, None)
+        self._choose_reading()
+
+    def _choose_reading(self) -> None:
+        """Draw what is chosen; the reason that was given is that of another reading."""
+        self._reason.value = ""
         self._draw()
 
     def _named(self, found: Checked) -> list[int]:
@@ -143,7 +151,7 @@ class CheckPage:
     def _chosen(self, found: Checked) -> list[int]:
         rows = self._named(found)
         if self._reading.value == _ALL:
-            return rows if self._finding.value != _ANY else []
+            return rows
         return [k for k in rows if _reading(*found.readings[k]) == self._reading.value]
 
     # -- the scene -----------------------------------------------------------------------------------------
@@ -162,7 +170,7 @@ class CheckPage:
         if found is None or scene.solid is None or not self._draws.value:
             for name, *_ in _DRAWN:
                 scene.show_points(name, None)
-            self._drawn.content = ""
+            self._drawn.content = "" if found is None or self._named(found) else words.paragraph(_NAMELESS)
             return
         base = scene.solid.robot.base
         points = found.points @ base.rotation.T + np.array(base.translation)
@@ -174,6 +182,8 @@ class CheckPage:
             scene.show_points(name, _seen(points[some]), colour, size)
         unseen = len(rows) - len(_seen(points[rows]))
         told = f"{counted(len(rows), 'reading')} chosen: red in the scene; excluded ones are orange, all others grey."
+        if not self._named(found):
+            told = f"{_NAMELESS} {told}"
         self._drawn.content = words.paragraph(
             told
             + (f" The first {_LISTED} can be chosen here." if len(self._named(found)) > _LISTED else "")
@@ -195,6 +205,7 @@ class CheckPage:
         if found is None or not rows:
             raise InputError("no reading is chosen", parameter="Reading", cure="Choose one, or a finding.")
         self._write(with_exclusions(self._excluded, found.named(rows), self._reason.value))
+        self._reason.value = ""
 
     def _remove(self) -> None:
         kept = [one for one in self._excluded if _reading(one.configuration, one.target) != self._back.value]
@@ -239,12 +250,24 @@ def choose_measurements(window: Window, name: str | None) -> None:
     if settings.data in (None, name) or settings.exclude is None:
         window.edit(data=name)
         return
+    told = _excludes(window, settings.exclude)
     window.edit(data=name, exclude=None)
+    if not told:
+        return
     text = (
         f"{settings.exclude} excludes readings of {settings.data}. Other measurements are chosen, so nothing is "
         "excluded now. Undo brings both back; if its readings are among these too, choose it again on the page Check."
     )
     window.tell(Notice("nothing-excluded", text, "warning"))
+
+
+def _excludes(window: Window, name: str) -> bool:
+    """Return whether a file excludes readings; one that cannot be read may."""
+    try:
+        path = window.project.path(name)
+        return exists(path) and bool(read_exclusions(path))
+    except InputError:
+        return True
 
 
 def data_of(window: Window) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 
 from truearm.files import exists
 from truearm.modeling.chain import Array
-from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.results.iso9283_evaluation import RESULT
 from truearm.studio import words
@@ -62,15 +61,14 @@ class DrawnCube:
         result = read_result(place) if exists(place) else None
         said = []
         if plan.robot.name != scene.solid.robot.name:
-            text = f"The plan is of {plan.robot.name}, and {scene.solid.robot.name} is drawn."
-            said.append(Notice("other-plan", text, "warning"))
+            said.append(f"The plan is of {plan.robot.name}, and {scene.solid.robot.name} is drawn.")
         if result is not None and not is_of_plan(result, plan):
-            text = "The result is of another plan than the one that is chosen: its errors are not drawn."
-            said.append(Notice("other-plan", text, "warning"))
+            said.append("The result is of another plan than the one that is chosen: its errors are not drawn.")
             result = None
         space = cube_in_space(plan, result)
         self._draw_space(scene, space, float(self._factor.value), float(self._factor_rp.value))
-        self._said.content = words.notices(said) + (words.paragraph(space.legend()) if space.legend() else "")
+        said += [space.legend()] if space.legend() else []
+        self._said.content = "".join(map(words.paragraph, said))
 
     def _draw_space(self, scene: Scene, space: CubeInSpace, factor: float, factor_rp: float) -> None:
         assert scene.solid is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar, Final
 
@@ -24,6 +25,7 @@ from truearm.results.iso9283_table import (
 from truearm.shown import counted
 from truearm.simulation.truths import truth_names
 from truearm.studio import words
+from truearm.studio.evaluated_with import evaluated_with, other_evaluations, stamp_of, stamps_of
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.drawn_cube import DrawnCube
 from truearm.studio.pictures import Picture, report_figures
@@ -60,9 +62,12 @@ class PerformancePage:
     def __init__(self, window: Window) -> None:
         self._window = window
         gui, files = window.gui, window.project.settings.performance
+        self._result_file: ResultFile | None = None
         self._values: tuple[Value, ...] = ()
         self._figures: dict[str, Any] = {}
         self._shown: tuple[Any, ...] = ()
+        self._compared: tuple[Any, ...] = ()
+        self._said_of: tuple[Any, ...] = ()  # empty for what is of no result
         self._planning()
         self._simulating()
         with gui.add_folder("Evaluate", expand_by_default=True):
@@ -74,6 +79,7 @@ class PerformancePage:
             self._noise_rot: Any = gui.add_number("Noise [deg]", files.noise_rot_deg, min=1e-5, max=10.0, step=0.001)
             self._result: Any = gui.add_text("Result", files.result, hint="folder of the result")
             self._run = gui.add_button("Evaluate the tests")
+        self._of = gui.add_html("")
         self._said = gui.add_html("")
         self._criterion: Any = gui.add_dropdown("Values of", (_WORST,), visible=False)
         self._table = gui.add_html("")
@@ -81,7 +87,6 @@ class PerformancePage:
         self._picture: Any = gui.add_dropdown("Picture", (NONE,), visible=False)
         self._plot = Picture(window, "Picture")
         self._files: Any = gui.add_button_group("Download", EVALUATION_FILES, visible=False)
-        self._notices = gui.add_html("")
         self._noise.on_update(window.settled(lambda: self._change(noise_mm=float(self._noise.value))))
         self._noise_rot.on_update(window.settled(lambda: self._change(noise_rot_deg=float(self._noise_rot.value))))
         self._result.on_update(window.settled(lambda: self._change(result=self._result.value.strip())))
@@ -125,22 +130,35 @@ class PerformancePage:
         truths = truth_names(window.robot())
         offer(self._truth, truths, self._truth.value if self._truth.value in truths else "random", None)
         place = project.path(files.result) / RESULT
-        stat = place.stat() if exists(place) else None
-        shown = (place, stat and (stat.st_mtime_ns, stat.st_size), project.settings.dark)
+        shown = (place, stamp_of(place), project.settings.dark)
         if shown != self._shown:
-            self._show_result(read_result(place) if stat else None)
+            self._show_result(read_result(place) if exists(place) else None)
             self._shown = shown
+        compared = (shown, project.settings, stamps_of(project))
+        if compared != self._compared:
+            self._show_what_it_is_of()
+            self._compared = compared
+        if self._said_of and self._said_of != shown[:2]:
+            self._said.content, self._said_of = "", ()
         self._drawn.refresh()
+
+    def _show_what_it_is_of(self) -> None:
+        """Say what the result is of, what of that is not what is chosen now, and what is to know about it."""
+        result = self._result_file
+        told = other_evaluations(result, self._window.project, self._window.robot())
+        if result is not None:
+            told += [Notice(one.code, one.message, one.level) for one in result.warnings]
+        of = "" if result is None else words.lines([evaluated_with(result)])
+        self._of.content = of + words.notices(told)
 
     def _show_result(self, result: ResultFile | None) -> None:
         there = result is not None
+        self._result_file = result
         self._files.visible = self._criterion.visible = there
         self._values = () if result is None else values_of(result)
         ids = dict.fromkeys(value.id for value in self._values)
         offer(self._criterion, (_WORST, *ids), self._criterion.value if self._criterion.value in ids else _WORST, None)
         self._show_values()
-        told = [] if result is None else [Notice(one.code, one.message, one.level) for one in result.warnings]
-        self._notices.content = words.notices(told)
         folder = self._window.project.path(self._window.project.settings.performance.result)
         self._figures = report_figures(folder / REPORT) if there else {}
         self._picture.visible = self._plot.place.visible = bool(self._figures)
@@ -219,12 +237,13 @@ class PerformancePage:
         self._change(**{n.partition(".")[0]: f"{out}/{n}" if n in outcome.files else None for n in FILES})
 
     def _evaluate(self) -> None:
+        self._said.content, self._said_of = "", ()
         window, files = self._window, self._window.project.settings.performance
         given = {name: getattr(files, name) for name, *_ in _CHOICES if name != "plan"}
         window.start(
             "Evaluate the tests",
             evaluate_tests,
-            lambda outcome: self._told(outcome, files.result),
+            lambda outcome: self._evaluated(outcome, files.result),
             folder=window.project.folder,
             plan=self._file("plan"),
             out=files.result,
@@ -233,14 +252,21 @@ class PerformancePage:
             **given,
         )
 
+    def _evaluated(self, outcome: Outcome, out: str) -> None:
+        """Say what the job printed, as long as its result stands there; its notices stand above the table."""
+        self._told(replace(outcome, notices=()), out)
+        place = self._window.project.path(out) / RESULT
+        self._said_of = place, stamp_of(place)
+
     def _told(self, outcome: Outcome, out: str) -> None:
-        """Say what a job printed, without the notices, which stand below."""
+        """Say what a job printed, and its notices."""
         self._window.project.look(out)
         lines = [line for line in outcome.lines if not any(one.message in line for one in outcome.notices)]
-        self._said.content = words.lines([*lines, f"Written to {out}: {', '.join(outcome.files)}"])
-        if out in (_FOLDER, *_SIMULATED):
-            for notice in outcome.notices:
-                self._window.tell(notice)
+        if not any(line.startswith("Written to ") for line in lines):
+            lines.append(f"Written to {out}: {', '.join(outcome.files)}")
+        self._said.content, self._said_of = words.lines(lines), ()
+        for notice in outcome.notices:
+            self._window.tell(notice)
 
     def _file(self, name: str) -> str:
         found = getattr(self._window.project.settings.performance, name)

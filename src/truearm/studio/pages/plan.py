@@ -183,8 +183,15 @@ class PlanPage:
         if self._tour.value == "stop":
             jog.stop()
             return
-        name = self._ways()
-        if name not in self._written():
+        name, written = self._ways(), self._written()
+        if name not in written and self._table() in written:
+            raise InputError(
+                "no ways stand beside this plan",
+                where=self._table(),
+                cure="Say a clearance, a floor, no floor or home under Ways that are clear, and plan again: of itself "
+                "a plan looks for no ways between configurations of a file, which were reached once.",
+            )
+        if name not in written:
             raise InputError("there are no ways to drive yet", where=name, cure="Plan first.")
         joints = jog.play_file(name, float(self._speed.value), from_its_start=True)
         solid = jog.scene.solid

@@ -40,6 +40,22 @@ class _Tie(BaseModel):
     kind: str
 
 
+class InstrumentOfResult(BaseModel):
+    """What was said of the instrument."""
+
+    model_config = _LENIENT
+    sigma_mm: _Number
+    sigma_rot_deg: _Length
+
+
+class ReadFile(BaseModel):
+    """A file that an evaluation has read: as it was named, and its SHA-256."""
+
+    model_config = _LENIENT
+    file: str
+    sha256: str
+
+
 class Curve(BaseModel):
     """How far the barycentre of a path is from its command, by the arc length [mm]."""
 
@@ -77,6 +93,8 @@ class ResultFile(BaseModel):
     truearm: Literal["truearm-iso9283-result/1"]
     robot: str
     alignment: _Tie
+    instrument: InstrumentOfResult | None = None
+    inputs: dict[str, ReadFile] | None = None
     rated: Rated | None = None
     plan: PlanOfResult | None = None
     criteria: tuple[Entry, ...]

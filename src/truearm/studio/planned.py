@@ -136,4 +136,5 @@ def cell_places(folder: Path, fields: PlanFields, cell: str | None) -> dict[str,
     """
     if cell is None or not fields.at_program:
         return {}
-    return {part: cell for part in cell_parts(folder / cell)}
+    places: dict[str, str] = dict.fromkeys(cell_parts(folder / cell), cell)
+    return places

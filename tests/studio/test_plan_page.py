@@ -186,7 +186,7 @@ def test_the_ways_are_driven_from_home_and_shown_after_reopening(
     jog = next(page for page in window.pages if isinstance(page, JogPage))
     assert eventually(lambda: bool(jog.scene._parts.get("chosen")))
     assert page._scale.visible
-    assert " mm (dark) to " in page._scale.content
+    assert " mm (blue) to " in page._scale.content
     act(page._among, True)
     assert len(jog.scene._parts["candidates"][0].points) >= 12
     page._speed._impl.value = 1000.0

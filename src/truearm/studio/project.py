@@ -166,16 +166,6 @@ class Project:
         self._undone.clear()
         return True
 
-    @property
-    def undoable(self) -> bool:
-        """Whether there is an edit to undo."""
-        return bool(self._before)
-
-    @property
-    def redoable(self) -> bool:
-        """Whether an undone edit can be done again."""
-        return bool(self._undone)
-
     def undo(self) -> None:
         """Take back the last edit of the settings; nothing if there is none."""
         if self._before:

@@ -178,7 +178,7 @@ class PlanPage:
         if self._cloud.value:
             if found is not None:
                 low, high = float(found.errors.min()), float(found.errors.max())
-                told = f"From {1e3 * low:.3g} mm (dark) to {1e3 * high:.3g} mm (light); chosen configurations are red."
+                told = f"From {1e3 * low:.3g} mm (blue) to {1e3 * high:.3g} mm (yellow); chosen configurations are red."
                 self._scale.content, self._scale.visible = words.paragraph(told), True
                 scene.show_points("predicted", in_world(found.places), coloured(found.errors, low, high))
                 scene.show_points("chosen", in_world(found.chosen), _CHOSEN)

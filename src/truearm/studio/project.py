@@ -408,5 +408,7 @@ def _check_paths(project: Project, settings: Settings) -> None:
             project.path(value, f"performance.{name}")
     if settings.robot not in library():
         project.path(settings.robot, "robot")
+    if settings.wrench_file is not None:
+        project.path(settings.wrench_file, "wrench")
     if settings.controller_kinematics not in (None, "nominal", "proprietary", "unknown"):
         project.path(str(settings.controller_kinematics), "controller_kinematics")

@@ -298,7 +298,7 @@ def test_a_plan_that_the_command_has_written_is_compared_as_well(
     page = page_of(studio)
     assert told(page) == ""
     assert page._enough.place.visible
-    assert "no plan of this window yet" in page._said.content
+    assert "The plan in plan.csv was not made in this window: its report says" in page._said.content
     window.edit(plan={"poses": "8", "candidates": 41})
     assert "was made with candidates 40. Chosen now: candidates 41." in told(page)
 

@@ -109,8 +109,10 @@ class PlanPage:
         told = other_plan_told(self._window.project, self._table())
         self._other.visible = bool(told)
         self._other.content = words.notice(Notice("other-plan-settings", told, "warning")) if told else ""
-        self._said.content = words.paragraph(_NONE_YET)
-        if self._planned is not None and self._of[1:] == self._stands():
+        stands = self._stands()
+        elsewhere = f"The plan in {stands[0]} was not made in this window: its report says what it is good for."
+        self._said.content = words.paragraph(_NONE_YET if stands[1] is None else elsewhere)
+        if self._planned is not None and self._of[1:] == stands:
             outcome = self._planned.outcome
             self._said.content = words.lines([*outcome.lines, f"Written: {', '.join(outcome.files)}"])
         seen = self._seen()

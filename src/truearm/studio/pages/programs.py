@@ -24,6 +24,8 @@ from truearm.studio.pages.fields import Fields
 from truearm.studio.pages.program_in_space import ProgramInSpace
 from truearm.studio.window import Window
 
+#: Whose axes a force is in where nothing was said.
+_BASE: Final = "(base)"
 #: What a report is called among the files to download.
 _REPORT: Final = "report"
 #: What stands in a list where nothing was said.
@@ -51,7 +53,7 @@ class ProgramsPage:
         self._cell = gui.add_dropdown("Tools and frames", (NONE,), hint="a file of the schema truearm-cell/1")
         self.force = fields = Fields(window, lambda: window.project.settings.model_dump(), self._push)
         fields.text("wrench", "Process force", "on the tool: 0,0,-80,0,0,1.5 in N and N m; or a file of wrenches")
-        fields.choice("wrench_frame", "Force in axes of", WRENCH_FRAMES, "of numbers: the base's if nothing is chosen")
+        fields.choice("wrench_frame", "Force in axes of", WRENCH_FRAMES, "of numbers; a file says its own", none=_BASE)
         self._taught = gui.add_dropdown("Taught", (_UNSAID, *_TAUGHT), hint="what was taught at the robot itself")
         self._kinematics = gui.add_dropdown(
             "Controller has", (_UNSAID, *STATED), hint="with what it turns poses into joint positions; or a file"

@@ -14,7 +14,7 @@ import stat
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -42,11 +42,14 @@ class FileSet:
         How to write them again; None if that was not said.
     version
         Of truearm, that wrote them.
+    inputs
+        Hashes of the files that they were made from, by the parameters that named these; empty where that was not said.
     """
 
     files: Mapping[str, str]
     command: str | None = None
     version: str = __version__
+    inputs: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,8 @@ def unfinished_text(run: Unfinished) -> str:
 
 
 def _written(one: FileSet) -> dict[str, Any]:
-    return {"version": one.version, "command": one.command, "files": {**one.files}}
+    inputs = {"inputs": {**one.inputs}} if one.inputs else {}
+    return {"version": one.version, "command": one.command, **inputs, "files": {**one.files}}
 
 
 def sets_in(folder: Path) -> tuple[FileSet, ...]:
@@ -212,7 +216,8 @@ def _planted(found: os.stat_result, folder: Path) -> bool:
 
 def _file_set(content: Any) -> FileSet:
     command, version = content["command"], _checked(content["version"], str)
-    return FileSet(_texts(content["files"]), command if command is None else _checked(command, str), version)
+    inputs = _texts(content.get("inputs", {}))
+    return FileSet(_texts(content["files"]), command if command is None else _checked(command, str), version, inputs)
 
 
 def _texts(content: Any) -> dict[str, str]:

@@ -219,6 +219,7 @@ def write_files(
     files: Mapping[str, str | bytes],
     command: str | None = None,
     standing: Mapping[str, str | None] | None = None,
+    inputs: Mapping[str, str] | None = None,
 ) -> None:
     """Write several files into a folder, all of them or none, with a manifest of them.
 
@@ -238,6 +239,8 @@ def write_files(
         How to write them again, for the manifest.
     standing
         Hashes of files that must stand there as they are known, by name; None for one that must not be there.
+    inputs
+        Hashes of the files that they were made from, by parameter, for the manifest.
 
     Raises
     ------
@@ -266,7 +269,7 @@ def write_files(
                     undo_unfinished(place)
                     clear_temporary(place)
             known = {folder / name: value for name, value in (standing or {}).items()}
-            replace_all(folder, _with_manifest(folder, contents, command), command, known)
+            replace_all(folder, _with_manifest(folder, contents, command, inputs or {}), command, known)
         made.clear()
     finally:
         for new in reversed(made):
@@ -284,9 +287,11 @@ def put_back_old(folder: Path) -> None:
                 clear_temporary(each)
 
 
-def _with_manifest(folder: Path, contents: Mapping[Path, bytes], command: str | None) -> dict[Path, bytes]:
+def _with_manifest(
+    folder: Path, contents: Mapping[Path, bytes], command: str | None, inputs: Mapping[str, str]
+) -> dict[Path, bytes]:
     """Return contents with the folder's manifest behind them, where they belong into one."""
-    new = file_set(folder, contents, command)
+    new = replace(file_set(folder, contents, command), inputs=inputs)
     before = sets_in(folder)
     if len(contents) == 1 and not any(name in one.files for one in before for name in new.files):
         return {**contents}

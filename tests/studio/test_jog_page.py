@@ -112,6 +112,28 @@ def test_a_slider_that_is_moved_while_the_arm_moves_is_not_set_back(page: JogPag
     assert np.rad2deg(page.jogging.joints[:2]) == pytest.approx([41.0, 25.0])
 
 
+def test_sliders_show_rounded_numbers_and_the_arm_stands_exactly(page: JogPage, studio: Studio) -> None:
+    joints = np.deg2rad([12.345678901234, -7.777777777, 20.000000001, 110.123456, 77.8280976765121, -113.8955578452884])
+    page.go_to_joints(joints)
+    shown = [slider.value for slider in page._sliders]
+    assert shown == [12.35, -7.78, 20.0, 110.12, 77.83, -113.9]
+    assert [slider.precision for slider in page._sliders] == [2] * 6
+    ends = [end for slider in page._sliders for end in (slider.min, slider.max)]
+    assert ends == [round(end, 2) for end in ends]
+    act(page._sliders[0])  # what is shown is not taken as typed
+    assert page.jogging is not None
+    assert page.jogging.joints == pytest.approx(joints, abs=0.0, rel=0.0)
+    act(page._sliders[4], 50.0)  # the others stay where they are
+    moved = page.jogging.joints
+    assert np.delete(moved, 4) == pytest.approx(np.delete(joints, 4), abs=1e-15)
+    assert np.rad2deg(moved[4]) == pytest.approx(50.0)
+    page.go_to_joints(joints)
+    act(page._record, "record")
+    file = studio.window.project.folder / "recorded.csv"
+    written = file.read_text().splitlines()[1].split(",")[1:7]
+    assert [float(one) for one in written] == pytest.approx(np.rad2deg(joints), abs=1e-12)
+
+
 def test_meshes_are_sent_once(page: JogPage, studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     sent: list[str] = []
     monkeypatch.setattr(
@@ -351,8 +373,23 @@ def test_colours_go_from_dark_to_light() -> None:
     colours = coloured(np.array([-1.0, 0.0, 0.5, 1.0, 2.0]), 0.0, 1.0).astype(int)
     assert np.array_equal(colours[0], colours[1])
     assert np.array_equal(colours[3], colours[4])
-    assert (np.diff(colours[1:4].sum(axis=1)) > 0).all()
+    assert (np.diff(colours[1:4] @ [0.2126, 0.7152, 0.0722]) > 0).all()
     assert np.array_equal(coloured(np.array([3.0]), 1.0, 1.0)[0], colours[0])
+
+
+def test_colours_stand_out_from_a_light_and_from_a_dark_window() -> None:
+    colours = coloured(np.linspace(0.0, 1.0, 61), 0.0, 1.0) / 255.0
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    # From linear sRGB (IEC 61966-2-1) to XYZ by its white D65, and to CIELAB.
+    xyz = linear @ np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]).T
+    root = np.cbrt(xyz / [0.9505, 1.0, 1.089])
+    lab = np.stack([116 * root[:, 1] - 16, 500 * (root[:, 0] - root[:, 1]), 200 * (root[:, 1] - root[:, 2])], axis=1)
+    dark = 0.011  # of the window's dark grey, (26, 27, 30)
+    assert 1.05 / (xyz[:, 1].max() + 0.05) >= 3.0  # as WCAG 2.1 has contrasts
+    assert (xyz[:, 1].min() + 0.05) / (dark + 0.05) >= 3.0
+    assert (np.diff(lab[::10, 0]) > 1.0).all()
+    steps = np.linalg.norm(np.diff(lab[::10], axis=0), axis=1)
+    assert steps.max() < 1.1 * steps.min()
 
 
 def test_errors_of_a_result_are_drawn_from_before_to_after(studio: Studio, page: JogPage) -> None:

@@ -18,7 +18,8 @@ from tests.cli.conftest import Truearm
 from tests.cli.conftest import truearm as truearm
 from tests.simulated import campaign
 from tests.studio.conftest import Serving
-from tests.studio.pressing import act, at_once, notices
+from tests.studio.pressing import act, at_once, below, notices
+from tests.studio.typing_in import typed
 
 from truearm.jobs.calibrate import calibrate
 from truearm.jobs.compensate import compensate
@@ -160,7 +161,7 @@ def test_a_correction_is_of_the_project_as_it_is_now_or_is_not_handed_out(
             assert f"Changed since: {what}. It is not handed out: correct the program again." in one._stands.content
             assert one._said.content == ""
             assert not one._space.place.visible
-        act(page._downloads, "corrected program")
+        act(page._downloads, "plate.mod")
         assert sent == []
         assert f"changed since: {what}. Correct it again." in notices(window)
 
@@ -168,7 +169,7 @@ def test_a_correction_is_of_the_project_as_it_is_now_or_is_not_handed_out(
     act(page._run)
     is_current()
     assert "44 targets" in page._said.content
-    for name in ("corrected program", "report"):
+    for name in ("plate.mod", "report"):
         act(page._downloads, name)
     assert sent == ["plate.mod", "compensation.html"]
     sent.clear()
@@ -212,7 +213,7 @@ def test_a_correction_is_of_the_project_as_it_is_now_or_is_not_handed_out(
     for what, (change, before) in changed.items():
         change()
         sent.clear()
-        act(page._downloads, "corrected program")  # also where the page has not been shown anew since
+        act(page._downloads, "plate.mod")  # also where the page has not been shown anew since
         assert sent == []
         window.refresh()
         is_of_another_state(what)
@@ -294,7 +295,18 @@ def test_the_command_that_the_report_names_does_the_same(
     text = head + f"tools:{tool}" * ("tools" in parts) + frame * ("frames" in parts)
     (folder / "cell.yaml").write_text(text)
     monkeypatch.chdir(folder)
-    corrected_program(folder, "result/calibrated.yaml", "plate.mod", "studio", "cell.yaml", ["none"], "nominal", print)
+    corrected_program(
+        folder,
+        "result/calibrated.yaml",
+        "plate.mod",
+        "studio",
+        "cell.yaml",
+        "0,0,-20,0,0,1.5",
+        "tool",
+        ["none"],
+        "nominal",
+        print,
+    )
     found = re.search(
         r"truearm (compensate result/calibrated.yaml plate.mod .*) --out DIR",
         unescape((folder / "studio/compensation.html").read_text()),
@@ -304,3 +316,100 @@ def test_the_command_that_the_report_names_does_the_same(
     assert run.code == 0, run.err
     for name in ("plate.mod", "plate.mod.truearm.json", "compensation.html"):
         assert (folder / "command" / name).read_bytes() == (folder / "studio" / name).read_bytes()
+
+
+_WRENCHES = """\
+truearm: truearm-cell/1
+units: {length: mm, angle: deg, force: N, moment: N m}
+wrenches:
+  - {targets: ["pHole*"], force: [0, 0, -20], moment: [0, 0, 1.5], frame: tool}
+"""
+
+
+def test_the_process_force_is_kept_given_and_compared(
+    serving: Serving, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, calibrated: Path
+) -> None:
+    monkeypatch.setattr("truearm.studio.typing_at_rest._REST", 0.01)  # nobody types here
+    folder = project(tmp_path)
+    copytree(calibrated, folder / "result")
+    (folder / "forces.yaml").write_text(_WRENCHES)
+    (folder / "cell.yaml").write_text(_TOOL)
+    studio = serving(folder)
+    window = studio.window
+    page = programs(window)
+    at_once(window, monkeypatch)
+    force, axes = page.force.element("wrench"), page.force.element("wrench_frame")
+
+    def is_of_the_command(words: str) -> None:
+        act(page._run)
+        assert "44 targets" in page._said.content, notices(window)
+        assert page._stands.content == ""
+        assert words in unescape((folder / "result/corrected/compensation.html").read_text())
+        assert programs(serving(folder).window)._stands.content == ""
+
+    act(axes, "tool")  # says nothing by itself, as there are no numbers
+    is_of_the_command("truearm compensate result/calibrated.yaml plate.mod --controller-kinematics nominal")
+    typed(studio, force, "0,0,-20,0,0,1.5")
+    assert (window.project.settings.wrench, window.project.settings.wrench_frame) == ("0,0,-20,0,0,1.5", "tool")
+    assert "Changed since: the process force." in page._stands.content
+    is_of_the_command("plate.mod --wrench 0,0,-20,0,0,1.5 --wrench-frame tool --controller-kinematics nominal")
+    window.edit(wrench="0 N, 0 N, -20 N, 0, 0, 1.5 Nm")
+    assert page._stands.content == ""
+    window.edit(wrench_frame=None)
+    assert "Changed since: the process force." in page._stands.content
+    typed(studio, force, "forces.yaml")
+    is_of_the_command("plate.mod --wrench forces.yaml --controller-kinematics nominal")
+    (folder / "forces.yaml").write_text(_WRENCHES.replace("-20", "-25"))
+    window.refresh()
+    assert "Changed since: the process force." in page._stands.content
+    for text, words in (
+        ("0,0,80", "three forces and three moments belong here"),
+        ("0,0,80kg,0,0,0", "this is no unit of a force"),
+        ("cell.yaml", "the file has no wrenches"),
+        ("missing.yaml", "missing.yaml"),
+        ("../forces.yaml", "no place in the project"),
+    ):
+        typed(studio, force, text)
+        assert words in below(window, force)
+        assert window.project.settings.wrench == "forces.yaml"
+    typed(studio, force, "")
+    assert window.project.settings.wrench is None
+
+
+_SRC = "DEF part ( )\n  LIN XP1\n  LIN XP2\nEND\n"
+_DAT = """\
+DEFDAT part
+  DECL E6POS XP1={X 900.0,Y 0.0,Z 900.0,A 0.0,B 90.0,C 0.0}
+  DECL E6POS XP2={X 900.0,Y 50.0,Z 900.0,A 0.0,B 90.0,C 0.0}
+ENDDAT
+"""
+
+
+def test_all_files_of_a_corrected_program_are_handed_out(
+    serving: Serving, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = project(tmp_path)
+    (folder / "part.src").write_text(_SRC)
+    (folder / "part.dat").write_text(_DAT)
+    _, data = campaign("kr5", 40, 0.02e-3, 4)
+    calibrate("kr5", data, model="offsets", out=folder / "result")
+    window = serving(folder).window
+    page, sent = programs(window), list[str]()
+    at_once(window, monkeypatch)
+    monkeypatch.setattr(window, "download", lambda path: sent.append(path.read_text()))
+    window.edit(robot="kr5", program="part.src")
+    act(page._run)
+    assert page._stands.content == "", notices(window)
+    assert page._downloads.options == ("part.src", "part.dat", "report"), notices(window)
+    for name in page._downloads.options[:2]:
+        act(page._downloads, name)
+    assert sent == [(folder / "result/corrected" / name).read_text() for name in ("part.src", "part.dat")]
+    assert sent[0] == _SRC
+    assert sent[1] != _DAT  # the numbers of the points are there
+    (folder / "part.dat").write_text(_DAT.replace("50.0", "60.0"))
+    window.refresh()
+    assert "Changed since: the program." in page._stands.content
+    act(page._downloads, "part.src")
+    assert len(sent) == 2
+    window.edit(robot="irb120", program="plate.mod")
+    assert not page._downloads.visible

@@ -75,15 +75,17 @@ def test_edits_are_on_disk_at_once_and_undone_and_done_again(project: Project) -
     assert (on_disk().train, on_disk().taught) == (40, ("tools", "frames"))
     project.undo()
     assert on_disk() == Settings()
-    assert not project.undoable
     project.undo()
+    assert on_disk() == Settings()
     project.redo()
     project.redo()
     project.redo()
     assert on_disk().train == "all"
     project.undo()
     project.edit(seed=3)
-    assert not project.redoable
+    edited = on_disk()
+    project.redo()
+    assert on_disk() == edited
 
 
 def test_small_files_of_an_edit_are_undone_with_it(project: Project) -> None:
@@ -129,8 +131,8 @@ def test_settings_that_cannot_be_are_refused_and_change_nothing(project: Project
     with pytest.raises(InputError):
         project.edit(**changes)
     assert (project.folder / PROJECT_FILE).read_bytes() == before
+    project.undo()
     assert project.settings == Settings()
-    assert not project.undoable
 
 
 def test_links_lead_nowhere_outside(project: Project, tmp_path: Path) -> None:
@@ -203,14 +205,18 @@ def test_what_another_program_writes_between_looking_and_writing_is_not_overwrit
         there.setattr("truearm.studio.project.write_text_over", late(write_text_over))
         with pytest.raises(InputError, match="another program has changed this file"):
             project.edit({"list.csv": "mine\n"}, exclude="list.csv")
-    assert (file.read_bytes(), project.settings.exclude, project.undoable) == (theirs, None, False)
+    project.undo()
+    assert (file.read_bytes(), project.settings.exclude) == (theirs, None)
     file.unlink()
     project.edit({"list.csv": "mine\n"}, exclude="list.csv")
     with monkeypatch.context() as there:
         there.setattr("truearm.studio.project.remove_known", late(remove_known))
         with pytest.raises(InputError, match="another program has changed this file"):
             project.undo()
-    assert (file.read_bytes(), project.settings.exclude, project.undoable) == (theirs, "list.csv", True)
+    assert (file.read_bytes(), project.settings.exclude) == (theirs, "list.csv")
+    file.write_text("mine\n")
+    project.undo()  # it stands to be undone
+    assert project.settings.exclude is None
 
 
 def test_an_edit_that_was_made_of_a_text_is_refused_where_another_stands(project: Project) -> None:

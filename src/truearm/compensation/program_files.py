@@ -100,7 +100,7 @@ def program_files(paths: Sequence[Path], *, again: bool = False) -> tuple[Progra
     """
     every = [*paths]
     for path in paths:
-        every += [near for near in _companions(path) if not any(_same(near, other) for other in every)]
+        every += [near for near in companions(path) if not any(_same(near, other) for other in every)]
     _refuse_twice(every)
     names = _names(every)
     return tuple(ProgramFile(path, name, _original(path, again)) for path, name in zip(every, names, strict=True))
@@ -375,7 +375,7 @@ def _language(file: ProgramFile) -> Language:
     )
 
 
-def _companions(path: Path) -> list[Path]:
+def companions(path: Path) -> list[Path]:
     """Return files beside a program that belong to it by their name."""
     suffix = path.suffix.lower()
     pairs = [pair for language in LANGUAGES for pair in language.companions if suffix == pair[0]]

@@ -13,10 +13,10 @@ import numpy as np
 
 from truearm.arrays import finite_number, number_array
 from truearm.errors import InputError, did_you_mean, name_parameter, refusals_of, wrong_kind
-from truearm.files import path_argument
+from truearm.files import exists, path_argument, read_bytes
 from truearm.library import is_robot, load_robot, urdf_source
 from truearm.limits import limit, refuse_beyond
-from truearm.manifest import sets_in
+from truearm.manifest import hash_of, sets_in
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
@@ -181,6 +181,20 @@ def files_of(*given: object) -> tuple[Path, ...]:
     """Return which files a job was given."""
     named = [value for value in given if isinstance(value, str | Path)]
     return tuple((urdf_source(value) or (Path(value), None))[0].absolute() for value in named)
+
+
+def hashes_of(**given: object) -> dict[str, str]:
+    """Return the SHA-256 of each file that was given, by its parameter.
+
+    They are taken before the files are read: of one that changes meanwhile, the hash is not that of the file later.
+    """
+    found = {}
+    for parameter, value in given.items():
+        with refusals_of(parameter):
+            for path in files_of(value):
+                if exists(path) and path.is_file():
+                    found[parameter] = hash_of(read_bytes(path))
+    return found
 
 
 def files_argument(files: object, parameter: str) -> dict[str, Path]:

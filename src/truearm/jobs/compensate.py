@@ -31,7 +31,7 @@ from truearm.compensation.program_files import edited, language_called, program_
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
 from truearm.errors import InputError, refusals_at, refusals_of
-from truearm.files import exists, path_argument, read_bytes
+from truearm.files import path_argument
 from truearm.identification.judging.external_force import check_force
 from truearm.identification.judging.payload import check_payload
 from truearm.jobs.arguments import (
@@ -41,6 +41,7 @@ from truearm.jobs.arguments import (
     files_of,
     flag_argument,
     folder_for,
+    hashes_of,
     names_argument,
     notes_argument,
     paths_argument,
@@ -51,7 +52,6 @@ from truearm.jobs.arguments import (
     wrench_argument,
 )
 from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, check_maker, known_of, refuse_unaccepted
-from truearm.manifest import hash_of
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
@@ -171,7 +171,7 @@ def compensate(
             (REPORT,), out, robot, tools, frames, wrench_file, *_kinematics_file(controller_kinematics), *paths
         )
     )
-    hashes = _hashes(
+    hashes = hashes_of(
         robot=robot,
         tools=tools,
         frames=frames,
@@ -277,20 +277,6 @@ def compensate(
         with refusals_of("out"):
             made.save(folder, progress)
     return made
-
-
-def _hashes(**given: object) -> dict[str, str]:
-    """Return the SHA-256 of each file that was given, by its parameter.
-
-    They are taken before the files are read: of one that changes meanwhile, the hash is not that of the file later.
-    """
-    found = {}
-    for parameter, value in given.items():
-        with refusals_of(parameter):
-            for path in files_of(value):
-                if exists(path) and path.is_file():
-                    found[parameter] = hash_of(read_bytes(path))
-    return found
 
 
 def _wrench_file(wrench: object) -> Path | None:

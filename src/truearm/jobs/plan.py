@@ -31,6 +31,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.driving import cell_argument, constraints_argument, finder_argument
+from truearm.jobs.plan_inputs import plan_inputs
 from truearm.jobs.plan_notices import load_notices, targets_notices
 from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
 from truearm.jobs.plans_replaced import plan_files_for, refuse_ways_of_another, replaced_notices
@@ -218,6 +219,7 @@ def plan(
         dwell=dwell,
         wait=wait,
     )
+    hashes = plan_inputs(robot, candidates_from, constraints, accurate_at, tools, frames)
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
@@ -281,7 +283,7 @@ def plan(
     told = load_notices(made.robot) if weighed else []
     if tour is not None and wanted_program is None:
         told += targets_notices(made.robot, carrying, named)
-    planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour, told=tuple(told))
+    planned = Plan(made, call, files_of(*read), deviation, joints_are, words, tour, told=tuple(told), hashes=hashes)
     if wanted_program is not None:
         planned = with_program(planned, wanted_program, carrying, named, weighed=weighed)
     if table is not None:

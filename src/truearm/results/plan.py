@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -51,6 +52,8 @@ class Plan(Record):
         What to know of another plan that it was written over.
     told
         What to know of what it was made with: the load, and targets that nobody said.
+    hashes
+        SHA-256 of the files that were read, by parameter.
     """
 
     made: MeasurementPlan
@@ -63,6 +66,7 @@ class Plan(Record):
     program: PlanProgram | None = None
     replaced: tuple[Notice, ...] = ()
     told: tuple[Notice, ...] = ()
+    hashes: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def joints(self) -> Array:
@@ -227,7 +231,7 @@ class Plan(Record):
         if self.program is not None:
             contents = self.contents()
             folder = output_folder(file, contents, self.inputs, "file", ours=True)
-            write_files(folder, contents, self.command)
+            write_files(folder, contents, self.command, inputs=self.hashes)
             return tuple(folder / name for name in contents)
         table = output_file(file, self.inputs, ours=True)
         if table.suffix == PAGE:
@@ -238,5 +242,5 @@ class Plan(Record):
             ways = output_file(ways_beside(table), self.inputs, ours=True)
             texts[ways.name] = tour_csv(self.tour, self.made.robot, self.joints_are)
             texts[output_file(sheet_beside(table), self.inputs, ours=True).name] = plan_sheet(self)
-        write_files(table.parent, texts, self.command)
+        write_files(table.parent, texts, self.command, inputs=self.hashes)
         return tuple(table.parent / name for name in texts)

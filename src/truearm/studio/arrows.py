@@ -14,8 +14,12 @@ from truearm.modeling.chain import Array
 
 #: How much errors may be magnified.
 FACTORS: Final = (1.0, 2000.0)
-#: From small to large: of the map viridis, which grows evenly in lightness.
-_COLOURS: Final = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]], float)
+#: From small to large, in even steps of colour (CIELAB) and each lighter than the one before: blue, green, yellow. All
+#: stand out from white and from the dark window by a contrast of 3 or more.
+_COLOURS: Final = np.array(
+    [[28, 107, 176], [10, 122, 155], [12, 138, 134], [20, 152, 106], [88, 155, 67], [137, 152, 30], [181, 144, 15]],
+    float,
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,10 @@ from truearm.files import exists, read_bytes, read_text, read_yaml
 from truearm.manifest import hash_of, sets_in
 from truearm.modeling.formats.controller_entry import STATED, controller_summary
 from truearm.modeling.robot import Robot
+from truearm.modeling.wrench import Wrench
 from truearm.results.program_correction import REPORT
 from truearm.studio.project import Project
+from truearm.studio.settings import Settings
 
 CellPart = Literal["tools", "frames"]
 _PARTS: Final[tuple[CellPart, ...]] = ("tools", "frames")
@@ -33,8 +35,8 @@ class Corrected:
     ----------
     name
         Of the corrected program, in the project.
-    program
-        Its path.
+    files
+        The paths of the program, first the one that is chosen, and of the files that belong to it.
     report
         The path of its report; None where that is of another correction, or missing.
     changed
@@ -42,7 +44,7 @@ class Corrected:
     """
 
     name: str
-    program: Path
+    files: tuple[Path, ...]
     report: Path | None
     changed: tuple[str, ...]
 
@@ -106,12 +108,16 @@ def corrected_now(project: Project, robots: Callable[[], tuple[Robot | None, str
     try:
         record = correction_record(corrected)
     except InputError:
-        return Corrected(name, corrected, None, ("its record",))
+        return Corrected(name, (corrected,), None, ("its record",))
     if record is None:  # another program's file
         return None
     together = any({program.name, REPORT} <= {*one.files} for one in sets_in(folder))
+    try:
+        files = tuple(folder / file.name for file in program_files([program]))
+    except InputError:
+        files = (corrected,)
     report = folder / REPORT if together and exists(folder / REPORT) else None
-    return Corrected(name, corrected, report, tuple(dict.fromkeys(_changed(project, folder, program, record, robots))))
+    return Corrected(name, files, report, tuple(dict.fromkeys(_changed(project, folder, program, record, robots))))
 
 
 def _changed(
@@ -148,6 +154,10 @@ def _changed(
         parts = _PARTS
     if any(said.get(part) != (_hash_of(project, settings.cell) if part in parts else None) for part in _PARTS):
         yield "tools and frames"
+    if said.get("wrench") != _hash_of(project, settings.wrench_file) or (
+        settings.wrench_file is None and applied.get("wrenches", []) != _acting(settings)
+    ):
+        yield "the process force"
     taught = None if settings.taught is None else sorted({*settings.taught} - {"none"})
     if applied.get("taught") != taught:
         yield "what was taught"
@@ -161,6 +171,17 @@ def _changed(
         same = applied.get("controller") == controller_summary(STATED[kinematics])
     if not same or said.get("controller_kinematics") != read:
         yield "what the controller has"
+
+
+def _acting(settings: Settings) -> list[dict[str, Any]]:
+    """Return what acts on the tool by the numbers of the settings, as a record has it; nothing if they are none."""
+    if settings.wrench is None:
+        return []
+    try:
+        said = Wrench.of(settings.wrench, settings.wrench_axes or "base")
+    except InputError:
+        return []
+    return [{"force_n": [*said.force], "moment_nm": [*said.moment], "frame": said.frame}] if said.acts else []
 
 
 def _changed_file(file: ProgramFile, folder: Path) -> Iterator[str]:

@@ -94,7 +94,7 @@ class CubeInSpace:
             )
         if not said:
             return ""
-        return f"{'; '.join(said)}; colours go from 0 (dark) to {self.largest * 1e3:.3g} mm (light). {self.under}"
+        return f"{'; '.join(said)}; colours go from 0 (blue) to {self.largest * 1e3:.3g} mm (yellow). {self.under}"
 
 
 def cube_in_space(plan: PerformancePlan, result: ResultFile | None) -> CubeInSpace:

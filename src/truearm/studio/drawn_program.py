@@ -13,6 +13,7 @@ import numpy as np
 from truearm.compensation.programs.program import Program
 from truearm.files import confined_reads
 from truearm.modeling.chain import Array
+from truearm.modeling.wrench import WrenchFrame
 from truearm.studio.corrected import CellPart, cell_parts
 from truearm.studio.tasks import Outcome, Progress, compensate_command
 
@@ -81,6 +82,8 @@ def corrected_program(
     program: str,
     out: str,
     cell: str | None,
+    wrench: str | None,
+    wrench_frame: WrenchFrame | None,
     taught: Sequence[str] | None,
     controller_kinematics: str | None,
     progress: Progress,
@@ -100,9 +103,11 @@ def corrected_program(
             out=out,
             tools=places.get("tools"),
             frames=places.get("frames"),
+            wrench=wrench,
+            wrench_frame=wrench_frame,
             taught=taught,
             controller_kinematics=controller_kinematics,
-            command=compensate_command(robot, program, places, taught, controller_kinematics),
+            command=compensate_command(robot, program, places, wrench, wrench_frame, taught, controller_kinematics),
             progress=progress,
         )
         progress("drawing the program")

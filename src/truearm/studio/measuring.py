@@ -25,7 +25,7 @@ from truearm.studio.project import Project
 
 #: Of points that are set aside, and of points of which nothing says how they were taken.
 ASIDE: Final = (205, 60, 180)
-UNTOLD: Final = (70, 130, 180)
+UNTOLD: Final = (128, 134, 140)
 #: Lines of sight: to a target that is next, to one that is hidden, to one of which nothing is asked any more.
 _NEXT: Final = (46, 160, 67)
 _HIDDEN: Final = (214, 69, 61)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -11,8 +12,8 @@ from truearm.units import sized_si
 
 _Text = Annotated[str, Field(min_length=1)]
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-#: How many candidates the job draws where nothing is said.
-_CANDIDATES: Final = 5000
+#: What the job takes where nothing is said.
+UNSAID: Final[dict[str, Any]] = {"model": "geometric", "candidates": 5000, "noise": 0.1, "seed": 0}
 
 
 class PlanFields(BaseModel):
@@ -48,31 +49,34 @@ class PlanFields(BaseModel):
         """Where the plan is written in the project: a file, or a folder where a program drives it."""
         return self.out or ("plan.csv" if self.program is None else "plan")
 
-    def said(self, cell: str | None, constraints: str | None, payload: str | None) -> dict[str, Any]:
+    @property
+    def at_program(self) -> bool:
+        """Whether the robot shall be accurate at the targets of a program."""
+        return self.accurate_at is not None and not self.accurate_at.lower().endswith(".csv")
+
+    def said(self, places: Mapping[str, str], constraints: str | None, payload: str | None) -> dict[str, Any]:
         """Return what is given to the command beside robot and poses, by the names of parameters, in its order.
 
         Parameters
         ----------
-        cell
-            File of tools and frames, given where the robot shall be accurate at the targets of a program.
+        places
+            Files of tools and frames, by the names of these parameters.
         constraints, payload
             As the job takes them.
         """
-        drawn = self.device is None and self.candidates_from is None
-        at_program = self.accurate_at is not None and not self.accurate_at.lower().endswith(".csv")
         given = {
             "candidates_from": self.candidates_from,
             "objective": self.objective,
             "accurate_at": self.accurate_at,
             "region": self.region,
-            "tools": cell if at_program else None,
-            "frames": cell if at_program else None,
-            "model": None if self.model == "geometric" else self.model,
-            "candidates": self.candidates if drawn and self.candidates != _CANDIDATES else None,
+            "tools": places.get("tools"),
+            "frames": places.get("frames"),
+            "model": self.model,
+            "candidates": self.candidates if self.candidates_from is None else None,
             "device": self.device,
             "constraints": constraints,
-            "noise": None if self.noise == 0.1 else self.noise,
-            "seed": self.seed or None,
+            "noise": self.noise,
+            "seed": self.seed,
             "payload": payload,
             "floor": self.floor,
             "no_floor": self.no_floor or None,
@@ -84,7 +88,7 @@ class PlanFields(BaseModel):
             "dwell": self.dwell,
             "wait": self.wait,
         }
-        return {name: value for name, value in given.items() if value is not None}
+        return {name: value for name, value in given.items() if value is not None and value != UNSAID.get(name)}
 
 
 def plan_arguments(robot: str, said: dict[str, Any]) -> dict[str, Any]:

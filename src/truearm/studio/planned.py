@@ -12,11 +12,14 @@ import numpy as np
 
 from truearm.files import confined_reads
 from truearm.modeling.chain import Array
+from truearm.studio.corrected import cell_parts
 from truearm.studio.plan_fields import PlanFields, plan_arguments
 from truearm.studio.tasks import Outcome, Progress, option_words
 
 #: Options that are not called as their parameters.
 _OPTIONS: Final = {"candidates_from": "from", "accurate_at": "for"}
+#: Options without a value.
+_FLAGS: Final = ("no_floor", "approach")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +35,6 @@ class Planned:
         ``(n, 3)`` each.
     places, errors
         Where the accuracy was predicted, in the base frame, ``(m, 3)``, and the error to expect there, ``(m,)`` [m].
-    enough
-        How the error falls with the number of poses: the picture of the plan's page.
     """
 
     outcome: Outcome
@@ -41,7 +42,6 @@ class Planned:
     candidates: Array
     places: Array
     errors: Array
-    enough: dict[str, Any]
 
 
 def planned(
@@ -64,11 +64,12 @@ def planned(
     """
     from truearm.jobs.plan import plan
     from truearm.jobs.texts import read_poses
-    from truearm.reporting.plan_report import number_figure
 
     os.chdir(folder)
-    said, poses = fields.said(cell, constraints, payload), fields.poses.strip()
+    poses = fields.poses.strip()
     with confined_reads(folder):
+        places = cell_places(folder, fields, cell)
+        said = fields.said(places, constraints, payload)
         found = plan(
             robot,
             poses=read_poses(poses),
@@ -93,7 +94,6 @@ def planned(
         made.robot.forward(made.among)[0],
         (made.prediction.places - np.array(base.translation)) @ base.rotation,
         made.prediction.error,
-        number_figure(made.prediction, len(made.joints)),
     )
 
 
@@ -101,3 +101,41 @@ def plan_command(robot: str, poses: str, said: dict[str, Any]) -> str:
     """Return the command that does the same in the project's folder, as the page shows it."""
     options = {_OPTIONS.get(name, name): value for name, value in said.items()}
     return shlex.join(["truearm", "plan", robot, "--poses", poses, *option_words(options), "--out", "PLAN"])
+
+
+def asked_by(command: str) -> dict[str, str] | None:
+    """Return what a command of a plan asks for, by the names of parameters; None if it is none of these commands.
+
+    What is true has the text ``True``.
+    """
+    try:
+        given = shlex.split(command)
+    except ValueError:
+        return None
+    if given[:2] != ["truearm", "plan"] or len(given) < 3:
+        return None
+    parameters = {option: name for name, option in _OPTIONS.items()}
+    asked, rest = {"robot": given[2]}, iter(given[3:])
+    for option in rest:
+        name = option.removeprefix("--").replace("-", "_")
+        name = parameters.get(name, name)
+        value = "True" if name in _FLAGS else next(rest, None)
+        if value is None or not option.startswith("--"):
+            return None
+        if name != "out":
+            asked[name] = value
+    return asked
+
+
+def cell_places(folder: Path, fields: PlanFields, cell: str | None) -> dict[str, str]:
+    """Return a file of tools and frames as the job takes it: for what it has, where a program needs it.
+
+    Parameters
+    ----------
+    cell
+        Its name in the folder; None for none.
+    """
+    if cell is None or not fields.at_program:
+        return {}
+    places: dict[str, str] = dict.fromkeys(cell_parts(folder / cell), cell)
+    return places

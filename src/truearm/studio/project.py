@@ -166,16 +166,6 @@ class Project:
         self._undone.clear()
         return True
 
-    @property
-    def undoable(self) -> bool:
-        """Whether there is an edit to undo."""
-        return bool(self._before)
-
-    @property
-    def redoable(self) -> bool:
-        """Whether an undone edit can be done again."""
-        return bool(self._undone)
-
     def undo(self) -> None:
         """Take back the last edit of the settings; nothing if there is none."""
         if self._before:
@@ -418,5 +408,7 @@ def _check_paths(project: Project, settings: Settings) -> None:
             project.path(value, f"performance.{name}")
     if settings.robot not in library():
         project.path(settings.robot, "robot")
+    if settings.wrench_file is not None:
+        project.path(settings.wrench_file, "wrench")
     if settings.controller_kinematics not in (None, "nominal", "proprietary", "unknown"):
         project.path(str(settings.controller_kinematics), "controller_kinematics")

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from truearm.modeling.wrench import WrenchFrame
 from truearm.studio.measure_fields import MeasureFields
 from truearm.studio.plan_fields import PlanFields
 
@@ -59,6 +60,8 @@ class Settings(BaseModel):
         File of a robot program.
     cell
         File that says where tools and frames are; None for what the program says.
+    wrench, wrench_frame
+        What acts on the tool, six numbers or a file, and in whose axes, as for :func:`truearm.compensate`.
     taught
         As for :func:`truearm.compensate`; None if that was not said.
     controller_kinematics
@@ -94,6 +97,8 @@ class Settings(BaseModel):
     result: _Name = "result"
     program: _Name | None = None
     cell: _Name | None = None
+    wrench: _Name | None = None
+    wrench_frame: WrenchFrame | None = None
     taught: tuple[_Name, ...] | None = None
     controller_kinematics: _Name | None = None
     corrected: _Name = "result/corrected"
@@ -104,6 +109,17 @@ class Settings(BaseModel):
     measure: MeasureFields = MeasureFields()
     performance: TestedFiles = TestedFiles()
     dark: bool = False
+
+    @property
+    def wrench_file(self) -> str | None:
+        """The file that says what acts on the tool; None where numbers say it, or nothing does."""
+        named = self.wrench is not None and self.wrench.lower().endswith((".yaml", ".yml"))
+        return self.wrench if named else None
+
+    @property
+    def wrench_axes(self) -> WrenchFrame | None:
+        """The frame of `wrench` as the job takes it: none without numbers, as a file says its own."""
+        return None if self.wrench is None or self.wrench_file is not None else self.wrench_frame
 
     def text(self) -> str:
         """Return the file."""

@@ -79,6 +79,8 @@ def compensate_command(
     robot: str,
     program: str,
     places: Mapping[CellPart, str],
+    wrench: str | None,
+    wrench_frame: str | None,
     taught: Sequence[str] | None,
     controller_kinematics: str | None,
 ) -> str:
@@ -88,10 +90,14 @@ def compensate_command(
     ----------
     places
         The files that say where tools and frames are.
+    wrench, wrench_frame, taught, controller_kinematics
+        As the job takes them.
     """
     words = ["truearm", "compensate", robot, program]
     for part, file in places.items():
         words += [f"--{_PLACES[part]}", file]
+    words += [] if wrench is None else ["--wrench", wrench]
+    words += [] if wrench_frame is None else ["--wrench-frame", wrench_frame]
     words += [] if controller_kinematics is None else ["--controller-kinematics", controller_kinematics]
     words += [] if taught is None else ["--taught", ",".join(taught)]
     return shlex.join([*words, "--out", "DIR"])

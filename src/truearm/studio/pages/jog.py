@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -34,7 +35,8 @@ _NEAREST: Final = "nearest"
 _WHOSE: Final = ("controller", "model")
 #: Of a motion that is played, a picture so often [s].
 _PICTURE: Final = 0.04
-#: Ends of a slider that differ by less are the same [deg or mm].
+#: Sliders show so many decimals [deg or mm], and ends that differ by less are the same.
+_DECIMALS: Final = 2
 _ROUNDING: Final = 1e-6
 _SAFE: Final = "This moves a drawing. No real robot is connected to this window, and none moves."
 
@@ -164,8 +166,8 @@ class JogPage:
         self._sliders = []
         with self._joints:
             for k, (joint, unit) in enumerate(zip(arm.robot.joints, arm.units, strict=True)):
-                low, high = arm.ranges()[k]
-                slider = self._window.gui.add_slider(f"{joint.name} [{unit}]", low, max(high, low + 0.01), 0.01, low)
+                low, high = _shown_range(*arm.ranges()[k])
+                slider = self._window.gui.add_slider(f"{joint.name} [{unit}]", low, high, 10.0**-_DECIMALS, low)
                 slider.on_update(self._newest(f"joint {k}", partial(self._slid, k)))
                 self._sliders.append(slider)
         self._taken = [slider.value for slider in self._sliders]
@@ -179,6 +181,8 @@ class JogPage:
 
     def _slid(self, joint: int) -> None:
         arm = self._jogged()
+        if self._sliders[joint].value == self._taken[joint]:
+            return  # what is shown is rounded, and the arm stays exactly where it is
         self._taken[joint] = self._sliders[joint].value
         arm.set_number(joint, float(self._taken[joint]))
         self._moved()
@@ -261,13 +265,14 @@ class JogPage:
             ):
                 if slider.value != self._taken[k]:
                     continue  # somebody has moved it meanwhile, and that is done next
-                high = max(high, low + 0.01)
+                low, high = _shown_range(low, high)
+                shown = min(max(round(number, _DECIMALS), low), high)
                 if abs(slider.min - low) > _ROUNDING or abs(slider.max - high) > _ROUNDING:
                     slider.min, slider.max = min(low, slider.value), max(high, slider.value)
-                    slider.value = min(max(number, low), high)
+                    slider.value = shown
                     slider.min, slider.max = low, high
-                elif slider.value != number:
-                    slider.value = min(max(number, low), high)
+                elif slider.value != shown:
+                    slider.value = shown
                 self._taken[k] = slider.value
             self._place.value, self._turns.value = arm.pose_numbers(self._frame.value)
             self._said.content = "".join(words.paragraph(text) for text in arm.words())
@@ -379,6 +384,14 @@ class JogPage:
         if self._playing is not None:
             self._playing.set()
             self._playing = None
+
+
+def _shown_range(low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a slider: within the range in which a number can go, with the decimals that are shown."""
+    step = 10.0**_DECIMALS
+    least = math.ceil((low - _ROUNDING) * step) / step
+    most = math.floor((high + _ROUNDING) * step) / step
+    return least, max(most, round(least + 1.0 / step, _DECIMALS))
 
 
 def _no_robot() -> Notice:

@@ -13,7 +13,7 @@ from truearm.studio.pages.jog import JogPage
 from truearm.studio.window import Window
 
 _LEGEND: Final = (
-    "Readings that are kept go from dark (they scatter by nothing) to yellow (by as much as is allowed), blue where "
+    "Readings that are kept go from blue (they scatter by nothing) to yellow (by as much as is allowed), grey where "
     "nothing says how they were taken; violet ones are set aside. Lines of sight are green to what is next, and red to "
     "what the instrument does not see."
 )

@@ -13,6 +13,7 @@ from truearm.identification.solving.models import MODELS
 from truearm.jobs.texts import read_poses
 from truearm.manifest import MANIFEST
 from truearm.modeling.chain import Array
+from truearm.notices import Notice
 from truearm.planning.choosing.measurement_plan import ERROR
 from truearm.planning.choosing.observability import INDICES
 from truearm.simulation.devices import DEVICES
@@ -21,7 +22,8 @@ from truearm.studio.arrows import coloured
 from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.fields import Fields
 from truearm.studio.pages.jog import JogPage
-from truearm.studio.pictures import Picture
+from truearm.studio.pictures import Picture, report_figures
+from truearm.studio.plan_made_with import other_plan_told
 from truearm.studio.planned import Planned, planned
 from truearm.studio.recorded import read_recorded
 from truearm.studio.window import Window
@@ -33,6 +35,7 @@ _WAYS: Final = (214, 140, 60)
 #: Languages of programs that drive a plan.
 _LANGUAGES: Final = ("rapid", "krl", "fanuc", "urscript", "inform", "val3")
 _FILES: Final = (".yaml", ".yml")
+_NONE_YET: Final = "There is no plan of this window yet."
 
 
 class PlanPage:
@@ -47,12 +50,15 @@ class PlanPage:
         self._drawn: tuple[Any, ...] = ()
         self._driven_ways: Array | None = None  # in the world [m], (n, 3)
         gui = window.gui
+        self._other = gui.add_html("", visible=False)
         self.fields = fields = Fields(window, self._now, self._change)
         fields.text("poses", "Poses", "how many to choose, or auto")
         fields.choice("model", "Model", [model.name for model in MODELS], "what will be identified", none=None)
         fields.choice("device", "Instrument", [one.name for one in DEVICES], "none: all targets are read everywhere")
         fields.number("noise", "Noise [mm]", "of a coordinate about a well identified model", optional=False)
-        fields.number("candidates", "Candidates", "random ones to choose from", optional=False, whole=True)
+        fields.number(
+            "candidates", "Candidates", "random ones to choose from, without a file", optional=False, whole=True
+        )
         fields.file("candidates_from", "Candidates from", (".csv",), "choose among the configurations of a file")
         fields.number("seed", "Seed", "of the random candidates", optional=False, whole=True)
         with gui.add_folder("Where it shall be accurate", expand_by_default=False):
@@ -73,7 +79,7 @@ class PlanPage:
             fields.text("wait", "Wait", "what for then: time, operator, or input 3,300s; time if not said")
         fields.text("out", "Write to", "plan.csv if not said; with a program a folder: plan")
         self._run = gui.add_button("Plan")
-        self._said = gui.add_html(words.paragraph("There is no plan of this window yet."))
+        self._said = gui.add_html(words.paragraph(_NONE_YET))
         self._enough = Picture(window, "How many poses are enough")
         self._file: Any = gui.add_dropdown("File", (NONE,), visible=False)
         self._download = gui.add_button("Download the file", visible=False)
@@ -94,21 +100,32 @@ class PlanPage:
         self._download.on_click(window.action(self._downloaded))
 
     def refresh(self) -> None:
-        """Show the fields of the settings, the files that plans have written, and what is in them."""
+        """Show the fields of the settings, the plan that stands in the folder, and whether it is of these."""
         self.fields.refresh()
         names = self._written()
         self._file.visible = self._download.visible = bool(names)
         if names:
             value = str(self._file.value)
             offer(self._file, names, value if value in names else names[0], None)
-        if self._planned is not None:
-            self._enough.show(self._planned.enough)
+        told = other_plan_told(self._window.project, self._table())
+        self._other.visible = bool(told)
+        self._other.content = words.notice(Notice("other-plan-settings", told, "warning")) if told else ""
+        stands = self._stands()
+        elsewhere = f"The plan in {stands[0]} was not made in this window: its report says what it is good for."
+        self._said.content = words.paragraph(_NONE_YET if stands[1] is None else elsewhere)
+        if self._planned is not None and self._of[1:] == stands:
+            outcome = self._planned.outcome
+            self._said.content = words.lines([*outcome.lines, f"Written: {', '.join(outcome.files)}"])
         seen = self._seen()
         if seen != self._drawn:
             self._drawn = seen
             self._driven_ways = None
             self._draw_ways()
             self._draw()
+            enough = report_figures(self._window.project.path(self._report())).get("number")
+            self._enough.place.visible = enough is not None
+            if enough is not None:
+                self._enough.show(enough)
 
     # The fields --------------------------------------------------------------------------------------------------
 
@@ -130,7 +147,7 @@ class PlanPage:
         window.start(
             "Plan",
             planned,
-            self._done,
+            lambda found: self._done(found, settings.robot),
             folder=window.project.folder,
             robot=settings.robot,
             fields=settings.plan,
@@ -139,11 +156,10 @@ class PlanPage:
             payload=settings.payload,
         )
 
-    def _done(self, found: Planned) -> None:
-        self._planned, self._of = found, self._whose()
-        place = PurePosixPath(found.outcome.files[0])
-        self._window.project.look(*found.outcome.files, str(place.parent / MANIFEST))
-        self._said.content = words.lines([*found.outcome.lines, f"Written: {', '.join(found.outcome.files)}"])
+    def _done(self, found: Planned, robot: str) -> None:
+        table = found.outcome.files[0]
+        self._planned, self._of = found, (robot, table, self._stamp(table))
+        self._window.project.look(*found.outcome.files, str(PurePosixPath(table).parent / MANIFEST))
         self._drawn = ()
 
     # The scene ---------------------------------------------------------------------------------------------------
@@ -151,7 +167,8 @@ class PlanPage:
     def _draw(self) -> None:
         scene = self._jog().scene
         self._scale.visible = False
-        found = self._planned if self._of == self._whose() else None
+        now = (self._window.project.settings.robot, *self._stands())
+        found = self._planned if self._of == now else None
         files = self._written()
         for name in ("predicted", "chosen", "candidates"):
             scene.show_points(name, None)
@@ -166,7 +183,7 @@ class PlanPage:
         if self._cloud.value:
             if found is not None:
                 low, high = float(found.errors.min()), float(found.errors.max())
-                told = f"From {1e3 * low:.3g} mm (dark) to {1e3 * high:.3g} mm (light); chosen configurations are red."
+                told = f"From {1e3 * low:.3g} mm (blue) to {1e3 * high:.3g} mm (yellow); chosen configurations are red."
                 self._scale.content, self._scale.visible = words.paragraph(told), True
                 scene.show_points("predicted", in_world(found.places), coloured(found.errors, low, high))
                 scene.show_points("chosen", in_world(found.chosen), _CHOSEN)
@@ -211,6 +228,9 @@ class PlanPage:
         plan = self._window.project.settings.plan
         return plan.place if plan.program is None else f"{plan.place}/plan.csv"
 
+    def _report(self) -> str:
+        return f"{self._table().removesuffix('.csv')}.html"
+
     def _ways(self) -> str:
         return f"{self._table().removesuffix('.csv')}-ways.csv"
 
@@ -223,17 +243,18 @@ class PlanPage:
             return [name for name in names if project.path(name).is_file()]
         return [name for name in project.names() if name.startswith(f"{plan.place}/")]
 
-    def _whose(self) -> tuple[Any, ...]:
-        """Return what was planned: of which robot, and the table as it is now."""
-        path = self._window.project.path(self._table())
-        return self._window.project.settings.robot, path.stat().st_mtime_ns if path.is_file() else None
+    def _stands(self) -> tuple[Any, ...]:
+        """Return which plan stands in the folder: the name of its table, and when that was written."""
+        return self._table(), self._stamp(self._table())
+
+    def _stamp(self, table: str) -> int | None:
+        path = self._window.project.path(table)
+        return path.stat().st_mtime_ns if path.is_file() else None
 
     def _seen(self) -> tuple[Any, ...]:
-        """Return what is drawn: of which plan and which robot."""
-        path = self._window.project.path(self._table())
-        stamp = path.stat().st_mtime_ns if path.is_file() else None
-        scene = self._jog().scene
-        return (id(self._planned), stamp, self._table(), None if scene.solid is None else id(scene.solid))
+        """Return what is drawn: of which plan and which robot, and in which colours."""
+        scene, dark = self._jog().scene, self._window.project.settings.dark
+        return (id(self._planned), self._stands(), dark, None if scene.solid is None else id(scene.solid))
 
     def _downloaded(self) -> None:
         self._window.download(self._window.project.path(self._file.value))

@@ -7,10 +7,12 @@ from glob import escape
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
+from truearm.compensation.cell import read_wrenches
 from truearm.errors import InputError
 from truearm.files import exists
 from truearm.manifest import MANIFEST
 from truearm.modeling.formats.controller_entry import STATED
+from truearm.modeling.wrench import WRENCH_FRAMES, Wrench
 from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES
 from truearm.results.program_correction import REPORT
@@ -18,14 +20,20 @@ from truearm.studio import words
 from truearm.studio.corrected import Corrected, corrected_now, kinematics_files
 from truearm.studio.drawn_program import DrawnProgram, corrected_program, read_program
 from truearm.studio.pages.choices import NONE, chosen, offer
+from truearm.studio.pages.fields import Fields
 from truearm.studio.pages.program_in_space import ProgramInSpace
 from truearm.studio.window import Window
 
+#: Whose axes a force is in where nothing was said.
+_BASE: Final = "(base)"
+#: What a report is called among the files to download.
+_REPORT: Final = "report"
 #: What stands in a list where nothing was said.
 _UNSAID: Final = "(not said)"
 #: Settings that count for the drawing of a program, and for its correction.
 _DRAWN: Final = ("robot", "program")
-_CORRECTED: Final = (*_DRAWN, "result", "corrected", "cell", "taught", "controller_kinematics")
+_ASKED: Final = ("cell", "wrench", "wrench_frame", "taught", "controller_kinematics")
+_CORRECTED: Final = (*_DRAWN, "result", "corrected", *_ASKED)
 #: What was taught at the robot, as the job takes it.
 _TAUGHT: Final = (
     *("none", "points", "tools", "frames"),
@@ -43,6 +51,9 @@ class ProgramsPage:
         gui = window.gui
         self._program = gui.add_dropdown("Program", (NONE,), hint="a file of the project")
         self._cell = gui.add_dropdown("Tools and frames", (NONE,), hint="a file of the schema truearm-cell/1")
+        self.force = fields = Fields(window, lambda: window.project.settings.model_dump(), self._push)
+        fields.text("wrench", "Process force", "on the tool: 0,0,-80,0,0,1.5 in N and N m; or a file of wrenches")
+        fields.choice("wrench_frame", "Force in axes of", WRENCH_FRAMES, "of numbers; a file says its own", none=_BASE)
         self._taught = gui.add_dropdown("Taught", (_UNSAID, *_TAUGHT), hint="what was taught at the robot itself")
         self._kinematics = gui.add_dropdown(
             "Controller has", (_UNSAID, *STATED), hint="with what it turns poses into joint positions; or a file"
@@ -54,7 +65,7 @@ class ProgramsPage:
         self._corrected: Corrected | None = None
         self._corrected_at: tuple[Any, ...] = ()
         self._stands = gui.add_html("")
-        self._downloads = gui.add_button_group("Download", ("corrected program", "report"), visible=False)
+        self._downloads = gui.add_button_group("Download", (_REPORT,), visible=False)
         self._said = gui.add_html("")
         self._program.on_update(window.action(lambda: window.edit(program=chosen(self._program))))
         self._cell.on_update(window.action(lambda: window.edit(cell=chosen(self._cell))))
@@ -76,6 +87,7 @@ class ProgramsPage:
         programs = [name for name in project.names(*suffixes) if not name.startswith(written)]
         offer(self._program, programs, settings.program)
         offer(self._cell, project.names(".yaml", ".yml"), settings.cell)
+        self.force.refresh()
         offer(self._taught, _TAUGHT, None if settings.taught is None else ", ".join(settings.taught), _UNSAID)
         offer(self._kinematics, (*STATED, *kinematics_files(project)), settings.controller_kinematics, _UNSAID)
         if self._told_of.differs(window):
@@ -87,10 +99,23 @@ class ProgramsPage:
             self._space.show()
         corrected = self._standing()
         self._downloads.visible = corrected is not None and not corrected.changed
+        if corrected is not None:
+            offered = (*(file.name for file in corrected.files), _REPORT)
+            if self._downloads.options != offered:
+                self._downloads.options = offered
         self._stands.content = ""
         if corrected is not None and corrected.changed:
             told = f"{corrected.told} It is not handed out: correct the program again."
             self._stands.content = words.notices([Notice("other-program", told, "warning")])
+
+    def _push(self, name: str, value: Any) -> None:
+        """Change what acts on the tool; a text that is no force and no file of forces is refused."""
+        changed = self._window.project.settings.model_copy(update={name: value})
+        if name == "wrench" and changed.wrench_file is not None:
+            read_wrenches(self._window.project.path(changed.wrench_file, "wrench"))
+        elif name == "wrench" and value is not None:
+            Wrench.of(value)
+        self._window.edit(**{name: value})
 
     def _teach(self) -> None:
         said = chosen(self._taught, _UNSAID)
@@ -148,6 +173,8 @@ class ProgramsPage:
             program=program,
             out=settings.corrected,
             cell=settings.cell,
+            wrench=settings.wrench,
+            wrench_frame=settings.wrench_axes,
             taught=settings.taught,
             controller_kinematics=settings.controller_kinematics,
         )
@@ -165,8 +192,9 @@ class ProgramsPage:
         if corrected is None:
             raise InputError("there is no corrected program yet", parameter="corrected", cure="Correct it first.")
         corrected.refuse_other()
-        if self._downloads.value != "report":
-            self._window.download(corrected.program)
+        chosen_file = next((file for file in corrected.files if file.name == self._downloads.value), None)
+        if chosen_file is not None:
+            self._window.download(chosen_file)
         elif corrected.report is not None:
             self._window.download(corrected.report)
         else:

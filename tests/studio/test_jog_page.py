@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.studio.arms import SCARA
 from tests.studio.conftest import Serving
 from tests.studio.pressing import below
 
@@ -308,6 +309,46 @@ def test_another_robot_is_drawn_anew_and_fixtures_beside_it(studio: Studio, page
     studio.window.edit(dark=True)
     assert page.scene.solid is not None
     assert page.scene.solid.robot.name == "katana450"
+
+
+class OpenWindow:
+    """Where a window has the things of the scene: it keeps the place of what is drawn anew under the same name."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._buffer = studio.window.server.scene._websock_interface.get_message_buffer()
+        self._seen, self._places = -1, dict[str, Any]()
+
+    def places(self) -> dict[str, Any]:
+        for number, message in sorted(self._buffer.message_from_id.items()):
+            name = getattr(message, "name", "")
+            if number <= self._seen or message.entity_type != "scene":
+                continue
+            known = self._places.setdefault(name, {"position": (0.0, 0.0, 0.0), "wxyz": (1.0, 0.0, 0.0, 0.0)})
+            known |= {part: value for part, value in vars(message).items() if part in known}
+            if message.lifecycle_phase == "remove":
+                del self._places[name]
+        self._seen = self._buffer.message_counter - 1
+        return self._places
+
+
+def test_an_open_window_draws_another_robot_where_a_new_window_does(studio: Studio, page: JogPage) -> None:
+    """Also what stands turned as all begins: of that viser tells a window nothing."""
+    folder, window = studio.window.project.folder, OpenWindow(studio)
+    turned = Transform((0.3, 0.2, 0.4), (0.5, 0.5, 0.5, 0.5))
+    robots = {
+        "turned.yaml": load_robot("irb120").with_frames(turned, {}).with_fixtures({"nest": ("frame", turned)}),
+        "upright.yaml": load_robot("irb120").with_fixtures({"nest": ("frame", Transform())}),
+        "scara.yaml": SCARA,
+    }
+    for name, robot in robots.items():
+        (folder / name).write_text(robot_text(robot))
+    for name in ("irb120", "scara.yaml", "irb120", "panda", "irb1200_5_0.9", "irb120", "turned.yaml", "upright.yaml"):
+        studio.window.edit(robot=name)
+        page.scene.show_balls("tests", np.zeros((1, 3)), np.full(1, 0.1))
+        drawn = dict(window.places())
+        assert drawn == OpenWindow(studio).places()
+        assert {"/handle", "/tip", "/nominal/flange", "/frames/floor"} <= drawn.keys()
+        act(page._sliders[0], 60.0)
 
 
 def test_errors_are_magnified_and_the_factor_is_said(page: JogPage) -> None:

@@ -23,7 +23,7 @@ from truearm.studio.pages.jog_path import JogPath
 from truearm.studio.pages.jog_views import JogViews
 from truearm.studio.pages.robot_looks import RobotLooks
 from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
-from truearm.studio.scene import Scene
+from truearm.studio.scene import Scene, placed
 from truearm.studio.window import Window
 from truearm.writing import write_text_over
 
@@ -171,9 +171,10 @@ class JogPage:
         self._taken = [slider.value for slider in self._sliders]
         if self._handle is not None:
             self._handle.remove()
-        self._handle = self._window.server.scene.add_transform_controls(
+        handle = self._window.server.scene.add_transform_controls(
             "/handle", scale=0.22 * self.scene.length, line_width=3.0, depth_test=False, visible=self._handle_on.value
         )
+        self._handle = placed(handle)
         self._handle.on_update(self._newest("handle", self._dragged))
         self._moved()
 

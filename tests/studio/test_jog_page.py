@@ -204,6 +204,45 @@ def test_configurations_are_recorded_and_played(page: JogPage, studio: Studio) -
     assert len(file.read_text().splitlines()) == 2
 
 
+def test_what_is_recorded_is_undone_and_done_again(page: JogPage, studio: Studio) -> None:
+    window, file = studio.window, studio.window.project.folder / "recorded.csv"
+    window.edit(seed=7)
+    texts = [None]
+    for angle in (10.0, 20.0, 30.0):
+        act(page._sliders[0], angle)
+        act(page._record, "record")
+        texts.append(file.read_text())
+    act(page._record, "remove last")
+    assert file.read_text() == texts[2]
+    window._undo_edit()
+    assert "P1, P2, P3" in page._recorded.content
+    assert file.read_text() == texts[3]
+    assert "Undone: recorded.csv." in _notices(studio)
+    assert window.project.settings.seed == 7
+    for text in texts[2::-1]:
+        window._undo_edit()
+        assert (file.read_text() if file.exists() else None) == text
+    assert "Nothing recorded yet" in page._recorded.content
+    for text in texts[1:]:
+        window._redo_edit()
+        assert file.read_text() == text
+    assert "Done again: recorded.csv." in _notices(studio)
+    assert window.project.changes() == ()
+    assert window.project.settings.seed == 7
+
+
+def test_it_says_what_is_undone_and_where_there_is_nothing(page: JogPage, studio: Studio) -> None:
+    studio.window._undo_edit()
+    assert "There is nothing to undo." in _notices(studio)
+    studio.window.edit(seed=7, loss="huber")
+    studio.window._undo_edit()
+    assert "Undone: seed, loss." in _notices(studio)
+    studio.window._redo_edit()
+    assert "Done again: seed, loss." in _notices(studio)
+    studio.window._redo_edit()
+    assert "There is nothing to redo." in _notices(studio)
+
+
 def test_a_motion_ends_where_the_user_moves_the_arm(page: JogPage) -> None:
     act(page._sliders[0], 40.0)
     act(page._record, "record")

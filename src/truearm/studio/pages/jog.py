@@ -12,7 +12,6 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes
-from truearm.manifest import hash_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
@@ -25,7 +24,6 @@ from truearm.studio.pages.robot_looks import RobotLooks
 from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
 from truearm.studio.scene import Scene, placed
 from truearm.studio.window import Window
-from truearm.writing import write_text_over
 
 #: What the flange is called among the targets, and the branch that is taken if none is chosen.
 _FLANGE: Final = "flange"
@@ -296,9 +294,10 @@ class JogPage:
 
     def _recording(self, what: str) -> None:
         arm, file = self._jogged(), self._file()
-        before = read_bytes(file) if exists(file) else None
+        there = read_bytes(file) if exists(file) else None
         known = self._read() or Recorded((), np.zeros((0, len(arm.joints))), arm.whose)
-        if before is not None and before != known.text(arm.robot).encode():
+        before = None if there is None else known.text(arm.robot)
+        if before is not None and there != before.encode():
             raise InputError(
                 "this file was not recorded here, and is not changed", where=file.name, cure="Record into another one."
             )
@@ -308,9 +307,8 @@ class JogPage:
             known = known.without_last()
         else:
             raise InputError("the only configuration of a file is not removed", where=file.name)
-        write_text_over(file, known.text(arm.robot), None if before is None else hash_of(before))
-        self._window.project.look(self._window.project.relative(file))
-        self._show_recorded()
+        name = self._window.project.relative(file)
+        self._window.edit({name: known.text(arm.robot)}, known={name: before})
 
     def _show_recorded(self) -> None:
         try:

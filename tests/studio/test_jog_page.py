@@ -207,7 +207,7 @@ def test_configurations_are_recorded_and_played(page: JogPage, studio: Studio) -
 def test_what_is_recorded_is_undone_and_done_again(page: JogPage, studio: Studio) -> None:
     window, file = studio.window, studio.window.project.folder / "recorded.csv"
     window.edit(seed=7)
-    texts = [None]
+    texts: list[str | None] = [None]
     for angle in (10.0, 20.0, 30.0):
         act(page._sliders[0], angle)
         act(page._record, "record")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tests.studio.conftest import Serving
+from tests.studio.pressing import below
 from tests.studio.test_jog_page import act, eventually
 from tests.studio.typing_in import typed
 
@@ -141,7 +142,7 @@ def test_sections_are_undone_and_done_again(studio: Studio, page: JogPage) -> No
     window.edit(seed=7)
     go(page, *_START)
     act(made._add, "start")
-    texts = [None]
+    texts: list[str | None] = [None]
     for place in ((350.0, 100.0, 250.0), (400.0, 150.0, 250.0)):
         go(page, *place)
         act(made._add, "line")
@@ -167,6 +168,33 @@ def test_sections_are_undone_and_done_again(studio: Studio, page: JogPage) -> No
     act(made._add, "line")
     assert "(350, 100, 250)" not in file.read_text()  # what is undone comes not back with what is added
     assert window.project.changes() == ()
+
+
+def test_the_orientation_of_a_path_that_has_begun_is_changed_or_that_is_refused(studio: Studio, page: JogPage) -> None:
+    """The list shows what the file says, whatever was chosen."""
+    made, file = page.path, studio.window.project.folder / "path.yaml"
+    free, kept = made._kept.options
+    go(page, *_START)
+    act(made._add, "start")
+    act(made._kept, kept)
+    go(page, 350.0, 100.0, 250.0)
+    act(made._add, "line")
+    assert "axis: [0.0, 0.0, -1.0]" in file.read_text()
+    with_axis = file.read_text()
+    act(made._kept, free)
+    assert "orientation" not in file.read_text()
+    page._place._impl.value, page._turns._impl.value = (350.0, 50.0, 250.0), (90.0, 0.0, 0.0)
+    act(page._go)
+    act(made._kept, kept)
+    assert file.read_text() == with_axis
+    studio.window._undo_edit()
+    assert made._kept.value == free
+    typed(studio, made._file, "other.yaml")
+    typed(studio, made._file, "path.yaml")
+    act(made._kept, kept)
+    assert "where z pointed at the start of this path is not known any more" in below(studio.window, made._kept)
+    assert made._kept.value == free
+    assert "orientation" not in file.read_text()
 
 
 def test_another_file_begins_another_path(studio: Studio, page: JogPage) -> None:

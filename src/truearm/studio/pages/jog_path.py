@@ -22,6 +22,7 @@ from truearm.studio.path_points import (
     new_path,
     path_text,
     played_path,
+    with_orientation,
     with_section,
     with_speed,
     without_last,
@@ -60,6 +61,7 @@ class JogPath:
         self._window, self._scene, self._arm, self._play, self._stop = window, scene, arm, play, stop
         self._path: dict[str, Any] | None = None
         self._first: Point | None = None
+        self._axis: Point | None = None  # where the tip's z axis pointed at the start, if that was made here
         self._drawn: tuple[Any, ...] = (None,)
         gui = window.gui
         with gui.add_folder("Path", expand_by_default=False):
@@ -72,6 +74,7 @@ class JogPath:
             self._do: Any = gui.add_button_group("Path", ("play", "stop", "remove last"))
             self._draws: Any = gui.add_checkbox("Draw", True, hint="the path in the scene")
             self._said = gui.add_html(words.paragraph(_NONE))
+        self._kept.on_update(window.action(self._other_orientation))
         self._file.on_update(window.settled(lambda: window.edit(path=self._file.value.strip() or None)))
         self._speed.on_update(window.settled(self._other_speed))
         self._add.on_click(window.action(lambda: self._added(self._add.value)))
@@ -84,6 +87,7 @@ class JogPath:
         name = project.settings.path or PATH
         if self._file.value != name:
             self._file.value = name
+        self._show_orientation()
         path, solid = project.path(name, "path"), self._scene.solid
         stamp = path.stat().st_mtime_ns if exists(path) else None
         seen = (name, stamp, None if solid is None else id(solid))
@@ -98,11 +102,15 @@ class JogPath:
                 self._path = None if is_other else {**self._path, "sections": []}
             self._say()
             return
+        began = None if is_other or self._path is None else self._path["start"]
         try:
             planned = read_path(path)
             self._path = entries_of(read_text(path))
+            if self._path is None or self._path["start"] != began:
+                self._axis = None
             if self._path is not None:
                 self._speed.value = float(self._path["speed"])
+                self._show_orientation()
             self._show(planned)
         except InputError as error:
             self._path = None
@@ -114,11 +122,10 @@ class JogPath:
         arm, path = self._arm(), self._known()
         if kind == "start":
             if path is not None and path["sections"]:
-                raise InputError(
-                    "this path has begun already", where=self._name(), cure="Remove its sections, or name another file."
-                )
+                raise InputError("this path has begun already", where=self._name(), cure="Name another file.")
             position, rotation = arm.pose()
-            axis = None if self._kept.value == _FREE else _point(rotation[:, 2])
+            self._axis = _point(rotation[:, 2])
+            axis = None if self._kept.value == _FREE else self._axis
             speed, tip = float(self._speed.value), arm.tip
             self._path = new_path(_point(1e3 * position), speed, frame="base", target=tip, axis=axis)
             self._first = None
@@ -158,6 +165,22 @@ class JogPath:
             self._write(with_speed(path, float(self._speed.value)))
         elif path is not None:
             self._path = with_speed(path, float(self._speed.value))
+
+    def _other_orientation(self) -> None:
+        path = self._path
+        if path is None:
+            return
+        if self._kept.value == _KEPT and self._axis is None:
+            raise InputError(
+                "where z pointed at the start of this path is not known any more, and its orientation stays free",
+                where=self._name(),
+                cure="Name another file, and press start there.",
+            )
+        path = with_orientation(path, None if self._kept.value == _FREE else self._axis)
+        if path["sections"]:
+            self._write(path)
+        else:
+            self._path = path
 
     def _start(self) -> None:
         window, arm = self._window, self._arm()
@@ -217,6 +240,10 @@ class JogPath:
             if planned.frame != "world":
                 at = at @ solid.robot.base.rotation.T + solid.robot.base.translation
             self._scene.show_line("path", at, _LINE)
+
+    def _show_orientation(self) -> None:
+        if self._path is not None:
+            self._kept.value = _KEPT if "orientation" in self._path else _FREE
 
     def _say(self, more: str = "") -> None:
         """Show the path that is made, in words."""

@@ -185,7 +185,7 @@ def test_numbers_of_the_controller(serving: Serving, tmp_path: Path) -> None:
 
 
 def test_configurations_are_recorded_and_played(page: JogPage, studio: Studio) -> None:
-    file = studio.window.project.folder / "recorded.csv"
+    file = studio.window.project.folder / "recorded-irb120.csv"
     act(page._sliders[0], 40.0)
     act(page._record, "record")
     act(page._sliders[0], -40.0)
@@ -204,8 +204,28 @@ def test_configurations_are_recorded_and_played(page: JogPage, studio: Studio) -
     assert len(file.read_text().splitlines()) == 2
 
 
+def test_another_robot_has_its_own_list_and_its_own_numbers(page: JogPage, studio: Studio) -> None:
+    """Joint positions do not say of which arm they are."""
+    act(page._whose, "model")
+    act(page._record, "record")
+    studio.window.edit(robot="lrmate200id")
+    assert page._whose.value == "controller"
+    assert page._list.value == "recorded-lrmate200id.csv"
+    assert "Nothing recorded yet" in page._recorded.content
+    act(page._record, "record")
+    act(page._whose, "model")
+    act(page._list, "mine.csv")
+    studio.window.edit(payload="2kg,0mm,0mm,50mm")
+    assert (page._whose.value, page._list.value) == ("model", "mine.csv")  # the arm is the same
+    studio.window.edit(robot="irb120")
+    assert page._list.value == "recorded-irb120.csv"
+    assert "Recorded: P1" in page._recorded.content
+    files = sorted(path.name for path in studio.window.project.folder.glob("*.csv"))
+    assert files == ["recorded-irb120.csv", "recorded-lrmate200id.csv"]
+
+
 def test_what_is_recorded_is_undone_and_done_again(page: JogPage, studio: Studio) -> None:
-    window, file = studio.window, studio.window.project.folder / "recorded.csv"
+    window, file = studio.window, studio.window.project.folder / "recorded-irb120.csv"
     window.edit(seed=7)
     texts: list[str | None] = [None]
     for angle in (10.0, 20.0, 30.0):
@@ -217,7 +237,7 @@ def test_what_is_recorded_is_undone_and_done_again(page: JogPage, studio: Studio
     window._undo_edit()
     assert "P1, P2, P3" in page._recorded.content
     assert file.read_text() == texts[3]
-    assert "Undone: recorded.csv." in _notices(studio)
+    assert "Undone: recorded-irb120.csv." in _notices(studio)
     assert window.project.settings.seed == 7
     for text in texts[2::-1]:
         window._undo_edit()
@@ -226,7 +246,7 @@ def test_what_is_recorded_is_undone_and_done_again(page: JogPage, studio: Studio
     for text in texts[1:]:
         window._redo_edit()
         assert file.read_text() == text
-    assert "Done again: recorded.csv." in _notices(studio)
+    assert "Done again: recorded-irb120.csv." in _notices(studio)
     assert window.project.changes() == ()
     assert window.project.settings.seed == 7
 
@@ -284,7 +304,7 @@ def test_what_another_program_writes_while_a_pose_is_recorded_is_not_overwritten
     page: JogPage, studio: Studio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It writes once the page has looked at the file: a new one first, then one that was recorded here."""
-    file, with_one = studio.window.project.folder / "recorded.csv", Recorded.with_one
+    file, with_one = studio.window.project.folder / "recorded-irb120.csv", Recorded.with_one
 
     def late(known: Recorded, joints: Any) -> Recorded:
         file.write_text("theirs")

@@ -21,7 +21,7 @@ from truearm.studio.jogging import JOG_FRAMES, Branch, JogFrame, Jogging
 from truearm.studio.pages.jog_path import JogPath
 from truearm.studio.pages.jog_views import JogViews
 from truearm.studio.pages.robot_looks import RobotLooks
-from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
+from truearm.studio.recorded import Motion, Recorded, labels_text, list_of, read_recorded
 from truearm.studio.scene import Scene, placed
 from truearm.studio.window import Window
 
@@ -81,7 +81,7 @@ class JogPage:
             self._find = gui.add_button("Find all branches")
             self._branch: Any = gui.add_dropdown("Branch", (_NEAREST,))
         with gui.add_folder("Recorded configurations"):
-            self._list = gui.add_text("File", "recorded.csv")
+            self._list: Any = gui.add_text("File", "", hint="every robot has a list of its own, if you name no other")
             self._record = gui.add_button_group("Pose", ("record", "remove last"))
             self._recorded = gui.add_html("")
             self._speed = gui.add_number("Speed [deg/s, mm/s]", 45.0, min=0.1, max=1000.0, step=1.0)
@@ -108,6 +108,8 @@ class JogPage:
                 self._arms["calibrated"] = ghost
             self._arm.options = tuple(self._arms)
             self._ghost.disabled = ghost is None
+            if self.jogging is None or self.jogging.robot.name != nominal.name:
+                self._list.value = list_of(nominal)
             self._take("calibrated" if self._arm.value == "calibrated" and ghost is not None else "nominal")
         self._show_recorded()
         self.path.refresh()
@@ -149,7 +151,7 @@ class JogPage:
         self.jogging = arm = Jogging(self._arms[name], None if before is None else before.joints)
         known = arm.robot.controller.counts_known
         self._whose.disabled = not known
-        if before is not None and known and len(before.joints) == len(arm.joints):
+        if before is not None and known and before.robot.name == arm.robot.name:
             arm.whose = before.whose
         self._arm.value, self._whose.value = name, arm.whose
         tips = (_FLANGE, *(target.name for target in arm.robot.targets))

@@ -184,6 +184,22 @@ def test_numbers_of_the_controller(serving: Serving, tmp_path: Path) -> None:
     assert page._sliders[2].value == pytest.approx(-30.0)
 
 
+def test_poses_are_those_of_the_pendant_where_joints_are(studio: Studio, page: JogPage) -> None:
+    assert page._frame.options == ("base", "world", "tool")
+    act(page._frame, "world")
+    studio.window.edit(robot="lrmate200id")  # its controller's base is 330 mm above the model's
+    assert page._frame.options == ("base", "world", "controller", "tool")
+    assert (page._whose.value, page._frame.value) == ("controller", "controller")
+    height = page._place.value[2]
+    act(page._frame, "base")
+    assert page._place.value[2] - height == pytest.approx(330.0)
+    studio.window.edit(payload="2kg,0mm,0mm,50mm")
+    assert page._frame.value == "base"  # the arm is the same
+    act(page._frame, "controller")
+    studio.window.edit(robot="irb120")
+    assert page._frame.value == "base"
+
+
 def test_configurations_are_recorded_and_played(page: JogPage, studio: Studio) -> None:
     file = studio.window.project.folder / "recorded-irb120.csv"
     act(page._sliders[0], 40.0)

@@ -17,7 +17,7 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.notices import Notice
 from truearm.studio import words
-from truearm.studio.jogging import JOG_FRAMES, Branch, JogFrame, Jogging
+from truearm.studio.jogging import Branch, JogFrame, Jogging
 from truearm.studio.pages.jog_path import JogPath
 from truearm.studio.pages.jog_views import JogViews
 from truearm.studio.pages.robot_looks import RobotLooks
@@ -67,7 +67,7 @@ class JogPage:
         with gui.add_folder("Pose"):
             self._tip: Any = gui.add_dropdown("Tip", (_FLANGE,))
             self._frame: Any = gui.add_dropdown(
-                "Axes of", JOG_FRAMES, initial_value="base", hint="tool: by how much to move from here"
+                "Axes of", ("base",), hint="controller: as the pendant shows poses; tool: by how much to move from here"
             )
             self._place: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.1)
             self._turns: Any = gui.add_vector3(
@@ -159,6 +159,11 @@ class JogPage:
         if before is not None and before.tip in tips:
             arm.tip = before.tip
         self._tip.value = arm.tip or _FLANGE
+        frame: JogFrame = self._frame.value
+        if before is None or before.robot.name != arm.robot.name or frame not in arm.frames:
+            frame = "controller" if arm.whose == "controller" and "controller" in arm.frames else "base"
+        self._frame.options = arm.frames
+        self._frame.value = frame
         for slider in self._sliders:
             slider.remove()
         self._sliders = []

@@ -171,6 +171,19 @@ def test_branches_are_offered_and_taken(page: JogPage) -> None:
     assert page._branch.options == ("nearest",)
 
 
+def test_a_branch_that_is_refused_is_not_shown_as_chosen(page: JogPage, studio: Studio) -> None:
+    for slider, value in zip(page._sliders, (10.0, 20.0, -15.0, 30.0, 40.0, -50.0), strict=True):
+        act(slider, value)
+    act(page._find)
+    refused = next(name for name in page._branch.options if "(beyond-limit)" in name)
+    taken = next(name for name in page._branch.options[2:] if name.endswith("(reached)"))
+    for before in ("nearest", taken):
+        act(page._branch, before)
+        act(page._branch, refused)
+        assert "the arm cannot go there" in below(studio.window, page._branch)
+        assert page._branch.value == before
+
+
 def test_numbers_of_the_controller(serving: Serving, tmp_path: Path) -> None:
     folder = tmp_path / "fanuc"
     folder.mkdir()

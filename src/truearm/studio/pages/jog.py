@@ -49,6 +49,7 @@ class JogPage:
         self.jogging: Jogging | None = None
         self._arms: dict[str, Robot] = {}
         self._branches: list[Branch] = []
+        self._at_branch = _NEAREST  # what was chosen last, and not refused
         self._latest: dict[str, int] = {}
         self._playing: threading.Event | None = None
         gui = window.gui
@@ -207,6 +208,7 @@ class JogPage:
         self._branches = self._jogged().branches()
         names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
         self._branch.options = (_NEAREST, *names)
+        self._branch.value = self._at_branch = _NEAREST
         if not names:
             self._said.content += words.paragraph("No other way to this pose was found.")
 
@@ -215,9 +217,11 @@ class JogPage:
         if self._branch.value in names:
             branch = self._branches[names.index(self._branch.value)]
             if not branch.status.usable:
+                self._branch.value = self._at_branch
                 raise InputError("the arm cannot go there", came=branch.name, cure=branch.status.advice)
             self._jogged().go(branch.joints)
             self._moved(branches=False)
+        self._at_branch = self._branch.value
 
     def _other_tip(self) -> None:
         self._jogged().tip = None if self._tip.value == _FLANGE else self._tip.value
@@ -250,7 +254,8 @@ class JogPage:
         self.scene.move(arm.at, arm.robot)
         if branches and self._branches:
             self._branches = []
-            self._branch.options, self._branch.value = (_NEAREST,), _NEAREST
+            self._branch.options = (_NEAREST,)
+            self._branch.value = self._at_branch = _NEAREST
         self._shown(handle=handle)
 
     def _shown(self, *, handle: bool = True) -> None:

@@ -399,6 +399,34 @@ def test_another_robot_is_drawn_anew_and_fixtures_beside_it(studio: Studio, page
     assert page.scene.solid.robot.name == "katana450"
 
 
+def test_the_result_of_another_robot_is_neither_drawn_nor_moved(studio: Studio, page: JogPage) -> None:
+    placed = Transform((1.0, 2.0, 0.5), (0.0, 0.0, 0.0, 1.0))
+    found = load_robot("irb120").with_frames(placed, {"1": (0.0, 0.0, 0.1)}).with_values({"a_3": 0.2712})
+    folder = studio.window.project.folder / "result"
+    folder.mkdir()
+    (folder / "calibrated.yaml").write_text(robot_text(found))
+    studio.window.refresh()
+    assert page.scene.ghost is not None
+    assert page._other.content == ""
+    act(page._arm, "calibrated")
+    act(page._ghost, False)
+    studio.window.edit(payload="2kg,0mm,0mm,50mm")
+    assert not page.scene.ghost._root.visible  # what is drawn anew is hidden as before
+    studio.window.edit(robot="kr5")
+    assert page.scene.ghost is None
+    assert page._arm.options == ("nominal",)
+    assert page._tip.options == ("flange",)
+    assert page.scene.solid is not None
+    assert page.scene.solid.robot.base == Transform()
+    assert page.jogging is not None
+    assert page.jogging.robot.name == "kr5"
+    assert "(other-robot)" in page._other.content
+    assert "irb120" in page._other.content
+    studio.window.edit(robot="irb120")
+    assert page._arm.options == ("nominal", "calibrated")
+    assert page._other.content == ""
+
+
 class OpenWindow:
     """Where a window has the things of the scene: it keeps the place of what is drawn anew under the same name."""
 

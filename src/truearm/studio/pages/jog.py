@@ -57,6 +57,7 @@ class JogPage:
         self._arm: Any = gui.add_dropdown(
             "Arm", ("nominal",), hint="whose parameters and joint effects poses are found with"
         )
+        self._other = gui.add_html("")
         self._ghost = gui.add_checkbox("Calibrated arm as a shadow", True)
         self._whose: Any = gui.add_dropdown(
             "Numbers of", _WHOSE, initial_value="model", hint="as the pendant shows joints, or the model's"
@@ -97,9 +98,9 @@ class JogPage:
     def refresh(self) -> None:
         """Show the robots as they are now."""
         window = self._window
-        nominal, calibrated = window.robot(), window.calibrated()
-        same_arm = calibrated is None or len(calibrated.joints) == len(nominal.joints)
-        ghost = calibrated if same_arm else None
+        nominal, other = window.robot(), window.result_of_another()
+        ghost = None if other else window.calibrated()
+        self._other.content = words.notice(_other_robot(other, nominal)) if other else ""
         meshes = self._looks.meshes(nominal)
         if self.scene.show(nominal, ghost, meshes, dark=window.project.settings.dark) or self.jogging is None:
             assert self.scene.solid is not None
@@ -109,6 +110,7 @@ class JogPage:
                 self._arms["calibrated"] = ghost
             self._arm.options = tuple(self._arms)
             self._ghost.disabled = ghost is None
+            self.scene.show_ghost(self._ghost.value)
             if self.jogging is None or self.jogging.robot.name != nominal.name:
                 self._list.value = list_of(nominal)
             self._take("calibrated" if self._arm.value == "calibrated" and ghost is not None else "nominal")
@@ -390,6 +392,11 @@ class JogPage:
         if self._playing is not None:
             self._playing.set()
             self._playing = None
+
+
+def _other_robot(other: str, robot: Robot) -> Notice:
+    text = f"The result is of {other} and not of {robot.name}: the calibrated arm is not drawn, and cannot be moved."
+    return Notice("other-robot", text, "warning")
 
 
 def _no_robot() -> Notice:

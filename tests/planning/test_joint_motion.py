@@ -194,6 +194,7 @@ def test_a_path_that_leaves_the_reach_says_where() -> None:
     with pytest.raises(InputError) as refused:
         joint_motion(load_robot("li3"), path)
     assert "mm along the path" in str(refused.value)
+    assert refused.value.cure == "Move the path towards the arm, or start elsewhere (`seed`)."  # it is free already
     travelled = float(str(refused.value).split(" mm along")[0])
     reached = np.linalg.norm([0.3 + travelled / 1e3, 0.1, 0.3])
     assert 0.4 < reached < 1.2
@@ -225,6 +226,7 @@ def test_a_path_through_a_singular_wrist_is_refused_there() -> None:
         with pytest.raises(InputError, match=r"passes a singular posture; got 'axis_[46] would have to") as refused:
             joint_motion(robot, path, orientation="full", rotation=R, seed=begin)
         assert float(str(refused.value).split(" mm along")[0]) == pytest.approx(30, abs=10)
+        assert "free more of the orientation" in str(refused.value)
 
 
 def test_a_singular_posture_between_two_samples_is_not_stepped_over() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.studio.arms import SCARA
 from tests.studio.conftest import Serving
 from tests.studio.pressing import below
 
@@ -129,7 +130,7 @@ def test_sliders_show_rounded_numbers_and_the_arm_stands_exactly(page: JogPage, 
     assert np.rad2deg(moved[4]) == pytest.approx(50.0)
     page.go_to_joints(joints)
     act(page._record, "record")
-    file = studio.window.project.folder / "recorded.csv"
+    file = studio.window.project.folder / "recorded-irb120.csv"
     written = file.read_text().splitlines()[1].split(",")[1:7]
     assert [float(one) for one in written] == pytest.approx(np.rad2deg(joints), abs=1e-12)
 
@@ -192,6 +193,19 @@ def test_branches_are_offered_and_taken(page: JogPage) -> None:
     assert page._branch.options == ("nearest",)
 
 
+def test_a_branch_that_is_refused_is_not_shown_as_chosen(page: JogPage, studio: Studio) -> None:
+    for slider, value in zip(page._sliders, (10.0, 20.0, -15.0, 30.0, 40.0, -50.0), strict=True):
+        act(slider, value)
+    act(page._find)
+    refused = next(name for name in page._branch.options if "(beyond-limit)" in name)
+    taken = next(name for name in page._branch.options[2:] if name.endswith("(reached)"))
+    for before in ("nearest", taken):
+        act(page._branch, before)
+        act(page._branch, refused)
+        assert "the arm cannot go there" in below(studio.window, page._branch)
+        assert page._branch.value == before
+
+
 def test_numbers_of_the_controller(serving: Serving, tmp_path: Path) -> None:
     folder = tmp_path / "fanuc"
     folder.mkdir()
@@ -205,8 +219,24 @@ def test_numbers_of_the_controller(serving: Serving, tmp_path: Path) -> None:
     assert page._sliders[2].value == pytest.approx(-30.0)
 
 
+def test_poses_are_those_of_the_pendant_where_joints_are(studio: Studio, page: JogPage) -> None:
+    assert page._frame.options == ("base", "world", "tool")
+    act(page._frame, "world")
+    studio.window.edit(robot="lrmate200id")  # its controller's base is 330 mm above the model's
+    assert page._frame.options == ("base", "world", "controller", "tool")
+    assert (page._whose.value, page._frame.value) == ("controller", "controller")
+    height = page._place.value[2]
+    act(page._frame, "base")
+    assert page._place.value[2] - height == pytest.approx(330.0)
+    studio.window.edit(payload="2kg,0mm,0mm,50mm")
+    assert page._frame.value == "base"  # the arm is the same
+    act(page._frame, "controller")
+    studio.window.edit(robot="irb120")
+    assert page._frame.value == "base"
+
+
 def test_configurations_are_recorded_and_played(page: JogPage, studio: Studio) -> None:
-    file = studio.window.project.folder / "recorded.csv"
+    file = studio.window.project.folder / "recorded-irb120.csv"
     act(page._sliders[0], 40.0)
     act(page._record, "record")
     act(page._sliders[0], -40.0)
@@ -223,6 +253,65 @@ def test_configurations_are_recorded_and_played(page: JogPage, studio: Studio) -
     assert np.rad2deg(arm.joints[0]) == pytest.approx(-40.0)
     act(page._record, "remove last")
     assert len(file.read_text().splitlines()) == 2
+
+
+def test_another_robot_has_its_own_list_and_its_own_numbers(page: JogPage, studio: Studio) -> None:
+    """Joint positions do not say of which arm they are."""
+    act(page._whose, "model")
+    act(page._record, "record")
+    studio.window.edit(robot="lrmate200id")
+    assert page._whose.value == "controller"
+    assert page._list.value == "recorded-lrmate200id.csv"
+    assert "Nothing recorded yet" in page._recorded.content
+    act(page._record, "record")
+    act(page._whose, "model")
+    act(page._list, "mine.csv")
+    studio.window.edit(payload="2kg,0mm,0mm,50mm")
+    assert (page._whose.value, page._list.value) == ("model", "mine.csv")  # the arm is the same
+    studio.window.edit(robot="irb120")
+    assert page._list.value == "recorded-irb120.csv"
+    assert "Recorded: P1" in page._recorded.content
+    files = sorted(path.name for path in studio.window.project.folder.glob("*.csv"))
+    assert files == ["recorded-irb120.csv", "recorded-lrmate200id.csv"]
+
+
+def test_what_is_recorded_is_undone_and_done_again(page: JogPage, studio: Studio) -> None:
+    window, file = studio.window, studio.window.project.folder / "recorded-irb120.csv"
+    window.edit(seed=7)
+    texts: list[str | None] = [None]
+    for angle in (10.0, 20.0, 30.0):
+        act(page._sliders[0], angle)
+        act(page._record, "record")
+        texts.append(file.read_text())
+    act(page._record, "remove last")
+    assert file.read_text() == texts[2]
+    window._undo_edit()
+    assert "P1, P2, P3" in page._recorded.content
+    assert file.read_text() == texts[3]
+    assert "Undone: recorded-irb120.csv." in _notices(studio)
+    assert window.project.settings.seed == 7
+    for text in texts[2::-1]:
+        window._undo_edit()
+        assert (file.read_text() if file.exists() else None) == text
+    assert "Nothing recorded yet" in page._recorded.content
+    for text in texts[1:]:
+        window._redo_edit()
+        assert file.read_text() == text
+    assert "Done again: recorded-irb120.csv." in _notices(studio)
+    assert window.project.changes() == ()
+    assert window.project.settings.seed == 7
+
+
+def test_it_says_what_is_undone_and_where_there_is_nothing(page: JogPage, studio: Studio) -> None:
+    studio.window._undo_edit()
+    assert "There is nothing to undo." in _notices(studio)
+    studio.window.edit(seed=7, loss="huber")
+    studio.window._undo_edit()
+    assert "Undone: seed, loss." in _notices(studio)
+    studio.window._redo_edit()
+    assert "Done again: seed, loss." in _notices(studio)
+    studio.window._redo_edit()
+    assert "There is nothing to redo." in _notices(studio)
 
 
 def test_a_motion_ends_where_the_user_moves_the_arm(page: JogPage) -> None:
@@ -266,7 +355,7 @@ def test_what_another_program_writes_while_a_pose_is_recorded_is_not_overwritten
     page: JogPage, studio: Studio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It writes once the page has looked at the file: a new one first, then one that was recorded here."""
-    file, with_one = studio.window.project.folder / "recorded.csv", Recorded.with_one
+    file, with_one = studio.window.project.folder / "recorded-irb120.csv", Recorded.with_one
 
     def late(known: Recorded, joints: Any) -> Recorded:
         file.write_text("theirs")
@@ -330,6 +419,74 @@ def test_another_robot_is_drawn_anew_and_fixtures_beside_it(studio: Studio, page
     studio.window.edit(dark=True)
     assert page.scene.solid is not None
     assert page.scene.solid.robot.name == "katana450"
+
+
+def test_the_result_of_another_robot_is_neither_drawn_nor_moved(studio: Studio, page: JogPage) -> None:
+    placed = Transform((1.0, 2.0, 0.5), (0.0, 0.0, 0.0, 1.0))
+    found = load_robot("irb120").with_frames(placed, {"1": (0.0, 0.0, 0.1)}).with_values({"a_3": 0.2712})
+    folder = studio.window.project.folder / "result"
+    folder.mkdir()
+    (folder / "calibrated.yaml").write_text(robot_text(found))
+    studio.window.refresh()
+    assert page.scene.ghost is not None
+    assert page._other.content == ""
+    act(page._arm, "calibrated")
+    act(page._ghost, False)
+    studio.window.edit(payload="2kg,0mm,0mm,50mm")
+    assert not page.scene.ghost._root.visible  # what is drawn anew is hidden as before
+    studio.window.edit(robot="kr5")
+    assert page.scene.ghost is None
+    assert page._arm.options == ("nominal",)
+    assert page._tip.options == ("flange",)
+    assert page.scene.solid is not None
+    assert page.scene.solid.robot.base == Transform()
+    assert page.jogging is not None
+    assert page.jogging.robot.name == "kr5"
+    assert "(other-robot)" in page._other.content
+    assert "irb120" in page._other.content
+    studio.window.edit(robot="irb120")
+    assert page._arm.options == ("nominal", "calibrated")
+    assert page._other.content == ""
+
+
+class OpenWindow:
+    """Where a window has the things of the scene: it keeps the place of what is drawn anew under the same name."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._buffer = studio.window.server.scene._websock_interface.get_message_buffer()
+        self._seen, self._places = -1, dict[str, Any]()
+
+    def places(self) -> dict[str, Any]:
+        for number, message in sorted(self._buffer.message_from_id.items()):
+            name = getattr(message, "name", "")
+            if number <= self._seen or message.entity_type != "scene":
+                continue
+            known = self._places.setdefault(name, {"position": (0.0, 0.0, 0.0), "wxyz": (1.0, 0.0, 0.0, 0.0)})
+            known |= {part: value for part, value in vars(message).items() if part in known}
+            if message.lifecycle_phase == "remove":
+                del self._places[name]
+        self._seen = self._buffer.message_counter - 1
+        return self._places
+
+
+def test_an_open_window_draws_another_robot_where_a_new_window_does(studio: Studio, page: JogPage) -> None:
+    """Also what stands turned as all begins: of that viser tells a window nothing."""
+    folder, window = studio.window.project.folder, OpenWindow(studio)
+    turned = Transform((0.3, 0.2, 0.4), (0.5, 0.5, 0.5, 0.5))
+    robots = {
+        "turned.yaml": load_robot("irb120").with_frames(turned, {}).with_fixtures({"nest": ("frame", turned)}),
+        "upright.yaml": load_robot("irb120").with_fixtures({"nest": ("frame", Transform())}),
+        "scara.yaml": SCARA,
+    }
+    for name, robot in robots.items():
+        (folder / name).write_text(robot_text(robot))
+    for name in ("irb120", "scara.yaml", "irb120", "panda", "irb1200_5_0.9", "irb120", "turned.yaml", "upright.yaml"):
+        studio.window.edit(robot=name)
+        page.scene.show_balls("tests", np.zeros((1, 3)), np.full(1, 0.1))
+        drawn = dict(window.places())
+        assert drawn == OpenWindow(studio).places()
+        assert {"/handle", "/tip", "/nominal/flange", "/frames/floor"} <= drawn.keys()
+        act(page._sliders[0], 60.0)
 
 
 def test_errors_are_magnified_and_the_factor_is_said(page: JogPage) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tests.studio.conftest import Serving
+from tests.studio.pressing import below
 from tests.studio.test_jog_page import act, eventually
 from tests.studio.typing_in import typed
 
@@ -134,6 +135,83 @@ def test_what_cannot_be_is_refused_and_the_file_stays(studio: Studio, page: JogP
     assert "units" in made._said.content
     typed(studio, made._file, "../path.yaml")
     assert "no place in the project" in said(studio)
+
+
+def test_sections_are_undone_and_done_again(studio: Studio, page: JogPage) -> None:
+    window, made, file = studio.window, page.path, studio.window.project.folder / "path.yaml"
+    window.edit(seed=7)
+    go(page, *_START)
+    act(made._add, "start")
+    texts: list[str | None] = [None]
+    for place in ((350.0, 100.0, 250.0), (400.0, 150.0, 250.0)):
+        go(page, *place)
+        act(made._add, "line")
+        texts.append(file.read_text())
+    typed(studio, made._speed, 400.0)
+    texts.append(file.read_text())
+    act(made._do, "remove last")
+    assert "(400, 150, 250)" not in made._said.content
+    for text in texts[::-1]:
+        window._undo_edit()
+        assert (file.read_text() if file.exists() else None) == text
+        assert ("(400, 150, 250)" in made._said.content) == (text in texts[2:])
+        assert made._speed.value == (400.0 if text == texts[3] else 200.0)
+    assert "path" not in page.scene._parts or not page.scene._parts["path"]
+    assert "from (350, 0, 250)" in made._said.content
+    assert window.project.settings.seed == 7
+    for text in texts[1:]:
+        window._redo_edit()
+        assert file.read_text() == text
+    for _ in texts[1:]:
+        window._undo_edit()
+    go(page, 340.0, 50.0, 270.0)
+    act(made._add, "line")
+    assert "(350, 100, 250)" not in file.read_text()  # what is undone comes not back with what is added
+    assert window.project.changes() == ()
+
+
+def test_the_orientation_of_a_path_that_has_begun_is_changed_or_that_is_refused(studio: Studio, page: JogPage) -> None:
+    """The list shows what the file says, whatever was chosen."""
+    made, file = page.path, studio.window.project.folder / "path.yaml"
+    free, kept = made._kept.options
+    go(page, *_START)
+    act(made._add, "start")
+    act(made._kept, kept)
+    go(page, 350.0, 100.0, 250.0)
+    act(made._add, "line")
+    assert "axis: [0.0, 0.0, -1.0]" in file.read_text()
+    with_axis = file.read_text()
+    act(made._kept, free)
+    assert "orientation" not in file.read_text()
+    page._place._impl.value, page._turns._impl.value = (350.0, 50.0, 250.0), (90.0, 0.0, 0.0)
+    act(page._go)
+    act(made._kept, kept)
+    assert file.read_text() == with_axis
+    studio.window._undo_edit()
+    assert made._kept.value == free
+    typed(studio, made._file, "other.yaml")
+    typed(studio, made._file, "path.yaml")
+    act(made._kept, kept)
+    assert "where z pointed at the start of this path is not known any more" in below(studio.window, made._kept)
+    assert made._kept.value == free
+    assert "orientation" not in file.read_text()
+
+
+def test_another_file_begins_another_path(studio: Studio, page: JogPage) -> None:
+    made, folder = page.path, studio.window.project.folder
+    go(page, *_START)
+    act(made._add, "start")
+    go(page, 350.0, 100.0, 250.0)
+    act(made._add, "line")
+    typed(studio, made._file, "other.yaml")
+    assert "No path yet" in made._said.content
+    act(made._add, "line")
+    assert "the path has no start yet" in said(studio)
+    act(made._add, "start")
+    go(page, *_START)
+    act(made._add, "line")
+    assert "start: [350.0, 100.0, 250.0]" in (folder / "other.yaml").read_text()
+    assert "start: [350.0, 0.0, 250.0]" in (folder / "path.yaml").read_text()
 
 
 def test_a_path_file_is_the_same_after_reading_it() -> None:

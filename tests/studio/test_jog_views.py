@@ -56,6 +56,12 @@ def test_moments_are_those_of_the_weight_about_the_axes() -> None:
         load_arrows(GANTRY, Jogging(GANTRY).at, 1.0)
 
 
+def test_moments_of_rounding_are_zero() -> None:
+    payload = Payload(3.0, (0.0, 0.0, 0.1))
+    robot = replace(load_robot("irb120"), masses=(), balancers=()).with_payload(payload, (0.0, 1e-8, -9.80665))
+    assert load_arrows(robot, Jogging(robot).at, 1.0)[1][0] == "axis_1: 0 N m"
+
+
 def test_reached_points_are_those_of_the_tip() -> None:
     points = reached_points(SCARA, None)
     assert np.linalg.norm(points[:, :2], axis=1).max() <= 0.55 + 1e-9

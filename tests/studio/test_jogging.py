@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.studio.arms import GANTRY, POINT, SCARA
@@ -87,6 +89,24 @@ def test_numbers_of_a_pose_lead_back_to_it(arm: Jogging, frame: str, tip: str | 
     arm.joints = arm.joints + 0.05
     assert arm.go_to_numbers(frame, position, turns) is PoseStatus.REACHED  # type: ignore[arg-type]
     assert arm.joints == pytest.approx(Q, abs=1e-7)
+
+
+@pytest.mark.parametrize("target", [None, "ball"])
+def test_in_the_axes_of_the_controller_numbers_are_those_of_the_pendant(target: str | None) -> None:
+    placed = Transform((0.5, 0.1, 0.2), (0.8, 0.0, 0.6, 0.0))
+    robot = load_robot("lrmate200id").with_frames(placed, {"ball": (0.02, 0.03, 0.1)})
+    turned = Transform((0.0, 0.0, 0.01), (0.0, 1.0, 0.0, 0.0))
+    robot = replace(robot, controller=replace(robot.controller, flange=turned))
+    arm = Jogging(robot, Q)
+    arm.tip = target
+    assert arm.frames == ("base", "world", "controller", "tool")
+    for got, meant in zip(arm.pose("controller"), robot.forward(Q, frame="controller", target=target), strict=True):
+        assert got == pytest.approx(meant[0], abs=1e-12)
+    position, turns = arm.pose_numbers("controller")
+    arm.joints = arm.joints + 0.05
+    assert arm.go_to_numbers("controller", position, turns) is PoseStatus.REACHED
+    assert arm.joints == pytest.approx(Q, abs=1e-7)
+    assert Jogging(load_robot("irb120")).frames == ("base", "world", "tool")
 
 
 def test_in_the_tool_numbers_say_by_how_much(arm: Jogging) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from truearm.errors import InputError
 from truearm.jobs.plan import plan
 from truearm.jobs.simulate import simulate
 from truearm.library import load_robot
-from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
+from truearm.studio.recorded import Motion, Recorded, labels_text, list_of, read_recorded
 
 Q = np.deg2rad([[10.0, 20.0, -15.0, 30.0, 40.0, -50.0], [0.0, 5.0, 5.0, 0.0, 30.0, 0.0]])
 
@@ -32,6 +33,10 @@ def test_what_is_recorded_is_read_again(tmp_path: Path, name: str, whose: str) -
     assert read.joints == pytest.approx(Q, abs=1e-12)
     assert read.text(robot) == made.text(robot)
     assert read.without_last().labels == ("P1",)
+
+
+def test_the_list_of_a_robot_has_a_name_that_files_can_have() -> None:
+    assert list_of(replace(load_robot("irb120"), name="../my arm/ä")) == "recorded-..-my-arm-.csv"
 
 
 def test_a_removed_name_is_not_given_twice() -> None:

@@ -214,7 +214,7 @@ def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyP
     assert jog.scene.ghost is not None
     person.press("record")
     person.wait_for("Recorded: P1")
-    assert (folder / "recorded.csv").read_text().splitlines()[1].startswith("P1,0.0,40.0,")
+    assert (folder / "recorded-irb120.csv").read_text().splitlines()[1].startswith("P1,0.0,40.0,")
     person.picture("jog")
 
     person.turn_to("Plan")

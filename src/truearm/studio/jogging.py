@@ -13,6 +13,7 @@ from truearm.jobs.inverse import inverse
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import Controller, JointsOf
 from truearm.modeling.formats.joint_columns import counting
+from truearm.modeling.frames import Frame, frame_and_tip
 from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.inverse.candidates import REACHED, Candidates
 from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
@@ -21,11 +22,12 @@ from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.orientations import FIXED_XYZ_ANGLES
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import IDENTITY
 from truearm.units import from_si, to_si
 
-#: In whose axes a pose is given: those of the base, of the instrument, or of the tip as it stands now.
-JogFrame = Literal["base", "world", "tool"]
-JOG_FRAMES: Final[tuple[JogFrame, ...]] = ("base", "world", "tool")
+#: In whose axes a pose is given: those of the base, of the instrument, of the controller's base, or of the tip as it
+#: stands now.
+JogFrame = Literal["base", "world", "controller", "tool"]
 #: What counts of a pose for arms of few joints.
 _FREEDOM: Final[dict[int, Orientation]] = {3: "free", 4: "free", 5: "axis"}
 #: Rounding that is no way beyond a limit [rad or m].
@@ -94,6 +96,13 @@ class Jogging:
         return self._bent
 
     @property
+    def frames(self) -> tuple[JogFrame, ...]:
+        """In whose axes poses can be given: the controller's where its frames stand elsewhere than the model's."""
+        controller = self.robot.controller
+        elsewhere = controller.base != IDENTITY or controller.flange != IDENTITY
+        return ("base", "world", *(("controller",) if elsewhere else ()), "tool")
+
+    @property
     def units(self) -> list[str]:
         """``deg`` or ``mm`` of each joint."""
         return ["deg" if joint.kind == "revolute" else "mm" for joint in self.robot.joints]
@@ -158,8 +167,8 @@ class Jogging:
             )
         self.joints = np.clip(joints, self.low, self.high)
 
-    def pose(self, frame: JogFrame = "base") -> tuple[Array, Array]:
-        """Return the tip's position ``(3,)`` [m] and rotation ``(3, 3)`` in the base or the world."""
+    def pose(self, frame: Frame = "base") -> tuple[Array, Array]:
+        """Return the tip's position ``(3,)`` [m] and rotation ``(3, 3)`` in the axes of a frame that stands still."""
         at, known = self.at, self._pose
         if known is None or known[0] is not at or known[1] != self.tip:
             p, R = self.robot.forward(at, frame="world", target=self.tip)
@@ -167,7 +176,8 @@ class Jogging:
         _, _, position, rotation = known
         if frame == "world":
             return position, rotation
-        base = self.robot.base
+        base, behind = frame_and_tip(self.robot, frame, self.tip)
+        position, rotation = position + rotation @ np.array(behind.translation), rotation @ behind.rotation
         return (position - np.array(base.translation)) @ base.rotation, base.rotation.T @ rotation
 
     def pose_numbers(self, frame: JogFrame) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -198,10 +208,10 @@ class Jogging:
         R = FIXED_XYZ_ANGLES.matrices(np.deg2rad([turns]))[0]
         if frame == "tool":
             from_p, from_R = self.pose("base")
-            p, R = from_p + from_R @ p, from_R @ R
-        return self.go_to(p, R, "world" if frame == "world" else "base")
+            return self.go_to(from_p + from_R @ p, from_R @ R)
+        return self.go_to(p, R, frame)
 
-    def go_to(self, position: Array, rotation: Array, frame: JogFrame = "base") -> PoseStatus:
+    def go_to(self, position: Array, rotation: Array, frame: Frame = "base") -> PoseStatus:
         """Go to a pose of the tip, on the branch nearest to where the arm is.
 
         Raises
@@ -214,7 +224,7 @@ class Jogging:
             position[None],
             None if self.orientation == "free" else rotation[None],
             target=self.tip,
-            frame="world" if frame == "world" else "base",
+            frame=frame,
             seed=self.joints,
             orientation=self.orientation,
         ).solutions

@@ -52,7 +52,7 @@ def load_arrows(robot: Robot, at: Postures, length: float) -> tuple[Arrows, list
     loads = joint_loads(robot, robot.variables(at, robot.values), wrench=wrench)
     kinematics = robot.forward_kinematics(at)
     turning = np.array([joint.kind == "revolute" for joint in robot.joints])
-    sizes = np.round(np.where(turning, loads[:, 5, 0], loads[:, 2, 0]), 9) + 0.0
+    sizes = np.round(np.where(turning, loads[:, 5, 0], loads[:, 2, 0]), 6) + 0.0
     places = robot.moving[: len(sizes)]
     axes = np.array([kinematics.axis(place)[:, 0] for place in places])
     start = np.array([kinematics.origin(place)[:, 0] for place in places])

@@ -64,9 +64,8 @@ def new_path(start: Point, speed: float, *, frame: str, target: str | None, axis
     """
     made: dict[str, Any] = {"truearm": SCHEMA, "units": {"length": "mm", "angle": "deg", "time": "s"}, "frame": frame}
     made |= {} if target is None else {"target": target}
-    made |= {} if axis is None else {"orientation": {"axis": _rounded(axis, 9)}}
     made |= {"speed": speed, "acceleration": _RAMP * speed, "step": _STEP}
-    return {**made, "start": _rounded(start), "sections": []}
+    return with_orientation({**made, "start": _rounded(start), "sections": []}, axis)
 
 
 def with_section(path: dict[str, Any], kind: str, points: Sequence[Point]) -> dict[str, Any]:
@@ -98,6 +97,14 @@ def without_last(path: dict[str, Any]) -> dict[str, Any] | None:
 def with_speed(path: dict[str, Any], speed: float) -> dict[str, Any]:
     """Return a path at another speed [mm/s]."""
     return {**path, "speed": speed, "acceleration": _RAMP * speed}
+
+
+def with_orientation(path: dict[str, Any], axis: Point | None) -> dict[str, Any]:
+    """Return a path along which the tip's z axis points there; None where its orientation is free."""
+    names = [name for name in path if name != "orientation"]
+    kept = {} if axis is None else {"orientation": {"axis": _rounded(axis, 9)}}
+    before = names.index("speed")
+    return {**{name: path[name] for name in names[:before]}, **kept, **{name: path[name] for name in names[before:]}}
 
 
 def path_text(path: dict[str, Any]) -> str:

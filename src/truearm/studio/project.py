@@ -62,6 +62,12 @@ class _Edit:
         """Return the edit that takes it back."""
         return _Edit(self.settings, self.settings_before, self.files, self.files_before)
 
+    def changed(self) -> tuple[str, ...]:
+        """Return the names of the settings and files that it changes."""
+        before, new = self.settings_before, self.settings
+        settings = [name for name in Settings.model_fields if getattr(before, name) != getattr(new, name)]
+        return (*settings, *(name for name, text in self.files.items() if self.files_before[name] != text))
+
 
 class Project:
     """A folder with its settings, their history, and what the files were like when they were last looked at.
@@ -166,17 +172,21 @@ class Project:
         self._undone.clear()
         return True
 
-    def undo(self) -> None:
-        """Take back the last edit of the settings; nothing if there is none."""
-        if self._before:
-            self._make(self._before[-1].back())
-            self._undone.append(self._before.pop())
+    def undo(self) -> tuple[str, ...]:
+        """Take back the last edit; return which settings and files that changed, none if there is no edit."""
+        if not self._before:
+            return ()
+        self._make(self._before[-1].back())
+        self._undone.append(self._before.pop())
+        return self._undone[-1].changed()
 
-    def redo(self) -> None:
-        """Do an undone edit again; nothing if there is none."""
-        if self._undone:
-            self._make(self._undone[-1])
-            self._before.append(self._undone.pop())
+    def redo(self) -> tuple[str, ...]:
+        """Do an undone edit again; return which settings and files that changed, none if there is no such edit."""
+        if not self._undone:
+            return ()
+        self._make(self._undone[-1])
+        self._before.append(self._undone.pop())
+        return self._before[-1].changed()
 
     def reload(self) -> None:
         """Take the settings from the file as it is now; edits before are no longer undone."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -65,6 +66,11 @@ class Recorded:
         for label, cells in zip(self.labels, joint_cells(self.joints, robot.joints, controller), strict=True):
             writer.writerow([label, *cells])
         return stream.getvalue()
+
+
+def list_of(robot: Robot) -> str:
+    """Return the name of the file into which configurations of a robot are recorded: joint positions name no arm."""
+    return f"recorded-{re.sub('[^A-Za-z0-9_.-]+', '-', robot.name)}.csv"
 
 
 def read_recorded(path: Path, robot: Robot) -> Recorded:

@@ -74,7 +74,7 @@ class DrawnRobot:
         self._links: list[Any] = []
         colours, opacity = (_GHOST, _SEE_THROUGH) if ghost else (_SOLID, None)
         for link in shape.links:
-            self._links.append(scene.add_frame(f"{name}/{link.name}", show_axes=False))
+            self._links.append(placed(scene.add_frame(f"{name}/{link.name}", show_axes=False)))
             for part, mesh, colour in zip(("body", "joints"), (link.bodies, link.joints), colours, strict=True):
                 if len(mesh.faces):
                     scene.add_mesh_simple(
@@ -184,7 +184,7 @@ class Scene:
         """Show the frame of the tip that is moved, in the world [m]."""
         if self._tip is None:
             size = _TRIAD * self.length
-            self._tip = self._scene.add_frame("/tip", axes_length=size, axes_radius=0.04 * size)
+            self._tip = placed(self._scene.add_frame("/tip", axes_length=size, axes_radius=0.04 * size))
         self._tip.position, self._tip.wxyz = position, quaternion_from_rotation(rotation)
 
     def show_ghost(self, visible: bool) -> None:
@@ -203,21 +203,17 @@ class Scene:
         for number, (name, corners) in enumerate(self._boxes.items()):
             low, high = (np.clip(corner, -far, far) for corner in corners)
             middle = (low + high) / 2.0
-            self._parts["boxes"] += [
-                self._scene.add_box(
-                    f"/boxes/{number}",
-                    color=_BOX,
-                    dimensions=tuple((high - low).tolist()),
-                    opacity=_SEE_THROUGH,
-                    position=base.rotation @ middle + base.translation,
-                    wxyz=base.quaternion,
-                ),
-                self._scene.add_label(
-                    f"/boxes/{number}/name",
-                    printable(name),
-                    position=(0.0, 0.0, float(high[2] - middle[2])),
-                ),
-            ]
+            box = self._scene.add_box(
+                f"/boxes/{number}",
+                color=_BOX,
+                dimensions=tuple((high - low).tolist()),
+                opacity=_SEE_THROUGH,
+                position=base.rotation @ middle + base.translation,
+                wxyz=base.quaternion,
+            )
+            above = (0.0, 0.0, float(high[2] - middle[2]))
+            label = self._scene.add_label(f"/boxes/{number}/name", printable(name), position=above)
+            self._parts["boxes"] += [placed(box), placed(label)]
 
     def show_arrows(self, name: str, arrows: Arrows | None) -> None:
         """Draw arrows in one upload, with the words that say how much they are magnified; None takes them away."""
@@ -236,7 +232,7 @@ class Scene:
         top = arrows.segments.reshape(-1, 3).max(axis=0)
         middle = arrows.segments[:, 0].mean(axis=0)
         place = (float(middle[0]), float(middle[1]), float(top[2]) + 0.1 * self.length)
-        self._parts[name] = [shown, self._scene.add_label(f"/{name}/words", arrows.words, position=place)]
+        self._parts[name] = [shown, placed(self._scene.add_label(f"/{name}/words", arrows.words, position=place))]
 
     def show_points(
         self, name: str, points: Array | None, colours: Colours = (70, 130, 180), size: float = 0.012
@@ -304,7 +300,7 @@ class Scene:
                     opacity=_SEE_THROUGH,
                     position=centre,
                 )
-                self._parts[name].append(ball)
+                self._parts[name].append(placed(ball))
 
     def show_names(self, name: str, places: Mapping[str, Array]) -> None:
         """Write words at places [m] in the world; none take them away."""
@@ -315,7 +311,7 @@ class Scene:
             return
         self._clear(name)
         for number, (words, place) in enumerate(places.items()):
-            self._parts[name].append(self._scene.add_label(f"/{name}/{number}", words, position=place))
+            self._parts[name].append(placed(self._scene.add_label(f"/{name}/{number}", words, position=place)))
 
     # -- parts ---------------------------------------------------------------------------------------------
 
@@ -346,26 +342,25 @@ class Scene:
                 position=place.translation,
                 wxyz=place.quaternion,
             )
-            self._parts["frames"] += [triad, self._scene.add_label(f"/frames/{name}/name", name)]
+            self._parts["frames"] += [placed(triad), self._scene.add_label(f"/frames/{name}/name", name)]
         thin, thick = _LINES[self._dark]
         floor = np.array(base.translation) + base.rotation @ np.array([0.0, 0.0, self.solid.floor])
         wide = _FLOOR * self.length
-        self._parts["frames"].append(
-            self._scene.add_grid(
-                "/frames/floor",
-                width=wide,
-                height=wide,
-                cell_size=0.1,
-                section_size=0.5,
-                cell_color=thin,
-                section_color=thick,
-                position=floor,
-                wxyz=base.quaternion,
-            )
+        grid = self._scene.add_grid(
+            "/frames/floor",
+            width=wide,
+            height=wide,
+            cell_size=0.1,
+            section_size=0.5,
+            cell_color=thin,
+            section_color=thick,
+            position=floor,
+            wxyz=base.quaternion,
         )
+        self._parts["frames"].append(placed(grid))
         self._clear("fixtures")
         for number, fixture in enumerate(robot.fixtures):
-            self._parts["fixtures"] += self._fixture(robot, fixture, f"/fixtures/{number}")
+            self._parts["fixtures"] += map(placed, self._fixture(robot, fixture, f"/fixtures/{number}"))
         # The arm stands a little right of the middle and above it: notices float over the corner below on the left.
         look = np.array(base.translation) + base.rotation @ (self.length * np.array([0.02, -0.05, 0.08]))
         look += base.rotation @ np.array([0.0, 0.0, 0.6 * self.solid.floor])
@@ -432,6 +427,18 @@ class Scene:
         for part in reversed(self._parts.get(name, [])):
             part.remove()
         self._parts[name] = []
+
+
+def placed(node: Any) -> Any:
+    """Return a new node of the scene, after telling its place to the windows.
+
+    viser tells no place where all new nodes begin. Where one of the same name has gone a moment before, it tells the
+    windows nothing of that either: they take the new node for the former one, and keep its place.
+    """
+    tell = node._impl.api._queue_scene_message
+    tell(viser._messages.SetPositionMessage(node.name, tuple(node.position.tolist())))
+    tell(viser._messages.SetOrientationMessage(node.name, tuple(node.wxyz.tolist())))
+    return node
 
 
 def standing_at(nominal: Robot, calibrated: Robot) -> Robot:

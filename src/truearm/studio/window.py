@@ -404,12 +404,14 @@ class Window:
         }[name]()
 
     def _undo_edit(self) -> None:
-        self.project.undo()
+        changed = self.project.undo()
         self.refresh()
+        self._show(words.paragraph(f"Undone: {', '.join(changed)}." if changed else "There is nothing to undo."))
 
     def _redo_edit(self) -> None:
-        self.project.redo()
+        changed = self.project.redo()
         self.refresh()
+        self._show(words.paragraph(f"Done again: {', '.join(changed)}." if changed else "There is nothing to redo."))
 
     def _reload(self) -> None:
         self.project.reload()

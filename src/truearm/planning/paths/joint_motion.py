@@ -185,7 +185,7 @@ class _Follower:
                     + (", or, with joints to spare, to the end of the postures near the first" if self._spare else ""),
                     where=self._place(k),
                     came=f"orientation '{self._orientation}'",
-                    cure="Move the path towards the arm, start elsewhere (`seed`), or free more of the orientation.",
+                    cure=self._cure("Move the path towards the arm", "start elsewhere (`seed`)"),
                 )
             scaled[k], A = found
             self._check_limits(k, scaled[k] * self._scale)
@@ -248,8 +248,13 @@ class _Follower:
             "the path passes a singular posture",
             where=self._place(k),
             came=f"{self._names[fastest]} would have to move fastest",
-            cure="Move the path, start on another branch (`seed`), or free more of the orientation.",
+            cure=self._cure("Move the path", "start on another branch (`seed`)"),
         )
+
+    def _cure(self, *ways: str) -> str:
+        """Return what to do; an orientation that is free already cannot be freed more."""
+        ways = ways if self._orientation == "free" else (*ways, "free more of the orientation")
+        return f"{', '.join(ways[:-1])}, or {ways[-1]}."
 
     def _place(self, k: int) -> str:
         return f"{self._travelled[k] * 1e3:.1f} mm along the path, at {self._path.time[k]:.4g} s (sample {k})"

@@ -193,10 +193,25 @@ def read_path(file: FilePath) -> PlannedPath:
     Raises
     ------
     InputError
+        If its entries cannot be, or as :func:`planned_path`.
+    """
+    return planned_path(read_yaml(file, PathFile), str(file))
+
+
+def planned_path(content: PathFile, source: str) -> PlannedPath:
+    """Return the path over time that the entries of a file describe.
+
+    Parameters
+    ----------
+    source
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
         With the section, if a waypoint repeats, a circle has no radius or its points lie on a line, times do not rise,
         a section with times does not begin and end at rest, or there would be too many samples.
     """
-    content = read_yaml(file, PathFile)
     length = content.units.length
 
     def metres(value: float, where: str) -> float:
@@ -206,11 +221,11 @@ def read_path(file: FilePath) -> PlannedPath:
         return np.array([metres(value, where) for value in values])
 
     step = content.step
-    at = place(content.start, f"{file}, start")
+    at = place(content.start, f"{source}, start")
     parts: list[Trajectory] = []
     kinds, numbers, began = [], [], 0.0
     for number, section in enumerate(content.sections, 1):
-        where = f"{file}, sections[{number}]"
+        where = f"{source}, sections[{number}]"
         with refusals_at(where):
             if section.times is not None:
                 part = _as_given(section, at, step, length, where)
@@ -230,11 +245,11 @@ def read_path(file: FilePath) -> PlannedPath:
         began, at = float(parts[-1].time[-1]), parts[-1].position[-1]
         refuse_beyond("samples", sum(len(one.time) for one in parts), where=where)
     joined = [np.concatenate([getattr(one, name) for one in parts]) for name in _FIELDS]
-    with refusals_at(f"{file}, orientation"):
+    with refusals_at(f"{source}, orientation"):
         orientation, rotation = _orientation(content.orientation)
     tip = None
     if content.tip is not None:
-        x, y, z = place(content.tip, f"{file}, tip")
+        x, y, z = place(content.tip, f"{source}, tip")
         tip = (float(x), float(y), float(z))
     return PlannedPath(
         Trajectory(*joined),
@@ -247,7 +262,7 @@ def read_path(file: FilePath) -> PlannedPath:
         rotation,
         content.joint_speeds,
         (length, content.units.angle),
-        str(file),
+        source,
     )
 
 

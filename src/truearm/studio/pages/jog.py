@@ -13,20 +13,18 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes
-from truearm.manifest import hash_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.notices import Notice
 from truearm.studio import words
-from truearm.studio.jogging import JOG_FRAMES, Branch, JogFrame, Jogging
+from truearm.studio.jogging import Branch, JogFrame, Jogging
 from truearm.studio.pages.jog_path import JogPath
 from truearm.studio.pages.jog_views import JogViews
 from truearm.studio.pages.robot_looks import RobotLooks
-from truearm.studio.recorded import Motion, Recorded, labels_text, read_recorded
-from truearm.studio.scene import Scene
+from truearm.studio.recorded import Motion, Recorded, labels_text, list_of, read_recorded
+from truearm.studio.scene import Scene, placed
 from truearm.studio.window import Window
-from truearm.writing import write_text_over
 
 #: What the flange is called among the targets, and the branch that is taken if none is chosen.
 _FLANGE: Final = "flange"
@@ -53,6 +51,7 @@ class JogPage:
         self.jogging: Jogging | None = None
         self._arms: dict[str, Robot] = {}
         self._branches: list[Branch] = []
+        self._at_branch = _NEAREST  # what was chosen last, and not refused
         self._latest: dict[str, int] = {}
         self._playing: threading.Event | None = None
         gui = window.gui
@@ -60,6 +59,7 @@ class JogPage:
         self._arm: Any = gui.add_dropdown(
             "Arm", ("nominal",), hint="whose parameters and joint effects poses are found with"
         )
+        self._other = gui.add_html("")
         self._ghost = gui.add_checkbox("Calibrated arm as a shadow", True)
         self._whose: Any = gui.add_dropdown(
             "Numbers of", _WHOSE, initial_value="model", hint="as the pendant shows joints, or the model's"
@@ -71,7 +71,7 @@ class JogPage:
         with gui.add_folder("Pose"):
             self._tip: Any = gui.add_dropdown("Tip", (_FLANGE,))
             self._frame: Any = gui.add_dropdown(
-                "Axes of", JOG_FRAMES, initial_value="base", hint="tool: by how much to move from here"
+                "Axes of", ("base",), hint="controller: as the pendant shows poses; tool: by how much to move from here"
             )
             self._place: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.1)
             self._turns: Any = gui.add_vector3(
@@ -85,7 +85,7 @@ class JogPage:
             self._find = gui.add_button("Find all branches")
             self._branch: Any = gui.add_dropdown("Branch", (_NEAREST,))
         with gui.add_folder("Recorded configurations"):
-            self._list = gui.add_text("File", "recorded.csv")
+            self._list: Any = gui.add_text("File", "", hint="every robot has a list of its own, if you name no other")
             self._record = gui.add_button_group("Pose", ("record", "remove last"))
             self._recorded = gui.add_html("")
             self._speed = gui.add_number("Speed [deg/s, mm/s]", 45.0, min=0.1, max=1000.0, step=1.0)
@@ -100,9 +100,9 @@ class JogPage:
     def refresh(self) -> None:
         """Show the robots as they are now."""
         window = self._window
-        nominal, calibrated = window.robot(), window.calibrated()
-        same_arm = calibrated is None or len(calibrated.joints) == len(nominal.joints)
-        ghost = calibrated if same_arm else None
+        nominal, other = window.robot(), window.result_of_another()
+        ghost = None if other else window.calibrated()
+        self._other.content = words.notice(_other_robot(other, nominal)) if other else ""
         meshes = self._looks.meshes(nominal)
         if self.scene.show(nominal, ghost, meshes, dark=window.project.settings.dark) or self.jogging is None:
             assert self.scene.solid is not None
@@ -112,6 +112,9 @@ class JogPage:
                 self._arms["calibrated"] = ghost
             self._arm.options = tuple(self._arms)
             self._ghost.disabled = ghost is None
+            self.scene.show_ghost(self._ghost.value)
+            if self.jogging is None or self.jogging.robot.name != nominal.name:
+                self._list.value = list_of(nominal)
             self._take("calibrated" if self._arm.value == "calibrated" and ghost is not None else "nominal")
         self._show_recorded()
         self.path.refresh()
@@ -153,7 +156,7 @@ class JogPage:
         self.jogging = arm = Jogging(self._arms[name], None if before is None else before.joints)
         known = arm.robot.controller.counts_known
         self._whose.disabled = not known
-        if before is not None and known and len(before.joints) == len(arm.joints):
+        if before is not None and known and before.robot.name == arm.robot.name:
             arm.whose = before.whose
         self._arm.value, self._whose.value = name, arm.whose
         tips = (_FLANGE, *(target.name for target in arm.robot.targets))
@@ -161,6 +164,11 @@ class JogPage:
         if before is not None and before.tip in tips:
             arm.tip = before.tip
         self._tip.value = arm.tip or _FLANGE
+        frame: JogFrame = self._frame.value
+        if before is None or before.robot.name != arm.robot.name or frame not in arm.frames:
+            frame = "controller" if arm.whose == "controller" and "controller" in arm.frames else "base"
+        self._frame.options = arm.frames
+        self._frame.value = frame
         for slider in self._sliders:
             slider.remove()
         self._sliders = []
@@ -173,9 +181,10 @@ class JogPage:
         self._taken = [slider.value for slider in self._sliders]
         if self._handle is not None:
             self._handle.remove()
-        self._handle = self._window.server.scene.add_transform_controls(
+        handle = self._window.server.scene.add_transform_controls(
             "/handle", scale=0.22 * self.scene.length, line_width=3.0, depth_test=False, visible=self._handle_on.value
         )
+        self._handle = placed(handle)
         self._handle.on_update(self._newest("handle", self._dragged))
         self._moved()
 
@@ -205,6 +214,7 @@ class JogPage:
         self._branches = self._jogged().branches()
         names = [f"{branch.name} ({branch.status.value})" for branch in self._branches]
         self._branch.options = (_NEAREST, *names)
+        self._branch.value = self._at_branch = _NEAREST
         if not names:
             self._said.content += words.paragraph("No other way to this pose was found.")
 
@@ -213,9 +223,11 @@ class JogPage:
         if self._branch.value in names:
             branch = self._branches[names.index(self._branch.value)]
             if not branch.status.usable:
+                self._branch.value = self._at_branch
                 raise InputError("the arm cannot go there", came=branch.name, cure=branch.status.advice)
             self._jogged().go(branch.joints)
             self._moved(branches=False)
+        self._at_branch = self._branch.value
 
     def _other_tip(self) -> None:
         self._jogged().tip = None if self._tip.value == _FLANGE else self._tip.value
@@ -248,7 +260,8 @@ class JogPage:
         self.scene.move(arm.at, arm.robot)
         if branches and self._branches:
             self._branches = []
-            self._branch.options, self._branch.value = (_NEAREST,), _NEAREST
+            self._branch.options = (_NEAREST,)
+            self._branch.value = self._at_branch = _NEAREST
         self._shown(handle=handle)
 
     def _shown(self, *, handle: bool = True) -> None:
@@ -300,9 +313,10 @@ class JogPage:
 
     def _recording(self, what: str) -> None:
         arm, file = self._jogged(), self._file()
-        before = read_bytes(file) if exists(file) else None
+        there = read_bytes(file) if exists(file) else None
         known = self._read() or Recorded((), np.zeros((0, len(arm.joints))), arm.whose)
-        if before is not None and before != known.text(arm.robot).encode():
+        before = None if there is None else known.text(arm.robot)
+        if before is not None and there != before.encode():
             raise InputError(
                 "this file was not recorded here, and is not changed", where=file.name, cure="Record into another one."
             )
@@ -312,9 +326,8 @@ class JogPage:
             known = known.without_last()
         else:
             raise InputError("the only configuration of a file is not removed", where=file.name)
-        write_text_over(file, known.text(arm.robot), None if before is None else hash_of(before))
-        self._window.project.look(self._window.project.relative(file))
-        self._show_recorded()
+        name = self._window.project.relative(file)
+        self._window.edit({name: known.text(arm.robot)}, known={name: before})
 
     def _show_recorded(self) -> None:
         try:
@@ -392,6 +405,11 @@ def _shown_range(low: float, high: float) -> tuple[float, float]:
     least = math.ceil((low - _ROUNDING) * step) / step
     most = math.floor((high + _ROUNDING) * step) / step
     return least, max(most, round(least + 1.0 / step, _DECIMALS))
+
+
+def _other_robot(other: str, robot: Robot) -> Notice:
+    text = f"The result is of {other} and not of {robot.name}: the calibrated arm is not drawn, and cannot be moved."
+    return Notice("other-robot", text, "warning")
 
 
 def _no_robot() -> Notice:

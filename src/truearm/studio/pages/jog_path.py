@@ -9,9 +9,9 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import exists, read_text
-from truearm.manifest import hash_of
 from truearm.modeling.chain import Array
-from truearm.planning.paths.path_file import PlannedPath, read_path
+from truearm.planning.paths.path_file import PathFile, PlannedPath, planned_path, read_path
+from truearm.schemas import validated
 from truearm.studio import words
 from truearm.studio.jogging import Jogging
 from truearm.studio.path_points import (
@@ -22,6 +22,7 @@ from truearm.studio.path_points import (
     new_path,
     path_text,
     played_path,
+    with_orientation,
     with_section,
     with_speed,
     without_last,
@@ -29,7 +30,6 @@ from truearm.studio.path_points import (
 from truearm.studio.recorded import Motion
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
-from truearm.writing import remove_known, write_text_over
 
 #: The file that is written where none is named.
 PATH: Final = "path.yaml"
@@ -61,7 +61,8 @@ class JogPath:
         self._window, self._scene, self._arm, self._play, self._stop = window, scene, arm, play, stop
         self._path: dict[str, Any] | None = None
         self._first: Point | None = None
-        self._drawn: tuple[Any, ...] = ()
+        self._axis: Point | None = None  # where the tip's z axis pointed at the start, if that was made here
+        self._drawn: tuple[Any, ...] = (None,)
         gui = window.gui
         with gui.add_folder("Path", expand_by_default=False):
             self._file: Any = gui.add_text("File", PATH, hint="a path file; made here, or any other to be played")
@@ -73,6 +74,7 @@ class JogPath:
             self._do: Any = gui.add_button_group("Path", ("play", "stop", "remove last"))
             self._draws: Any = gui.add_checkbox("Draw", True, hint="the path in the scene")
             self._said = gui.add_html(words.paragraph(_NONE))
+        self._kept.on_update(window.action(self._other_orientation))
         self._file.on_update(window.settled(lambda: window.edit(path=self._file.value.strip() or None)))
         self._speed.on_update(window.settled(self._other_speed))
         self._add.on_click(window.action(lambda: self._added(self._add.value)))
@@ -85,21 +87,30 @@ class JogPath:
         name = project.settings.path or PATH
         if self._file.value != name:
             self._file.value = name
+        self._show_orientation()
         path, solid = project.path(name, "path"), self._scene.solid
         stamp = path.stat().st_mtime_ns if exists(path) else None
         seen = (name, stamp, None if solid is None else id(solid))
         if seen == self._drawn:
             return
+        is_other = name != self._drawn[0]
         self._drawn = seen
         self._scene.show_line("path", None)
-        if stamp is None:
-            return
         self._first = None
+        if stamp is None:
+            if self._path is not None and self._path["sections"]:  # of a file that is gone, as an undo takes it away
+                self._path = None if is_other else {**self._path, "sections": []}
+            self._say()
+            return
+        began = None if is_other or self._path is None else self._path["start"]
         try:
             planned = read_path(path)
             self._path = entries_of(read_text(path))
+            if self._path is None or self._path["start"] != began:
+                self._axis = None
             if self._path is not None:
                 self._speed.value = float(self._path["speed"])
+                self._show_orientation()
             self._show(planned)
         except InputError as error:
             self._path = None
@@ -111,22 +122,21 @@ class JogPath:
         arm, path = self._arm(), self._known()
         if kind == "start":
             if path is not None and path["sections"]:
-                raise InputError(
-                    "this path has begun already", where=self._name(), cure="Remove its sections, or name another file."
-                )
+                raise InputError("this path has begun already", where=self._name(), cure="Name another file.")
             position, rotation = arm.pose()
-            axis = None if self._kept.value == _FREE else _point(rotation[:, 2])
+            self._axis = _point(rotation[:, 2])
+            axis = None if self._kept.value == _FREE else self._axis
             speed, tip = float(self._speed.value), arm.tip
             self._path = new_path(_point(1e3 * position), speed, frame="base", target=tip, axis=axis)
             self._first = None
-            self._say(self._path)
+            self._say()
             return
         if path is None:
             raise InputError("the path has no start yet", where=self._name(), cure="Go there, and press start.")
         here = _point(1e3 * arm.pose("world" if path["frame"] == "world" else "base")[0])
         if kind == "circle" and self._first is None:
             self._first = here
-            self._say(path, "A circle through here: go to another point of it, and press circle again.")
+            self._say("A circle through here: go to another point of it, and press circle again.")
             return
         points = [here] if self._first is None or kind != "circle" else [self._first, here]
         self._first = None
@@ -147,7 +157,7 @@ class JogPath:
                 raise InputError("the only section of a file is not removed", where=self._name())
             else:
                 self._path = None
-                self._said.content = words.paragraph(_NONE)
+                self._say()
 
     def _other_speed(self) -> None:
         path = self._path
@@ -155,6 +165,22 @@ class JogPath:
             self._write(with_speed(path, float(self._speed.value)))
         elif path is not None:
             self._path = with_speed(path, float(self._speed.value))
+
+    def _other_orientation(self) -> None:
+        path = self._path
+        if path is None:
+            return
+        if self._kept.value == _KEPT and self._axis is None:
+            raise InputError(
+                "where z pointed at the start of this path is not known any more, and its orientation stays free",
+                where=self._name(),
+                cure="Name another file, and press start there.",
+            )
+        path = with_orientation(path, None if self._kept.value == _FREE else self._axis)
+        if path["sections"]:
+            self._write(path)
+        else:
+            self._path = path
 
     def _start(self) -> None:
         window, arm = self._window, self._arm()
@@ -191,35 +217,23 @@ class JogPath:
         return self._path
 
     def _write(self, path: dict[str, Any]) -> None:
-        """Write the file, if it can be read again: a circle through points of a line is none."""
-        window, name = self._window, self._name()
-        file = window.project.path(name, "path")
+        """Write the file, if it is a path: a circle through points of a line is none."""
+        name = self._name()
+        file = self._window.project.path(name, "path")
+        planned_path(validated(path, PathFile, str(file)), str(file))
         before = path_text(self._path) if self._path is not None and exists(file) else None
-        text, known = path_text(path), None if before is None else hash_of(before.encode())
-        write_text_over(file, text, known)
-        try:
-            read_path(file)
-        except InputError:
-            if before is None:
-                remove_known(file, hash_of(text.encode()))
-            else:
-                write_text_over(file, before, hash_of(text.encode()))
-            raise
-        finally:
-            window.project.look(name)
+        self._window.edit({name: path_text(path)}, known={name: before}, path=name)
         self._path = path
-        window.edit(path=name)
-        window.refresh()
 
     def _drawn_or_not(self) -> None:
-        self._drawn = ()
+        self._drawn = self._drawn[:1]
         self.refresh()
 
     def _show(self, planned: PlannedPath) -> None:
         if self._path is None:
             self._said.content = words.paragraph(f"Of another program: {', '.join(planned.kinds)}. It can be played.")
         else:
-            self._say(self._path)
+            self._say()
         solid = self._scene.solid
         if solid is not None and self._draws.value:
             at: Array = planned.trajectory.position
@@ -227,8 +241,14 @@ class JogPath:
                 at = at @ solid.robot.base.rotation.T + solid.robot.base.translation
             self._scene.show_line("path", at, _LINE)
 
-    def _say(self, path: dict[str, Any], more: str = "") -> None:
-        self._said.content = words.lines(in_words(path)) + (words.paragraph(more) if more else "")
+    def _show_orientation(self) -> None:
+        if self._path is not None:
+            self._kept.value = _KEPT if "orientation" in self._path else _FREE
+
+    def _say(self, more: str = "") -> None:
+        """Show the path that is made, in words."""
+        said = words.paragraph(_NONE) if self._path is None else words.lines(in_words(self._path))
+        self._said.content = said + (words.paragraph(more) if more else "")
 
 
 _NONE: Final = "No path yet: go to where it starts, and press start."

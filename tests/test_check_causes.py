@@ -267,7 +267,7 @@ def test_a_reading_far_off_is_blamed_once_and_no_good_one_with_it() -> None:
 
 def test_nothing_is_doubted_where_numbers_are_few() -> None:
     few = campaign("fr3", 5, 0.05e-3, 8)[1]
-    assert check_few_to_doubt(identify(load_robot("fr3"), few, named_model("geometric"), loss="cauchy"), few)
+    assert check_few_to_doubt(identify(load_robot("fr3"), few, named_model("geometric"), loss="cauchy"))
     position = few.position.copy()
     position[4] += np.array([0.0, 2e-3, 0.0])
     (notice,) = check("fr3", one_target_of(replace(few, position=position))).warnings

@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from truearm.identification.solving.fit import Fit
 from truearm.identification.solving.losses import ABSOLUTE
-from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.notices import Notice
 from truearm.shown import counted
@@ -69,19 +66,18 @@ def _may_be(freedom: float) -> float:
     return float(max(1.0 - k - _ONE_SIDED_95 * math.sqrt(k), 0.1) ** -1.5)
 
 
-def check_few_to_doubt(fit: Fit, data: Dataset) -> list[Notice]:
+def check_few_to_doubt(fit: Fit) -> list[Notice]:
     """Say if the readings are hardly more numbers than a robust fit of them has free parameters.
 
     It may then leave a good reading far off: others that are as good agree without it.
     """
-    numbers = 3 * int(data.has_position.sum()) + 3 * int(data.has_orientation.sum())
-    numbers += sum(int(np.isfinite(lengths).sum()) for lengths in (data.distance, data.height) if lengths is not None)
-    if numbers >= _FEWEST_TO_DOUBT * len(fit.free.names):
+    parameters = len(fit.free.names)
+    if fit.numbers >= _FEWEST_TO_DOUBT * parameters:
         return []
     return [
         Notice(
             FEW_READINGS,
-            f"The readings are {counted(numbers, 'number')}, for {counted(len(fit.free.names), 'parameter')} of the "
+            f"The readings are {counted(fit.numbers, 'number')}, for {counted(parameters, 'parameter')} of the "
             f"{fit.model.name} model. With fewer than {_FEWEST_TO_DOUBT:g} for each, a wrong reading cannot be told "
             f"from a right one. {CURE}",
         )

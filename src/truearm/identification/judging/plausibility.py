@@ -110,7 +110,7 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
     unlike_robot = check_plausible(fit, data, wrong)
     if unlike_robot:
         return Comparison([*unlike_robot, *wrong, *found])
-    doubted = check_few_to_doubt(fit, data)
+    doubted = check_few_to_doubt(fit)
     suspects: list[Suspect] = []
     turned = np.zeros(len(off), dtype=bool)
     if not doubted:
@@ -187,7 +187,7 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
 
 def _far_from_fixtures(fit: Fit, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
     """Doubt readings against fixtures that a robust geometric fit leaves far off, and what is said of fixtures."""
-    few = check_few_to_doubt(fit, data)
+    few = check_few_to_doubt(fit)
     if few:
         return [*_unlike_its_readings(fit, data), *few], []
     errors = errors_of(fit.robot, data)

@@ -32,6 +32,19 @@ def pages_without_what_draws_them(request: pytest.FixtureRequest) -> Iterator[No
         yield
 
 
+#: Where plans are made for what comes after them.
+PLANNING = ("tests/cli/", "tests/compensation/", "tests/honesty/", "tests/jobs/", "tests/measurement/")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def plans_judged_at_few_numbers_of_poses(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Judge plans at few numbers of poses: all of them take most of a plan's time, and are tested with the planning."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.node.nodeid.startswith(PLANNING):
+            patch.setattr("truearm.planning.choosing.prediction.NUMBERS", (8, 30))
+        yield
+
+
 @pytest.fixture(scope="session")
 def measured_data() -> Path:
     """Folder of the real measurements, which are not part of the repository."""

@@ -1,14 +1,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from truearm.cli import main
-from truearm.planning.choosing import prediction
 
 
 @dataclass(frozen=True)
@@ -37,14 +36,6 @@ def truearm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         return Run(code if isinstance(code, int) else 0, caught.out, caught.err)
 
     return run
-
-
-@pytest.fixture(scope="package", autouse=True)
-def few_numbers_of_poses() -> Iterator[None]:
-    """Judge plans at few numbers of poses: all of them take most of a plan's time, and are tested with the planning."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(prediction, "NUMBERS", (8, 30))
-        yield
 
 
 @pytest.fixture(scope="session")

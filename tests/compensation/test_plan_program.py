@@ -364,7 +364,7 @@ def fastest_ways(name: str) -> Array:
         robot.forward(ways.reshape(-1, ways.shape[-1]), target=target)[0].reshape(*ways.shape[:2], 3)
         for target in (None, *(one.name for one in robot.targets))
     ]
-    return 399.0 * np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=(0, 1))
+    return np.asarray(399.0 * np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=(0, 1)))
 
 
 def with_speeds(robot: Robot, speeds: Sequence[float | None]) -> Robot:

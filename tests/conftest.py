@@ -19,6 +19,32 @@ def files_that_need_not_outlive_the_machine() -> Iterator[None]:
         yield
 
 
+#: Where pages are looked at as a browser shows them.
+DRAWN = ("tests/reporting/", "tests/studio/")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def pages_without_what_draws_them(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Leave Plotly's own script out of the pages: hundreds are written here, and that makes each of them 5 MB."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not request.node.nodeid.startswith(DRAWN):
+            patch.setattr("truearm.reporting.page._plotly", lambda: "/* plotly.js */")
+        yield
+
+
+#: Where plans are made for what comes after them.
+PLANNING = ("tests/cli/", "tests/compensation/", "tests/honesty/", "tests/jobs/", "tests/measurement/")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def plans_judged_at_few_numbers_of_poses(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Judge plans at few numbers of poses: all of them take most of a plan's time, and are tested with the planning."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.node.nodeid.startswith(PLANNING):
+            patch.setattr("truearm.planning.choosing.prediction.NUMBERS", (8, 30))
+        yield
+
+
 @pytest.fixture(scope="session")
 def measured_data() -> Path:
     """Folder of the real measurements, which are not part of the repository."""

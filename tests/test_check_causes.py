@@ -243,8 +243,15 @@ def test_a_block_of_rows_in_another_unit_of_angle_is_told(
     (told,) = [n for n in check(ROBOT, replace(data, joints=joints)).warnings if n.level == "error"]
     assert told.code == "unit-angle"
     assert f"{words}, at some configurations alone (1, 2" in told.message
-    whole = check(ROBOT, replace(data, joints=units(data.joints))).warnings
-    assert any(n.message == f"The joints: {words}. Mend the unit in the header." for n in whole)
+
+
+@pytest.mark.parametrize(
+    ("units", "words"), [(np.radians, "radians are called deg"), (np.degrees, "degrees are called rad")]
+)
+def test_all_rows_in_another_unit_of_angle_are_told(units: Callable[[Array], Array], words: str) -> None:
+    data = honest()
+    told = check(ROBOT, replace(data, joints=units(data.joints))).warnings
+    assert any(n.message == f"The joints: {words}. Mend the unit in the header." for n in told)
 
 
 def test_a_robot_is_not_another_one_because_of_one_wrong_row() -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from truearm.cli import main
+from truearm.jobs.demo import demo
+from truearm.results.demonstration import Demonstration
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,12 @@ def truearm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         return Run(code if isinstance(code, int) else 0, caught.out, caught.err)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def demonstrated(tmp_path_factory: pytest.TempPathFactory) -> Demonstration:
+    """The demo, in a folder that stays as it is."""
+    return demo(tmp_path_factory.mktemp("demonstrated"))
 
 
 @pytest.fixture(scope="session")

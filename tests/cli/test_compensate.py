@@ -20,6 +20,7 @@ from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation
+from truearm.results.demonstration import Demonstration
 
 
 def worn() -> Robot:
@@ -352,22 +353,22 @@ P[2]{
 """
 
 
-def test_the_demo_ends_with_a_corrected_program(tmp_path: Path) -> None:
-    shown = demo(tmp_path)
+def test_the_demo_ends_with_a_corrected_program(demonstrated: Demonstration, tmp_path: Path) -> None:
+    shown, out = demonstrated, shutil.copytree(demonstrated.folder, tmp_path / "demo")
     assert shown.correction is not None
     simulated = shown.correction.simulated
     assert simulated is not None
     assert shown.calibration.validation is not None
     assert simulated.corrected.mean() < 1.5 * shown.calibration.validation.position_norms.mean()
     assert simulated.original.mean() > 10 * simulated.corrected.mean()
-    page = (tmp_path / "corrected" / "compensation.html").read_text()
+    page = (out / "corrected" / "compensation.html").read_text()
     assert f"{1e3 * simulated.corrected.mean():.3f}" in page
     assert "Before and after" in page
     # What it wrote itself it writes again; another program of that name stays.
-    demo(tmp_path)
-    shutil.copy(tmp_path / "measurements.csv", tmp_path / "plate.mod")
+    demo(out)
+    shutil.copy(out / "measurements.csv", out / "plate.mod")
     with pytest.raises(ValueError, match="another file of that name"):
-        demo(tmp_path)
+        demo(out)
 
 
 def test_a_fit_that_lost_rank_is_accepted_by_name(truearm: Truearm, cell: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,16 +13,18 @@ from truearm.manifest import MANIFEST
 from truearm.studies import STUDIES, irb120_simulation
 from truearm.studies.study import Study
 
+WHOLE = irb120_simulation.study
+
+
+@cache
+def fewer(seeds: int) -> Study:
+    return WHOLE(seeds, lambda _: None, unseen=20)
+
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A study that is done in a second."""
-    whole = irb120_simulation.study
-
-    def fewer(seeds: int, progress: object) -> Study:
-        return whole(seeds, lambda _: None, unseen=20)
-
-    monkeypatch.setattr(irb120_simulation, "study", fewer)
+    """A study that is done in a second, and once."""
+    monkeypatch.setattr(irb120_simulation, "study", lambda seeds, _: fewer(seeds))
 
 
 def test_help_lists_every_study(truearm: Truearm) -> None:

@@ -336,16 +336,35 @@ def durations(name: str, text: str, shown: Array, rates: Array) -> list[float]:
 @pytest.mark.parametrize("name", BY_NAME)
 @pytest.mark.parametrize("driving", [Driving(), Driving(speed=0.1, share=0.3), Driving(speed=2.0, share=0.05)])
 def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Driving) -> None:
-    for robot, tour in (toured(name, approach=True), other_knowledge(name)):
-        check_speeds(name, robot, tour, driving)
+    for other in (False, True):
+        check_speeds(name, driving, other=other)
 
 
-def other_knowledge(name: str) -> tuple[Robot, Tour]:
-    """Return the same arm with speeds of the joints where they are not known, and else without them."""
+@cache
+def driven(name: str, driving: Driving, *, other: bool) -> tuple[Robot, MotionProgram, float]:
+    """Return an arm, the program of its tour and the highest speed that is told of it.
+
+    The other arm has speeds of the joints where they are not known, and else none.
+    """
     robot, tour = toured(name, approach=True)
-    known = known_speeds(robot) is not None
-    speeds = [None] * 6 if known else np.radians([150.0, 160.0, 170.0, 320.0, 400.0, 460.0]).tolist()
-    return with_speeds(robot, speeds), tour
+    if other:
+        known = known_speeds(robot) is not None
+        robot = with_speeds(
+            robot, [None] * 6 if known else np.radians([150.0, 160.0, 170.0, 320.0, 400.0, 460.0]).tolist()
+        )
+    return robot, *plan_program(tour, robot, BY_NAME[name].name, driving, "abc")
+
+
+@cache
+def fastest_ways(name: str) -> Array:
+    """Return of each move of a tour the highest speed of the flange and all targets, where it lasts a second [m/s]."""
+    robot, tour = toured(name, approach=True)
+    ways = tour.joints[:-1] + np.linspace(0.0, 1.0, 400)[:, None, None] * np.diff(tour.joints, axis=0)
+    places = [
+        robot.forward(ways.reshape(-1, ways.shape[-1]), target=target)[0].reshape(*ways.shape[:2], 3)
+        for target in (None, *(one.name for one in robot.targets))
+    ]
+    return np.asarray(399.0 * np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=(0, 1)))
 
 
 def with_speeds(robot: Robot, speeds: Sequence[float | None]) -> Robot:
@@ -353,20 +372,15 @@ def with_speeds(robot: Robot, speeds: Sequence[float | None]) -> Robot:
     return replace(robot, joints=tuple(replace(joint, max_speed=speed) for joint, speed in pairs))
 
 
-def check_speeds(name: str, robot: Robot, tour: Tour, driving: Driving) -> None:
-    program, told = plan_program(tour, robot, BY_NAME[name].name, driving, "abc")
+def check_speeds(name: str, driving: Driving, *, other: bool) -> None:
+    robot, program, told = driven(name, driving, other=other)
+    tour = toured(name, approach=True)[1]
     shown = robot.controller.from_model(tour.joints)
     slow, fast = joint_rates(robot)
     rates = np.full(len(slow), FASTEST) if name == "urscript" else fast
     found = durations(name, text_of(name, program), shown, rates)
     assert len(found) == len(tour.stops) - 1
-    fastest = 0.0
-    for start, end, seconds in zip(tour.joints[:-1], tour.joints[1:], found, strict=True):
-        along = start + np.linspace(0.0, 1.0, 400)[:, None] * (end - start)
-        for target in (None, *(one.name for one in robot.targets)):
-            steps = np.linalg.norm(np.diff(robot.forward(along, target=target)[0], axis=0), axis=1)
-            speed = float(steps.max()) * 399 / seconds
-            fastest = max(fastest, speed)
+    fastest = float((fastest_ways(name) / found).max())
     shares = [step.share for step in program.steps if isinstance(step, JointMove)]
     assert max(shares) <= driving.share + 1e-12 or name == "urscript"
     assert min(shares) > 0.0
@@ -433,12 +447,10 @@ def test_a_first_move_that_may_be_faster_than_was_asked_is_counted() -> None:
 
 def test_where_the_speeds_of_joints_are_known_programs_are_faster_and_keep_to_them() -> None:
     for name in ("krl", "fanuc-ls", "inform"):
-        robot, tour = toured(name, approach=True)
-        unknown, _ = other_knowledge(name)
-        assert known_speeds(unknown) is None
+        assert known_speeds(driven(name, Driving(), other=True)[0]) is None
         taken = []
-        for arm in (robot, unknown):
-            program, _ = plan_program(tour, arm, BY_NAME[name].name, Driving(), "abc")
+        for other in (False, True):
+            program = driven(name, Driving(), other=other)[1]
             taken.append(np.mean([step.share for step in program.steps if isinstance(step, JointMove)][1:]))
         assert taken[0] > 1.5 * taken[1], name
 

@@ -82,8 +82,15 @@ def tried(selection: Selection) -> set[str]:
 FEW = ("backlash", "hardening", "approach", "thermal-growth")
 
 
+@cache
+def with_play() -> tuple[Dataset, Selection]:
+    """Return readings of an arm that has backlash, and what is chosen for them."""
+    data = seen(twin_of(backlash=math.radians(0.05)), 50, 2)
+    return data, select(arm(), data, candidates=FEW)
+
+
 def test_backlash_is_found_where_there_is_some() -> None:
-    chosen = select(arm(), seen(twin_of(backlash=math.radians(0.05)), 50, 2), candidates=FEW)
+    _, chosen = with_play()
     assert "backlash" in taken(chosen)
     assert {"compliance", "backlash"} <= set(chosen.model.effects)
     assert chosen.elastic is not None
@@ -117,7 +124,7 @@ def test_a_smaller_model_than_the_elastic_one_can_win() -> None:
 
 
 def test_the_closed_form_agrees_with_fits_in_the_folds() -> None:
-    chosen = select(arm(), seen(twin_of(backlash=math.radians(0.05)), 60, 2), candidates=FEW)
+    _, chosen = with_play()
     first = chosen.confirmations[0]
     assert first.effects == chosen.model.effects
     assert first.error == pytest.approx(chosen.error, rel=0.1)
@@ -183,8 +190,7 @@ def test_every_selectable_effect_is_tried_where_the_data_tell_it() -> None:
 def test_the_order_of_trials_makes_no_difference_where_there_are_too_many_to_try_all(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    data = seen(twin_of(backlash=math.radians(0.05)), 40, 2)
-    every = select(arm(), data, candidates=FEW)
+    data, every = with_play()
     monkeypatch.setattr("truearm.identification.choosing.search._ALL", 1)
     assert select(arm(), data, candidates=FEW).model.effects == every.model.effects
 
@@ -330,8 +336,7 @@ def test_effects_with_more_unknowns_than_equations_are_not_taken() -> None:
 
 
 def test_a_smaller_model_is_taken_where_a_fit_ends_unsound(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = seen(twin_of(backlash=math.radians(0.05)), 40, 2)
-    chosen = select(arm(), data, candidates=FEW)
+    data, chosen = with_play()
     assert "backlash" in chosen.model.effects
     real = identify
 

@@ -466,7 +466,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "revert": lambda folder: {"programs": [_corrected(folder)], "out": folder / "reverted"},
     "convert": lambda folder: {"robot": "irb120", "convention": "hayati", "out": _new(folder, "hayati.yaml")},
     "export": lambda folder: {"robot": "irb120", "format": "hayati", "out": _new(folder, "hayati.csv")},
-    "study": lambda folder: {"name": "li-table", "seeds": 1, "out": folder / "study"},
+    "study": lambda folder: {"name": "irb120-simulation", "seeds": 1, "out": folder / "study"},
     "fleet": lambda folder: {
         "manifest": _written(folder / "fleet.yaml", _SERIES),
         "out": folder / "fleet",

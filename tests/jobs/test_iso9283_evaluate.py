@@ -10,7 +10,6 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -179,8 +178,7 @@ def test_the_report_has_a_picture_of_every_test_and_stays_small(found: Iso9283Ev
     }
     assert "needs the standard" in page
     assert "<td>AP</td>" in page
-    plotly = (files("plotly") / "package_data" / "plotly.min.js").read_text("utf-8")
-    assert len(page) - len(plotly) < 1e6
+    assert len(page) < 1e6  # without Plotly's own script, which is left out here
 
 
 def test_streams_without_cycles_are_drawn_as_what_was_found_in_them(small: Arguments) -> None:

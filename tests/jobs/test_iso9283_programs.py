@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,14 @@ def cube(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def planned(cube: Path, **more: Any) -> Iso9283Plan:
     given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [100, 10], "velocity": 0.5, "load": 3.0}
     return truearm.iso9283_plan(**({"robot": "irb120"} | given | more))
+
+
+@pytest.fixture(scope="module")
+def slow(cube: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a plan, its slow program and the record that its slow run asks for."""
+    folder = tmp_path_factory.mktemp("slow")
+    planned(cube, program="rapid", out=folder)
+    return folder
 
 
 def filled(path: Path, **entries: str) -> None:
@@ -85,13 +94,13 @@ def test_faster_programs_are_written_once_the_slow_run_is_recorded(cube: Path, t
     ],
 )
 def test_a_slow_run_that_says_too_little_or_something_else_is_refused(
-    entries: dict[str, str], more: dict[str, Any], message: str, cube: Path, tmp_path: Path
+    entries: dict[str, str], more: dict[str, Any], message: str, cube: Path, slow: Path, tmp_path: Path
 ) -> None:
-    planned(cube, program="rapid", out=tmp_path)
-    filled(tmp_path / SLOW_RUN, **entries)
+    out = shutil.copytree(slow, tmp_path / "out")
+    filled(out / SLOW_RUN, **entries)
     with pytest.raises(InputError, match=message):
-        planned(cube, slow_run=tmp_path / SLOW_RUN, out=tmp_path, **({"program": "rapid"} | more))
-    assert [path.name for path in (tmp_path / "programs").iterdir()] == ["AV_10.mod"]
+        planned(cube, slow_run=out / SLOW_RUN, out=out, **({"program": "rapid"} | more))
+    assert [path.name for path in (out / "programs").iterdir()] == ["AV_10.mod"]
 
 
 @pytest.mark.parametrize(

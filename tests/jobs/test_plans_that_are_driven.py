@@ -17,7 +17,6 @@ import truearm
 from truearm.errors import InputError
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.planning.choosing import prediction
 from truearm.planning.constraints.constraints import Constraints
 from truearm.planning.driving.cell import Cell, boxes_of
 from truearm.planning.driving.collisions import CollisionCheck
@@ -60,8 +59,7 @@ def a_quarter(robot: Robot) -> Constraints:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_thirty_poses_are_driven(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prediction, "NUMBERS", (30,))  # what other numbers would do takes most of the time
+def test_thirty_poses_are_driven(name: str) -> None:
     planned = truearm.plan(name, poses=30, candidates=400)
     robot, tour = planned.made.robot, planned.tour
     assert tour is not None
@@ -82,8 +80,7 @@ def test_the_arms_are_of_ten_makers() -> None:
 
 
 @pytest.mark.parametrize("name", ["irb120", "ur5e", "fr3"])
-def test_limits_of_a_quarter_leave_as_many_to_choose_from(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prediction, "NUMBERS", (30,))
+def test_limits_of_a_quarter_leave_as_many_to_choose_from(name: str) -> None:
     robot = truearm.load_robot(name)
     rules = a_quarter(robot)
     planned = truearm.plan(robot, poses=30, candidates=400, constraints=rules)
@@ -351,9 +348,8 @@ def test_all_stops_are_written(tmp_path: Path) -> None:
         truearm.plan("irb120", poses=12, candidates=60, out=tmp_path / "other.csv")
 
 
-def test_a_plan_is_as_good_as_one_that_hits_the_floor(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_is_as_good_as_one_that_hits_the_floor() -> None:
     """By what the priors and the readings tell of the parameters, all over the reach."""
-    monkeypatch.setattr(prediction, "NUMBERS", (30,))
     driven = truearm.plan("irb120", poses=30, candidates=600)
     anywhere = truearm.plan("irb120", poses=30, candidates=600, no_floor=True, clearance=0.0)
     assert driven.made.prediction.planned < 1.02 * anywhere.made.prediction.planned

@@ -51,6 +51,12 @@ def plan() -> MeasurementPlan:
     return made()
 
 
+@pytest.fixture
+def few_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judge plans at one number of poses alone: what other numbers would do takes most of the time."""
+    monkeypatch.setattr(prediction, "NUMBERS", (30,))
+
+
 def test_a_plan_is_better_than_chance_and_within_limits(plan: MeasurementPlan) -> None:
     arm = plan.robot
     low, high = np.array([joint.limits for joint in arm.joints]).T
@@ -90,6 +96,7 @@ def test_what_cannot_be_told_apart_is_named(plan: MeasurementPlan) -> None:
     assert "theta_offset_2" not in plan.left_out
 
 
+@pytest.mark.usefixtures("few_numbers")
 def test_each_objective_is_best_by_its_own_measure() -> None:
     plans = {name: made(candidates=80, objective=name) for name in ("O1", "O3", "O5")}
     for name, plan in plans.items():
@@ -103,6 +110,7 @@ def test_the_same_seed_gives_the_same_plan(plan: MeasurementPlan) -> None:
     assert told == told_again
 
 
+@pytest.mark.usefixtures("few_numbers")
 def test_constraints_are_counted_and_kept() -> None:
     rules = Constraints.model_validate(
         {
@@ -123,6 +131,7 @@ def test_constraints_are_counted_and_kept() -> None:
         made(constraints=tight)
 
 
+@pytest.mark.usefixtures("few_numbers")
 def test_auto_takes_eleven_or_more() -> None:
     plan = made(poses=None, candidates=60)
     assert 11 <= len(plan.joints) <= 60
@@ -159,6 +168,7 @@ def test_a_robot_without_targets_tells_nothing() -> None:
         sensitivity(arm, random_candidates(arm, 5, rng), MODEL["geometric"].free(arm), 1e-4)
 
 
+@pytest.mark.usefixtures("few_numbers")
 def test_where_the_robot_stands_does_not_matter() -> None:
     arm = with_targets(load_robot("irb120"))
     away = truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0)).robot
@@ -193,9 +203,9 @@ def test_the_predicted_error_comes_true() -> None:
     assert told.planned > 1.1 * told.floor
 
 
-def test_configurations_chosen_for_a_program_on_ten_robots(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("few_numbers")
+def test_configurations_chosen_for_a_program_on_ten_robots() -> None:
     """30 chosen for a program against 30 chosen by O1: the true error at its targets."""
-    monkeypatch.setattr(prediction, "NUMBERS", (30,))  # what other numbers would do takes most of the time
     nominal, model = load_robot("irb120"), MODEL["geometric"]
     arm, rng = with_targets(nominal), np.random.default_rng(0)
     goal = accuracy_goal(nominal, POLISHING, None, None, None, rng)

@@ -127,7 +127,7 @@ def test_influence() -> None:
 
 
 def test_tilting() -> None:
-    found = tilting_study(2, lambda _: None, count=40, unseen=60)
+    found = tilting_study(1, lambda _: None, count=40, unseen=60)
     left = "What is left of the conventional calibration's error on unseen poses"
     assert median(found, left, "two-stage, tilting first") < 15
     assert median(found, left, "before any calibration") > 100

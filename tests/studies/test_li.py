@@ -31,7 +31,7 @@ TOGETHER = SURFACE_WORDS["together"]
 
 @pytest.fixture(scope="module")
 def found() -> Study:
-    return study(2, lambda _: None, unseen=60)
+    return study(1, lambda _: None, unseen=60)
 
 
 def row(table: Table, what: str) -> Row:

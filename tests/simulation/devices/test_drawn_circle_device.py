@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,13 @@ STANDS = Transform((1.0, -0.4, 0.3), (0.8, 0.0, 0.6, 0.0))
 
 def drawn(robot: Twin, count: int, seed: int = 0, sigma: float | None = 0.0) -> Dataset:
     return measured_with(DRAWN_CIRCLE, katana(), robot, count, np.random.default_rng(seed), sigma)
+
+
+@cache
+def exactly_drawn(seed: int) -> tuple[Twin, Dataset]:
+    """Return a robot and what it drew, without noise."""
+    truth = Twin(published("standard").with_frames(STANDS, {}))
+    return truth, drawn(truth, 72, seed)
 
 
 def test_the_device_is_in_the_list() -> None:
@@ -105,8 +113,7 @@ def test_readings_scatter_as_they_declare() -> None:
 @pytest.mark.parametrize("seed", [0, 3])
 def test_without_noise_the_true_robot_is_found(seed: int) -> None:
     """Up to a rigid motion; seed 3 has pages whose heights alone would be explained from below as well."""
-    truth = Twin(published("standard").with_frames(STANDS, {}))
-    data = drawn(truth, 72, seed)
+    truth, data = exactly_drawn(seed)
     fit = identify(katana(), data, GEOMETRIC, redundancy="drop")
     assert fit.unobservable == ()
     assert max(fit.sigma.values()) < 1e-8
@@ -118,8 +125,7 @@ def test_without_noise_the_true_robot_is_found(seed: int) -> None:
 @pytest.mark.parametrize("seed", [1, 3])
 def test_pages_start_with_the_pencil_above_them(seed: int) -> None:
     """Heights of a robot that was led along a page are its errors: they say nothing of which side it is on."""
-    truth = Twin(published("standard").with_frames(STANDS, {}))
-    data = drawn(truth, 72, seed)
+    _, data = exactly_drawn(seed)
     start = start_from_readings(katana(), data)
     up = [float(start.fixture_kinematics(f"paper_{k}").matrix()[0][2, 2]) for k in (1, 2, 3)]
     assert up == pytest.approx(np.cos(DRAWN_CIRCLE.slopes), abs=0.1)

@@ -311,12 +311,17 @@ def test_an_arm_that_bends_is_identified_from_its_own_loops(name: str) -> None:
     assert found < 0.05 * np.concatenate([rigid.position_norms, rigid.length_norms]).max()
 
 
+#: Of what is out of its reach few readings are asked for: three times as many places are tried one after the other.
+OUT_OF_REACH = {"calibration-table": 8, "two-sockets": 8, "plane": 8, "two-spheres": 16, "drawn-circle": 16}
+
+
 @every_device
 def test_a_robot_of_three_joints_is_calibrated_or_refused(name: str) -> None:
     """With three joints a stylus cannot be turned: a plate, or a point, is out of reach or does not tell the tool."""
+    count = OUT_OF_REACH.get(name, 40)
     try:
-        _, data = read_by(name, "li3", 40)
-        fit = identify(nominal("li3"), data.of_configurations(range(28)), GEOMETRIC)
+        _, data = read_by(name, "li3", count)
+        fit = identify(nominal("li3"), data.of_configurations(range(count * 7 // 10)), GEOMETRIC)
     except InputError:
         assert name in (
             "hexapod",
@@ -330,7 +335,7 @@ def test_a_robot_of_three_joints_is_calibrated_or_refused(name: str) -> None:
             "drawn-circle",
         )
         return
-    errors = errors_of(fit.robot, data.of_configurations(range(28, 40)))
+    errors = errors_of(fit.robot, data.of_configurations(range(count * 7 // 10, count)))
     everything = np.concatenate([errors.position_norms, errors.orientation_norms, errors.length_norms])
     # closed loops hardly see some directions; there the priors leave a micrometre
     assert everything.max() < (2e-6 if gauge_freedoms(data) else EXACT)

@@ -6,6 +6,7 @@ wrong point: the tool stood elsewhere than the joint positions say.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.identification.judging.slip_trials import angle_slips, as_noted
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.mixed_lengths import factors_of, length_notice
 from truearm.measurement.places import Places, places_of
 from truearm.measurement.repeats import repeated_joints
 from truearm.measurement.rigid_tool import Suspect, Suspicion, fixed_points, suspect
@@ -53,6 +55,9 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
     if len(doubted) == 0:
         return [], []
     predicted = np.stack([fit.robot.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
+    data, lengths = _in_another_length(data, predicted, doubted, allowed)
+    doubted = np.setdiff1d(doubted, np.flatnonzero(lengths != 1.0))
+    scaled = [length_notice(data, lengths)] if (lengths != 1.0).any() else []
     mistaken = _joints_of_others(data, predicted, doubted, allowed)
     angled, slips = _in_another_unit(fit, data, off, doubted, allowed, [*mistaken])
     points, known = places_of(data), fixed_points(data)
@@ -68,7 +73,7 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
             unlike[c] = float(off[mine].max())
         else:
             suspects += of_this
-    return [*slips, *_joints_mistaken(data, mistaken, unlike)], suspects
+    return [*scaled, *slips, *_joints_mistaken(data, mistaken, unlike)], suspects
 
 
 def _doubted(
@@ -115,6 +120,22 @@ def _hang_together(
     read, there = data.position[mine], predicted[c, data.target[mine]]
     apart = [np.linalg.norm(points[:, None] - points, axis=2) for points in (read, there)]
     return bool(apart[1].max() > _LONG * allowed and np.abs(apart[0] - apart[1]).max() <= allowed)
+
+
+def _in_another_length(data: Dataset, predicted: Array, doubted: IntArray, allowed: float) -> tuple[Dataset, Array]:
+    """Return the data with positions in another unit of length mended, and by what factors, ``(readings,)``.
+
+    Parameters
+    ----------
+    predicted
+        Places of the targets [m], ``(configurations, targets, 3)``.
+    doubted
+        The readings that are far off.
+    """
+    factors = np.ones(len(data.target))
+    there = predicted[data.configuration[doubted], data.target[doubted]]
+    factors[doubted] = factors_of(data.position[doubted], there, allowed)
+    return replace(data, position=data.position * factors[:, None]), factors
 
 
 def _in_another_unit(

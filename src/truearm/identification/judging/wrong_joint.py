@@ -97,11 +97,12 @@ class _Trials:
     """
 
     def __init__(self, left: LeftOver, index: int, shift: Array) -> None:
-        self._left, self._index, self._shift = left, index, shift
+        self._left, self._shift = left, shift
+        self._one = replace(left.problem.data, references=None).of_configurations([index])
         self._vector = np.array([left.fit.robot.values[name] for name in left.fit.free.names])
-        data, controller = left.problem.data, left.fit.robot.controller
-        self._as_noted = data.joints_are == "converted"
-        self.noted = controller.from_model(data.joints[[index]])[0] if self._as_noted else data.joints[index]
+        joints = self._one.joints
+        self._as_noted = self._one.joints_are == "converted"
+        self.noted = left.fit.robot.controller.from_model(joints)[0] if self._as_noted else joints[0]
         self._given = self._equations(self.noted[None])[0]
 
     def rest(self, moved: Array) -> Array:
@@ -146,7 +147,7 @@ class _Trials:
         """Return the equations of the configuration at other joint positions, ``(trials, equations)``."""
         problem = self._left.problem
         joints = self._left.fit.robot.controller.to_model(noted) if self._as_noted else noted
-        data = replace(problem.data, references=None).of_configurations(np.full(len(noted), self._index))
+        data = self._one.of_configurations(np.zeros(len(noted), dtype=np.intp))
         problem = replace(problem, data=replace(data, joints=joints))
         where = [np.repeat(data.configuration[b.readings], b.observation.components) for b in problem.blocks]
         order = np.argsort(np.concatenate(where), kind="stable")

@@ -32,10 +32,8 @@ _EXCHANGED: Final = (3, 6)
 #: An exchange must change a distance by so many times what distances may be off: exchanged names of an equilateral
 #: triangle change none, and explain nothing that a wrong reading does not.
 _TOLD_APART: Final = 1.5
-#: A distance is that of another unit if it is as long as usual in that unit within this share, and off by so many times
-#: as much in its own.
+#: A distance is that of another unit if it is as long as usual in that unit within this share.
 _SAME_LENGTH: Final = 0.01
-_LONG: Final = 10.0
 #: One wrong reading explains a configuration if all distances without it are off by less than this share of what they
 #: may be off.
 _EXPLAINED: Final = 0.3
@@ -139,10 +137,10 @@ def scaled_distances(data: Dataset) -> dict[float, IntArray]:
     apart = np.linalg.norm(places.position[one] - places.position[other], axis=1)
     pairs, usual = grouped_medians(pair := places.target[one] * places.targets + places.target[other], apart)
     usual = usual[np.searchsorted(pairs, pair)]
-    where, allowed = places.configuration[one], np.maximum(UNMOVED, _SAME_LENGTH * usual)
+    where, allowed = places.configuration[one], _SAME_LENGTH * usual
     found = {}
     for by, _ in LENGTH_FACTORS:
-        other_unit = (np.abs(by * apart - usual) <= allowed) & (np.abs(apart - usual) > _LONG * allowed)
+        other_unit = (np.abs(by * apart - usual) <= allowed) & (usual > 0.0)
         found[by] = np.setdiff1d(where[other_unit], where[~other_unit])
     return {by: which for by, which in found.items() if len(which)}
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.test_arrival_lag import ON_A_TRACK
 from tests.simulated import campaign
 
 from truearm.identification.judging.curve_range import about_curves
@@ -157,6 +159,16 @@ def test_a_wrong_sign_of_one_joint_is_named_and_no_other_joint(index: int, joint
 def test_a_joint_that_is_off_by_far_is_named_with_how_far() -> None:
     run = check("irb120", slipped(elastic(), [(17, 3, 40.0)]))
     assert "joint 3 of configuration 18 looks off by about 40 deg" in " ".join(step.message for step in run.next)
+
+
+def test_a_slide_that_is_off_is_named_in_mm(tmp_path: Path) -> None:
+    (tmp_path / "track.yaml").write_text(ON_A_TRACK, encoding="utf-8")
+    robot, rng = load_robot(tmp_path / "track.yaml"), np.random.default_rng(3)
+    data = measure(truth_twin(robot, "random", rng), robot.random_configurations(40, rng), NOISE, rng)
+    joints = data.joints.copy()
+    joints[20, 0] += 0.05
+    said = " ".join(step.message for step in check(robot, replace(data, joints=joints)).next)
+    assert "joint 1 of configuration 21 looks off by about 50 mm" in said
 
 
 def test_no_joint_is_named_where_two_explain_the_readings_or_none_does() -> None:

@@ -122,8 +122,8 @@ def in_metres_with_a_sign(data: Dataset) -> Dataset:
 @pytest.mark.parametrize(
     ("spoil", "told"),
     [
-        (of_some(1e3, 0.4), ["are a thousand times too large; those of the others are not"]),
-        (of_some(1e-3, 0.4), ["are a thousand times too small; those of the others are not"]),
+        (of_some(1e3, 0.4), ["are a thousand times too large, as if mm were called m; those of the others are not"]),
+        (of_some(1e-3, 0.4), ["are a thousand times too small, as if m were called mm; those of the others are not"]),
         (of_some(25.4, 0.1), ["are 25.4 times too large, as if mm were called inches; those"]),
         (single_cells, ["No one unit makes them fit"]),
         (in_metres_with_a_sign, ["are a thousand times too large, as if mm were called m", "The sign of joint 4 is"]),
@@ -135,6 +135,59 @@ def test_units_of_positions_are_named_by_what_fits(spoil: Callable[[Dataset], Da
     assert len(errors) == len(told)
     for notice, words in zip(errors, told, strict=True):
         assert words in notice.message
+
+
+def rows_of(data: Dataset, first: int, last: int, factor: float, target: int | None = None) -> tuple[Dataset, set[str]]:
+    """Return data with a block of configurations, or one target of it, in another unit, and which these are."""
+    rows = (data.configuration >= first - 1) & (data.configuration < last)
+    if target is not None:
+        rows &= data.target == target
+    names = {f"{data.labels[data.configuration[r]]}/{data.targets[data.target[r]]}" for r in np.flatnonzero(rows)}
+    return replace(data, position=np.where(rows[:, None], factor, 1.0) * data.position), names
+
+
+@pytest.mark.parametrize("of_one", [False, True])
+@pytest.mark.parametrize(
+    ("first", "last", "factor", "said"),
+    [
+        (5, 5, 1e-3, "at configuration 5 are a thousand times too small"),
+        (5, 10, 1e-3, "at configurations 5 to 10 are a thousand times too small"),
+        (1, 19, 1e-3, "at configurations 1 to 19 are a thousand times too small"),
+        (9, 10, 1e3, "at configurations 9, 10 are a thousand times too large"),
+        (20, 24, 1 / 25.4, "at configurations 20 to 24 are 25.4 times too small, as if inches"),
+    ],
+)
+def test_rows_in_another_unit_of_length_are_all_named_and_nothing_else_is_said_of_them(
+    of_one: bool, first: int, last: int, factor: float, said: str
+) -> None:
+    data, rows = rows_of(one_target_of(honest()) if of_one else honest(), first, last, factor)
+    run = check(ROBOT, data)
+    (notice,) = run.warnings
+    assert (notice.code, notice.level) == ("unit-length", "error")
+    assert said in notice.message
+    assert {"/".join(where) for where in notice.at} == rows
+    assert [step.code for step in run.next] == ["mend-data"]
+
+
+def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
+    data, rows = rows_of(honest(), 5, 10, 1e-3)
+    (notice,) = check(None, data).warnings
+    assert (notice.code, notice.level) == ("unit-length", "error")
+    assert "lie 1000 times closer together at configurations 5 to 10 than at the others" in notice.message
+    assert {"/".join(where) for where in notice.at} == rows
+    (notice,) = check(None, rows_of(honest(), 1, 19, 1 / 25.4)[0]).warnings
+    assert "lie 25.4 times farther apart at configurations 20 to 24 than at the others" in notice.message
+
+
+def test_two_rows_in_metres_of_a_long_campaign_are_named_and_each_reading_alone() -> None:
+    long = replace(campaign(ROBOT, 80, 0.05e-3, 5)[1], sigma=None)
+    data, rows = rows_of(long, 41, 42, 1e-3)
+    (notice,) = check(ROBOT, data).warnings
+    assert "The positions at configurations 41, 42 are a thousand times too small" in notice.message
+    data, more = rows_of(data, 60, 60, 1 / 25.4, target=1)
+    (notice,) = check(ROBOT, data).warnings
+    assert "; the positions at 60/2 (configuration/target) are 25.4 times too small" in notice.message
+    assert {"/".join(where) for where in notice.at} == rows | more
 
 
 @pytest.mark.parametrize(("robot", "poses"), [("irb120", 30), ("ur10", 12), ("katana450", 30), ("li3", 20)])

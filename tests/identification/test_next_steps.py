@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.test_arrival_lag import ON_A_TRACK
 from tests.simulated import campaign
 
 from truearm.identification.judging.curve_range import about_curves
@@ -133,6 +135,54 @@ def test_a_joint_that_was_written_down_wrong_is_named() -> None:
     assert "`without=18`" in step.message
     # One row that is far off does not look like an instrument that moved.
     assert not any(notice.code in ("instrument-moved", "joint-zero-jumped", "drift") for notice in run.warnings)
+
+
+@pytest.mark.parametrize("of_one", [False, True])
+@pytest.mark.parametrize(("index", "joint"), [(21, 4), (12, 5), (28, 2)])
+def test_a_wrong_sign_of_one_joint_is_named_and_no_other_joint(index: int, joint: int, of_one: bool) -> None:
+    data = campaign("irb120", 40, NOISE, 3)[1]
+    if of_one:
+        data = replace(data.of_readings(data.target == 0), targets=data.targets[:1])
+    size = np.degrees(abs(data.joints[index, joint - 1]))
+    assert size > 5.0
+    joints = data.joints.copy()
+    joints[index, joint - 1] *= -1
+    run = check("irb120", replace(data, joints=joints))
+    (notice,) = run.warnings
+    assert notice.code == "joints-mistaken"
+    assert f"{index + 1} (joint {joint}) fit with the opposite sign of this joint" in notice.message
+    said = " ".join(step.message for step in run.next)
+    assert f"the sign of joint {joint} of configuration {index + 1} looks wrong" in said
+    assert "looks off" not in said
+
+
+def test_a_joint_that_is_off_by_far_is_named_with_how_far() -> None:
+    run = check("irb120", slipped(elastic(), [(17, 3, 40.0)]))
+    assert "joint 3 of configuration 18 looks off by about 40 deg" in " ".join(step.message for step in run.next)
+
+
+def test_a_slide_that_is_off_is_named_in_mm(tmp_path: Path) -> None:
+    (tmp_path / "track.yaml").write_text(ON_A_TRACK, encoding="utf-8")
+    robot, rng = load_robot(tmp_path / "track.yaml"), np.random.default_rng(3)
+    data = measure(truth_twin(robot, "random", rng), robot.random_configurations(40, rng), NOISE, rng)
+    joints = data.joints.copy()
+    joints[20, 0] += 0.05
+    said = " ".join(step.message for step in check(robot, replace(data, joints=joints)).next)
+    assert "joint 1 of configuration 21 looks off by about 50 mm" in said
+
+
+def test_no_joint_is_named_where_two_explain_the_readings_or_none_does() -> None:
+    twin, data = campaign("irb120", 40, NOISE, 3)
+    joints = data.joints.copy()
+    joints[21, 4] = 0.0  # joints 4 and 6 turn about one axis
+    straight = measure(twin, joints, 0.3e-3, np.random.default_rng(3))
+    said = " ".join(step.message for step in check("irb120", slipped(straight, [(21, 4, 10.0)])).next)
+    assert "configuration 22 is off by" in said
+    assert "joint 4" not in said
+    two = slipped(data, [(10, 2, 15.0), (10, 5, -30.0)])
+    said = " ".join(step.message for step in check("irb120", two).next)
+    assert "configuration 11 is off by" in said
+    assert "of configuration 11 looks off" not in said
 
 
 def test_several_rows_are_found_behind_each_other_and_behind_the_wrong_model() -> None:

@@ -112,7 +112,8 @@ def _compared(
         return (*ranged, *check_data(data, excluded=excluded), _too_seldom(data)), None, None
     against = check_against(robot, part)
     left_out = () if part is still else (_in_part(part, still),)
-    notices = (*ranged, *check_data(data, against.suspects, excluded), *against.notices, *left_out)
+    scaled = {row for notice in against.notices if notice.code == "unit-length" for row in notice.at}
+    notices = (*ranged, *check_data(data, against.suspects, excluded, scaled), *against.notices, *left_out)
     return notices, against.fit, against.believed
 
 

@@ -7,7 +7,8 @@ readings of a real instrument agree to the last digit.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final, Protocol
 
 import numpy as np
@@ -16,9 +17,10 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.inclinometer import Inclinations
+from truearm.measurement.mixed_lengths import named_configurations
 from truearm.measurement.places import constellation, places_of
 from truearm.measurement.repeats import check_duplicates, repeated_joints, repeated_joints_notices
-from truearm.measurement.rigid_tool import DEVIATIONS, SAME_POINT, UNMOVED, Suspect, rigid_suspects
+from truearm.measurement.rigid_tool import DEVIATIONS, SAME_POINT, UNMOVED, Suspect, rigid_suspects, scaled_distances
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_columns import COLUMN
 from truearm.modeling.robot import Robot
@@ -38,7 +40,10 @@ _OFTEN_SHARE: Final = 0.8
 
 
 def check_data(
-    data: Dataset, suspects: Iterable[Suspect] | None = None, excluded: Mapping[str, int] | None = None
+    data: Dataset,
+    suspects: Iterable[Suspect] | None = None,
+    excluded: Mapping[str, int] | None = None,
+    scaled: Collection[tuple[str, str]] = (),
 ) -> list[Notice]:
     """Return what is wrong with a dataset without asking a robot.
 
@@ -48,16 +53,61 @@ def check_data(
         Readings that a robot doubts. At their configurations it tells which reading is wrong better than distances do.
     excluded
         How many readings of each target are missing because they were excluded: nobody need be told that.
+    scaled
+        Configuration and target of readings in another unit of length: nothing more is said of these.
     """
     found = [*_misnamed(data), *_missing(data, excluded or {}), *check_duplicates(data)]
+    data = _without(data, scaled)
+    closer = _closer_together(data)
+    found += closer
+    data = _without(data, {row for notice in closer for row in notice.at})
     pairs = repeated_joints(data)
     known = {label for pair in pairs for label in pair}
+    known |= {label for notice in closer for label, _ in notice.at}
     doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
     found += repeated_joints_notices(data, pairs)
     told = {suspect.configuration for suspect in doubted}
     rigid = [suspect for suspect in rigid_suspects(data) if suspect.configuration not in told]
     found += suspect_notices([*rigid, *reference_suspects(data), *doubted])
     return found + _moved(data) + _temperatures(data)
+
+
+def _without(data: Dataset, rows: Collection[tuple[str, str]]) -> Dataset:
+    """Return data without the positions of some readings, and of the reference points at their configurations.
+
+    Parameters
+    ----------
+    rows
+        Configuration and target of each.
+    """
+    if not rows:
+        return data
+    names = zip(data.configuration.tolist(), data.target.tolist(), strict=True)
+    left_out = np.array([(data.labels[c], data.targets[t]) in rows for c, t in names], dtype=bool)
+    references = data.references
+    if references is not None:
+        there = np.isin(references.configuration, data.configuration[left_out])
+        references = replace(references, position=np.where(there[:, None], np.nan, references.position))
+    return replace(data, position=np.where(left_out[:, None], np.nan, data.position), references=references)
+
+
+def _closer_together(data: Dataset) -> list[Notice]:
+    """Say at which configurations the targets lie as in another unit of length."""
+    found = []
+    for by, which in scaled_distances(data).items():
+        size = f"{max(by, 1.0 / by):g} times"
+        how = f"{size} closer together" if by > 1.0 else f"{size} farther apart"
+        mine = np.flatnonzero(np.isin(data.configuration, which) & data.has_position).tolist()
+        found.append(
+            Notice(
+                "unit-length",
+                f"The targets lie {how} at {named_configurations(data.labels, which)} than at the others: the "
+                "positions there, or those of the others, are in another unit of length. Mend their numbers.",
+                "error",
+                at=tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in mine),
+            )
+        )
+    return found
 
 
 def _temperatures(data: Dataset) -> list[Notice]:

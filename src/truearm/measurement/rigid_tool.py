@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.mixed_lengths import LENGTH_FACTORS
 from truearm.measurement.places import Places, grouped_medians, places_of
 from truearm.modeling.chain import Array
 from truearm.shown import millimetres
@@ -31,6 +32,8 @@ _EXCHANGED: Final = (3, 6)
 #: An exchange must change a distance by so many times what distances may be off: exchanged names of an equilateral
 #: triangle change none, and explain nothing that a wrong reading does not.
 _TOLD_APART: Final = 1.5
+#: A distance is that of another unit if it is as long as usual in that unit within this share.
+_SAME_LENGTH: Final = 0.01
 #: One wrong reading explains a configuration if all distances without it are off by less than this share of what they
 #: may be off.
 _EXPLAINED: Final = 0.3
@@ -118,6 +121,28 @@ def rigid_suspects(data: Dataset) -> list[Suspect]:
     for c in doubtful:
         suspects += _blamed(data, distances, c, known)
     return suspects
+
+
+def scaled_distances(data: Dataset) -> dict[float, IntArray]:
+    """Return the configurations whose distances between targets are all usual ones in another unit of length.
+
+    Returns
+    -------
+    Their indices by the factor that makes them usual, of those of `LENGTH_FACTORS`.
+    """
+    places = places_of(data)
+    one, other = _compared(places)
+    if not len(one):
+        return {}
+    apart = np.linalg.norm(places.position[one] - places.position[other], axis=1)
+    pairs, usual = grouped_medians(pair := places.target[one] * places.targets + places.target[other], apart)
+    usual = usual[np.searchsorted(pairs, pair)]
+    where, allowed = places.configuration[one], _SAME_LENGTH * usual
+    found = {}
+    for by, _ in LENGTH_FACTORS:
+        other_unit = (np.abs(by * apart - usual) <= allowed) & (usual > 0.0)
+        found[by] = np.setdiff1d(where[other_unit], where[~other_unit])
+    return {by: which for by, which in found.items() if len(which)}
 
 
 def _compared(places: Places) -> tuple[IntArray, IntArray]:

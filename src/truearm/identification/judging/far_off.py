@@ -6,14 +6,17 @@ wrong point: the tool stood elsewhere than the joint positions say.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.judging.slip_trials import angle_slips, as_noted
+from truearm.identification.judging.slip_trials import Slip, angle_slips, as_noted, sign_slips
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.mixed_lengths import factors_of, length_notice
 from truearm.measurement.places import Places, places_of
 from truearm.measurement.repeats import repeated_joints
 from truearm.measurement.rigid_tool import Suspect, Suspicion, fixed_points, suspect
@@ -53,14 +56,18 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
     if len(doubted) == 0:
         return [], []
     predicted = np.stack([fit.robot.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
+    data, lengths = _in_another_length(data, predicted, doubted, allowed)
+    doubted = np.setdiff1d(doubted, np.flatnonzero(lengths != 1.0))
+    scaled = [length_notice(data, lengths)] if (lengths != 1.0).any() else []
     mistaken = _joints_of_others(data, predicted, doubted, allowed)
     angled, slips = _in_another_unit(fit, data, off, doubted, allowed, [*mistaken])
+    turned_round = _of_another_sign(fit, data, off, doubted, allowed, [*mistaken, *angled])
     points, known = places_of(data), fixed_points(data)
     repeated = {label for pair in repeated_joints(data) for label in pair}
     suspects: list[Suspect] = []
     unlike: dict[int, float] = {}
     for c in dict.fromkeys(data.configuration[doubted].tolist()):
-        if c in mistaken or c in angled or data.labels[c] in repeated:
+        if c in mistaken or c in angled or c in turned_round or data.labels[c] in repeated:
             continue
         mine = [r for r in doubted.tolist() if data.configuration[r] == c]
         of_this = [_doubted(data, r, predicted[c], points, known, float(off[r]), allowed) for r in mine]
@@ -68,7 +75,7 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
             unlike[c] = float(off[mine].max())
         else:
             suspects += of_this
-    return [*slips, *_joints_mistaken(data, mistaken, unlike)], suspects
+    return [*scaled, *slips, *_joints_mistaken(data, mistaken, turned_round, unlike)], suspects
 
 
 def _doubted(
@@ -117,6 +124,22 @@ def _hang_together(
     return bool(apart[1].max() > _LONG * allowed and np.abs(apart[0] - apart[1]).max() <= allowed)
 
 
+def _in_another_length(data: Dataset, predicted: Array, doubted: IntArray, allowed: float) -> tuple[Dataset, Array]:
+    """Return the data with positions in another unit of length mended, and by what factors, ``(readings,)``.
+
+    Parameters
+    ----------
+    predicted
+        Places of the targets [m], ``(configurations, targets, 3)``.
+    doubted
+        The readings that are far off.
+    """
+    factors = np.ones(len(data.target))
+    there = predicted[data.configuration[doubted], data.target[doubted]]
+    factors[doubted] = factors_of(data.position[doubted], there, allowed)
+    return replace(data, position=data.position * factors[:, None]), factors
+
+
 def _in_another_unit(
     fit: Fit, data: Dataset, off: Array, doubted: IntArray, allowed: float, left_out: list[int]
 ) -> tuple[set[int], list[Notice]]:
@@ -131,23 +154,13 @@ def _in_another_unit(
     left_out
         Configurations that are explained.
     """
-    read = np.bincount(data.configuration[data.has_position], minlength=data.configurations)
-    wrong = np.bincount(data.configuration[doubted], minlength=data.configurations)
-    some = np.setdiff1d(np.flatnonzero((wrong > 0) & (wrong == read)), left_out)[:_MOST_LOOKED_AT]
-    if not len(some):
-        return set(), []
-    part = data.of_configurations(some)
-    off_most = {c: float(np.nanmax(off[data.configuration == c])) for c in some.tolist()}
     found: dict[str, list[int]] = {}
     explained: set[int] = set()
-    for slip in as_noted(fit.robot, part, angle_slips):
-        places = [fit.robot.world_poses(slip.data.postures, name)[0] for name in part.targets]
-        gaps = np.linalg.norm(np.stack(places, axis=1)[part.configuration, part.target] - part.position, axis=1)
-        for index, c in enumerate(some.tolist()):
-            gap = float(gaps[(part.configuration == index) & part.has_position].max())
-            if c not in explained and gap <= min(allowed, off_most[c] / _LEAST_IMPROVEMENT):
-                explained.add(c)
-                found.setdefault(slip.words.partition(".")[0], []).append(c)
+    for slip, fitting in _explained_by(fit, data, off, doubted, allowed, left_out, angle_slips):
+        new = [c for c in fitting if c not in explained]
+        explained.update(new)
+        if new:
+            found.setdefault(slip.words.partition(".")[0], []).extend(new)
     return explained, [
         Notice(
             "unit-angle",
@@ -160,13 +173,54 @@ def _in_another_unit(
     ]
 
 
-def _joints_mistaken(data: Dataset, others: dict[int, int], unlike: dict[int, float]) -> list[Notice]:
+def _of_another_sign(
+    fit: Fit, data: Dataset, off: Array, doubted: IntArray, allowed: float, left_out: list[int]
+) -> dict[int, int]:
+    """Return the configurations whose readings fit with the opposite sign of one joint alone, and its number from 1."""
+    found: dict[int, list[int]] = {}
+    slips = _explained_by(fit, data, off, doubted, allowed, left_out, sign_slips)
+    for number, (_, fitting) in enumerate(slips, 1):
+        for c in fitting:
+            found.setdefault(c, []).append(number)
+    return {c: numbers[0] for c, numbers in found.items() if len(numbers) == 1}
+
+
+def _explained_by(
+    fit: Fit,
+    data: Dataset,
+    off: Array,
+    doubted: IntArray,
+    allowed: float,
+    left_out: list[int],
+    slips: Callable[[Dataset], Iterator[Slip]],
+) -> Iterator[tuple[Slip, list[int]]]:
+    """Return slips with joint positions, and the configurations whose readings each of them explains."""
+    read = np.bincount(data.configuration[data.has_position], minlength=data.configurations)
+    wrong = np.bincount(data.configuration[doubted], minlength=data.configurations)
+    some = np.setdiff1d(np.flatnonzero((wrong > 0) & (wrong == read)), left_out)[:_MOST_LOOKED_AT]
+    if not len(some):
+        return
+    part = data.of_configurations(some)
+    off_most = [float(np.nanmax(off[data.configuration == c])) for c in some.tolist()]
+    for slip in as_noted(fit.robot, part, slips):
+        places = [fit.robot.world_poses(slip.data.postures, name)[0] for name in part.targets]
+        gaps = np.linalg.norm(np.stack(places, axis=1)[part.configuration, part.target] - part.position, axis=1)
+        gap = [float(gaps[(part.configuration == i) & part.has_position].max()) for i in range(len(some))]
+        least = [min(allowed, most / _LEAST_IMPROVEMENT) for most in off_most]
+        yield slip, [c for i, c in enumerate(some.tolist()) if gap[i] <= least[i]]
+
+
+def _joints_mistaken(
+    data: Dataset, others: dict[int, int], signs: dict[int, int], unlike: dict[int, float]
+) -> list[Notice]:
     """Say which joint positions do not belong to their readings.
 
     Parameters
     ----------
     others
         Configurations whose readings fit the joint positions of another one, and which.
+    signs
+        Those whose readings fit with the opposite sign of a joint, and of which.
     unlike
         Those whose readings hang together and are elsewhere, and how far [m].
     """
@@ -178,6 +232,13 @@ def _joints_mistaken(data: Dataset, others: dict[int, int], unlike: dict[int, fl
             f"The {what} the joint positions of another one: {listed(words)}. Their rows were exchanged or copied: "
             "mend the joint positions, or leave them out."
         )
+    if signs:
+        words = [f"{data.labels[c]} (joint {number})" for c, number in signs.items()]
+        what = f"configuration{'' if len(words) == 1 else 's'} {listed(words)}"
+        found.append(
+            f"The readings of {what} fit with the opposite sign of this joint: mend it in these rows, or leave them "
+            "out."
+        )
     if unlike:
         words = [f"{data.labels[c]} ({millimetres(size)} mm off)" for c, size in unlike.items()]
         what = f"configuration{'' if len(words) == 1 else 's'} {listed(words)}"
@@ -186,7 +247,7 @@ def _joints_mistaken(data: Dataset, others: dict[int, int], unlike: dict[int, fl
             "other as they should. The joint positions are wrong, or the row is another one's, or the robot or the "
             "instrument was moved for it. Mend the joint positions, or leave these rows out."
         )
-    at = tuple((data.labels[c], "") for c in (*others, *unlike))
+    at = tuple((data.labels[c], "") for c in (*others, *signs, *unlike))
     return [Notice("joints-mistaken", " ".join(found), at=at)] if found else []
 
 

@@ -4,7 +4,7 @@ A configuration that is left out moves the fit. What its readings are off then b
 residuals and the share that the free parameters take of them, without another fit (mean-shift outliers: Cook and
 Weisberg 1982, "Residuals and Influence in Regression", section 2.2.2). The worst configuration is left out first, then
 the worst of the rest, because several of them hide each other. What the readings are off by is held against an error of
-one joint, which moves all targets of the configuration together.
+one joint (`wrong_joint.py`), which moves all targets of the configuration together.
 """
 
 from __future__ import annotations
@@ -17,14 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.wrong_joint import WrongJoint, wrong_joint
 from truearm.modeling.chain import Array
 
 #: Mean squares of a configuration, over those of the rest, from which it is off: six times as far as the others are.
 _LEAST_RATIO: Final = 36.0
-#: An error of one joint explains the readings of a configuration if it leaves less than so many times what other
-#: configurations leave, or less than this share of them and what a straight line leaves of a turn.
-_AS_WELL: Final = 9.0
-_EXPLAINED: Final = 0.01
 #: Configurations measured one after the other that are a part of the campaign and no single ones.
 _LEAST_PART: Final = 3
 #: Share of the squares that one target holds where it alone is off.
@@ -46,10 +43,8 @@ class OffConfiguration:
     ----------
     index
         In the dataset.
-    joints
-        Numbers of the joints, from 1, an error of each of which alone explains the readings; none if no joint does.
-    error
-        What the first of them was read too large by [rad or m]; zero if no joint explains the readings.
+    joint
+        The joint whose position alone explains the readings, clearly better than each other one; None if none does.
     target
         Name of the target that alone is off; empty if several are.
     distance
@@ -58,8 +53,7 @@ class OffConfiguration:
     """
 
     index: int
-    joints: tuple[int, ...]
-    error: float
+    joint: WrongJoint | None
     target: str
     distance: float
 
@@ -70,9 +64,8 @@ class _Rows:
 
     Attributes
     ----------
-    residual, basis, by_joints
-        Without what the free parameters can take ``(rows,)``; directions that they can take ``(rows, rank)``; and the
-        derivative by errors of the joints ``(rows, joints)``.
+    residual, basis
+        Without what the free parameters can take ``(rows,)``, and directions that they can take ``(rows, rank)``.
     sigma
         Standard deviation of each row [m], zero for angles, ``(rows,)``.
     target
@@ -83,7 +76,6 @@ class _Rows:
 
     residual: Array
     basis: Array
-    by_joints: Array
     sigma: Array
     target: NDArray[np.intp]
     of: tuple[slice, ...]
@@ -174,11 +166,9 @@ def _in_order(left: LeftOver) -> _Rows:
     names = list(dict.fromkeys(b.target for b in blocks))
     target = np.concatenate([np.full(b.rows, names.index(b.target)) for b in blocks])
     edges = np.searchsorted(configuration[order], np.arange(left.problem.data.configurations + 1))
-    vector = np.array([left.fit.robot.values[name] for name in left.fit.free.names])
     return _Rows(
         left.without_parameters(left.residual)[order],
         left.basis[order],
-        left.problem.at(vector).by_joints[order],
         sigma[order],
         target[order],
         tuple(slice(a, b) for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)),
@@ -244,17 +234,7 @@ def _described(left: LeftOver, rows: _Rows, index: int, shift: Array, scale: flo
         Mean square of what the other configurations leave.
     """
     mine = rows.of[index]
-    A, sigma, total = rows.by_joints[mine], rows.sigma[mine], float(shift @ shift)
-    size = np.maximum(np.sum(A**2, axis=0), 1e-300)
-    error = A.T @ shift / size
-    rest = np.maximum(total - error**2 * size, 0.0)
-    order = np.argsort(rest)
-    # Predictions of a fit without the configuration err too, so that a perfect explanation is not asked for.
-    noise = _AS_WELL * max(scale, 1e-300) * len(shift)
-    turns = np.array([joint.kind == "revolute" for joint in left.fit.robot.joints])
-    straight = (_EXPLAINED + np.where(turns, np.abs(error), 0.0)) ** 2 * total
-    joints = [int(i) for i in order if rest[i] < np.maximum(noise, straight[i])]
-    joints = [i for i in joints if i == joints[0] or rest[i] < rest[joints[0]] + noise]
+    sigma, total = rows.sigma[mine], float(shift @ shift)
     by_target = np.bincount(rows.target[mine], shift**2)
     several = np.count_nonzero(by_target) > 1
     alone = int(np.argmax(by_target)) if several and by_target.max() > _ONE_TARGET * total else None
@@ -264,8 +244,7 @@ def _described(left: LeftOver, rows: _Rows, index: int, shift: Array, scale: flo
     seen = max(len(np.unique(rows.target[mine][counted])), 1)
     return OffConfiguration(
         index,
-        () if alone is not None else tuple(i + 1 for i in joints),
-        float(error[joints[0]]) if joints and alone is None else 0.0,
+        wrong_joint(left, index, shift, scale) if alone is None else None,
         "" if alone is None else names[alone],
         math.sqrt(float(lengths @ lengths) / seen),
     )

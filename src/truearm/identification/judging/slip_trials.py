@@ -12,6 +12,7 @@ import numpy as np
 
 from truearm.measurement.controller_joints import in_controller_joints, in_model_joints
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.mixed_lengths import FARTHEST, LENGTH_FACTORS
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
@@ -21,14 +22,10 @@ from truearm.notices import Notice
 _MOST_UNEVEN: Final = 1.2
 #: Cosine between two axes of an instrument that are still called square.
 _SQUARE: Final = 0.1
-#: Between readings in one unit and those in another lies a gap: no reading is so many times as far as the next one.
-_APART: Final = 5.0
 #: So many configurations are named.
 _MOST_NAMED: Final = 5
 #: No joint turns farther to one side, in turns.
 _MOST_TURNS: Final = 1.5
-#: No instrument reads a robot from farther away [m].
-_FARTHEST: Final = 1e4
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +40,19 @@ class Slip:
         What happened and what to do about it, without a full stop.
     data
         The data as they should be.
+    at
+        Configuration and target of the readings that it is about; empty if it is about all.
     """
 
     code: str
     words: str
     data: Dataset
+    at: tuple[tuple[str, str], ...] = ()
 
     @property
     def notice(self) -> Notice:
         """What is said if it explains the data."""
-        return Notice(self.code, f"{self.words}.", "error")
+        return Notice(self.code, f"{self.words}.", "error", at=self.at)
 
 
 # -- lengths -----------------------------------------------------------------------------------------------
@@ -60,42 +60,12 @@ class Slip:
 
 def length_slips(data: Dataset) -> Iterator[Slip]:
     """Try lengths in another unit."""
-    for factor, words in (
-        (1e-3, "a thousand times too large, as if mm were called m"),
-        (1e3, "a thousand times too small, as if m were called mm"),
-        (25.4, "25.4 times too small, as if inches were called mm"),
-        (1 / 25.4, "25.4 times too large, as if mm were called inches"),
-    ):
-        if factor > 1.0 and np.nanmax(np.abs(data.position), initial=0.0) * factor > _FARTHEST:
+    for factor, words in LENGTH_FACTORS:
+        if factor > 1.0 and np.nanmax(np.abs(data.position), initial=0.0) * factor > FARTHEST:
             continue
         what = "positions" if data.fixture is None else "lengths"
         words = f"The {what} are {words}. Mend the unit in the header"
         yield Slip("unit-length", words, _scaled(data, factor))
-
-
-def mixed_length_slips(data: Dataset) -> Iterator[Slip]:
-    """Try another unit of those readings that lie far beyond the others, and of those that lie far inside of them."""
-    far_away = np.linalg.norm(data.position, axis=1)
-    known = np.sort(far_away[data.has_position & (far_away > 0.0)])
-    if len(known) < 2:
-        return
-    ratios = known[1:] / known[:-1]
-    widest = int(np.argmax(ratios))
-    if ratios[widest] < _APART:
-        return
-    beyond = far_away > np.sqrt(known[widest] * known[widest + 1])
-    for mask, factor, words in (
-        (beyond, 1e-3, "a thousand times too large"),
-        (~beyond, 1e3, "a thousand times too small"),
-        (beyond, 1 / 25.4, "25.4 times too large, as if mm were called inches"),
-        (~beyond, 25.4, "25.4 times too small, as if inches were called mm"),
-    ):
-        configurations = np.unique(data.configuration[mask & data.has_position])
-        first = ", ".join(data.labels[c] for c in configurations[:_MOST_NAMED].tolist())
-        which = f"{first} and others" if len(configurations) > _MOST_NAMED else first
-        said = f"The positions of some configurations ({which}) are {words}; those of the others are not. "
-        mended = data.position * np.where(mask, factor, 1.0)[:, None]
-        yield Slip("unit-length", f"{said}Mend the numbers of these rows", replace(data, position=mended))
 
 
 def _scaled(data: Dataset, factor: float) -> Dataset:

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.judging.mixed_length_slips import mixed_length_slips
 from truearm.identification.judging.orientation_slips import orientation_slips
 from truearm.identification.judging.slip_trials import (
     Slip,
@@ -24,7 +25,6 @@ from truearm.identification.judging.slip_trials import (
     length_slips,
     mirrored,
     mixed_angle_slips,
-    mixed_length_slips,
     order_slips,
     scale_slips,
     shifted,
@@ -88,9 +88,12 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     misfit = {t: float(np.median(off)) for t, off in zip(seen, errors, strict=True)}
     least = min(misfit.values())
     bad = [t for t, size in misfit.items() if size > max(_PLACED_WITHIN, _LEAST_IMPROVEMENT * least)]
+    if not bad and least <= _PLACED_WITHIN:
+        return turned
+    rows = _best(robot, some, (replace(slip, data=_some(slip.data)) for slip in mixed_length_slips(robot, rest)))
+    if rows is not None:
+        return [rows.notice]
     if not bad:
-        if least <= _PLACED_WITHIN:
-            return turned
         best = _best(
             robot,
             some,
@@ -104,9 +107,7 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     found = []
     for t in bad:
         only = _only(some, t)
-        best = _best(
-            robot, only, [*length_slips(only), *mirrored(only), *mixed_length_slips(only), *scale_slips(robot, only)]
-        )
+        best = _best(robot, only, [*length_slips(only), *mirrored(only), *scale_slips(robot, only)])
         if best is not None:
             found.append(Notice(best.code, f"Target {some.targets[t]}: {best.words}.", "error"))
     return [*turned, *found] or _beyond_reach(robot, some)
@@ -131,7 +132,6 @@ def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     """Try everything but several slips at once, the simplest first."""
     some = _some(data)
     yield from length_slips(some)
-    yield from mixed_length_slips(some)
     yield from _angle_slips(robot, some)
     yield from controller_slips(robot, some)
     yield from mirrored(some)

@@ -48,12 +48,13 @@ def measured_again(left: LeftOver, off: Off, known: float, *, checked: bool) -> 
 def _off_by(left: LeftOver, off: OffConfiguration) -> str:
     """Say what is wrong with a configuration."""
     label = left.problem.data.labels[off.index]
-    if off.joints:
-        joints = left.fit.robot.joints
-        turns = joints[off.joints[0] - 1].kind == "revolute"
-        size = f"{math.degrees(abs(off.error)):.2g} deg" if turns else f"{abs(off.error) * 1e3:.2g} mm"
-        which = " or ".join(f"{number}" for number in off.joints[:_NAMED])
-        return f"joint {which} of configuration {label} looks off by about {size}"
+    if off.joint is not None:
+        which = f"joint {off.joint.number} of configuration {label}"
+        if off.joint.sign:
+            return f"the sign of {which} looks wrong"
+        turns = left.fit.robot.joints[off.joint.number - 1].kind == "revolute"
+        size = f"{math.degrees(abs(off.joint.error)):.2g} deg" if turns else f"{abs(off.joint.error) * 1e3:.2g} mm"
+        return f"{which} looks off by about {size}"
     where = f"target {off.target} of " if off.target else ""
     return f"{where}configuration {label} is off by {off.distance * 1e3:.2g} mm"
 

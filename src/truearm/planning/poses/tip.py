@@ -61,9 +61,8 @@ class Tip:
 
     def moved(self, q: Array) -> tuple[Array, Array]:
         """Return positions ``(n, 3)`` [m] and their derivatives by the joint positions ``(n, 3, joints)`` alone."""
-        kinematics = self.robot.forward_kinematics(q, self.target)
-        linear = kinematics.position_jacobian(self.robot.moving[: len(self.robot.joints)])  # (joints, 3, n)
-        return (kinematics.position.T - self._origin) @ self._rotation, self._rotation.T @ linear.transpose(2, 1, 0)
+        position, linear = self.robot.moved_point(q, self.target)
+        return (position - self._origin) @ self._rotation, self._rotation.T @ linear
 
     def positions(self, q: Array | Postures) -> Array:
         """Return positions alone, ``(n, 3)`` [m]."""

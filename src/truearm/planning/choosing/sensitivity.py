@@ -57,7 +57,7 @@ class Sensitivity:
     @cached_property
     def squares(self) -> Array:
         """Mean product of the derivatives of a coordinate, ``(configurations, parameters, parameters)``."""
-        return np.asarray(self.rows.swapaxes(1, 2) @ self.rows) / self.rows.shape[1]
+        return np.asarray(self.rows.swapaxes(1, 2) @ self.rows / self.rows.shape[1])
 
     def identifiable(self, count: int) -> NDArray[np.intp]:
         """Return the indices of parameters that `count` average configurations can tell from all others."""

@@ -156,7 +156,7 @@ class _Search:
         wanted = points.reshape(-1, 3)
         missed = np.arange(len(wanted))
         for nearest in range(1, _SEEDS + 1):
-            sample = self._tree.query(wanted[missed], [nearest])[1][:, 0]
+            sample = np.asarray(self._tree.query(wanted[missed], [nearest])[1])[:, 0]
             missed = missed[~self._met(wanted[missed], self._joints[sample])]
         lost = np.zeros(len(wanted), dtype=bool)
         lost[missed] = True

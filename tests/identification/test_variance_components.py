@@ -6,7 +6,7 @@ from scipy.special import stdtrit
 
 from truearm.identification.solving.arrivals import Arrivals, Whitening
 from truearm.identification.solving.cluster_covariance import cluster_covariance
-from truearm.identification.solving.likelihood import Linearised
+from truearm.identification.solving.likelihood import Likelihood, Linearised, Moments
 from truearm.identification.solving.losses import Loss, pulls
 from truearm.identification.solving.variance_components import Components, variance_components
 from truearm.modeling.chain import Array
@@ -99,6 +99,16 @@ def test_priors_are_integrated_out() -> None:
     pulled = np.linalg.solve(V, A @ C)
     np.testing.assert_allclose(part.covariance, pulled.T @ of_joints @ pulled, rtol=1e-6, atol=1e-9)
     assert part.freedom == found.likeliest.freedom[0] < 2 * len(set(of_row.tolist()))
+
+
+def test_the_likelihood_is_right_where_joints_err_by_far_more_than_readings() -> None:
+    """Readings of an arrival in three coordinates then say nothing of six joints but in three directions."""
+    rng = np.random.default_rng(5)
+    A, G, z = rng.standard_normal((60, 4)), rng.standard_normal((60, 6)), rng.standard_normal(60)
+    at = Linearised(-z, A, G, np.zeros(4), True, Arrivals(np.repeat(np.arange(20), 3)), np.zeros(60, dtype=np.intp))
+    moments = Moments(at, 1)
+    large, larger = (Likelihood(moments, np.ones(1), np.full(6, variance)) for variance in (1e6, 1e10))
+    assert larger.likelihood - large.likelihood == pytest.approx(-0.5 * 20 * 3 * np.log(1e4), rel=1e-4)
 
 
 def test_whitening_is_the_root_of_the_inverse() -> None:

@@ -177,8 +177,8 @@ def _fastest_of(robot: Robot, ways: Array, target: str | None) -> float:
     rigid, count = robot.rigid, 2
     while True:
         share = np.linspace(-1.0, count + 1.0, count + 3)[:, None] / count
-        places = rigid.forward((1.0 - share) * ways[0] + share * ways[1], target=target)[0]
-        along = float(np.linalg.norm(np.diff(places, axis=0), axis=1).max()) * count
+        places = rigid.forward_kinematics((1.0 - share) * ways[0] + share * ways[1], target).position
+        along = float(np.linalg.norm(np.diff(places), axis=0).max()) * count
         over = third / (6.0 * count**2)
         if over <= _OVER * max(along, _SHARE_OF_BOUND * bound):
             return along + over

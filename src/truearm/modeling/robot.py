@@ -416,6 +416,12 @@ class Robot(RobotData):
             np.concatenate(kinematics.jacobians(self.moving[: len(self.joints)]), axis=1), (0, 1), (2, 1)
         )
 
+    def moved_point(self, q: Array | Postures, target: str | None = None) -> tuple[Array, Array]:
+        """Return where the tip is in the world ``(n, 3)`` [m], and the linear rows of :meth:`joint_jacobian`."""
+        kinematics = self.forward_kinematics(q, target)
+        linear = kinematics.position_jacobian(self.moving[: len(self.joints)])
+        return np.ascontiguousarray(kinematics.position.T), np.moveaxis(linear, (0, 1), (2, 1))
+
     def position_jacobian(
         self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
     ) -> Array:

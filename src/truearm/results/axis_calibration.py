@@ -91,7 +91,7 @@ class AxisCalibration(Record):
         text = [
             "joint  target  points   arc [deg]  radius [mm]  axis +/- [mm]  [mrad]  tangential [mm]  backlash [deg]"
         ]
-        for c in self._summary["circles"]:
+        for c in map(_circle, self.analysis.found.circles):
             lag = "" if c["backlash_deg"] is None else f"{c['backlash_deg']:.4f}"
             line = (
                 f"{c['joint']:<6} {c['target']:<7} {c['points']:<8} {c['arc_deg']:<10.1f} {c['radius_mm']:<12.3f} "
@@ -99,7 +99,7 @@ class AxisCalibration(Record):
                 f"{c['tangential_range_mm']:<16.4f} {lag}"
             )
             text.append(line.rstrip())
-        errors = self._summary["joint_errors"]
+        errors = joint_errors_summary(self.analysis.errors)
         text.append(f"Joint errors: {len(errors['found'])} found, in 95 % intervals:")
         for e in errors["found"]:
             low, high = e["interval"]
@@ -147,7 +147,8 @@ class AxisCalibration(Record):
             rows = self.analysis.table(name)
         except InputError as refusal:
             return {"refused": str(refusal)}
-        units = [converted(nominal, name).convention.row_units(j.kind) for j in nominal.joints]
+        convention = converted(nominal, name).convention
+        units = [convention.row_units(joint.kind) for joint in nominal.joints]
         return {
             "rows": [
                 {

@@ -108,15 +108,30 @@ class AxisAnalysis:
 
     def _base_of(self, robot: Robot) -> Array:
         if self.in_robot_frame:
-            return base_and_flange(self.nominal)[0]
-        axes, plain = joint_axes(robot), joint_axes(self.nominal)
-        to_base = np.linalg.inv(frame_between(plain[0], plain[1])) @ base_and_flange(self.nominal)[0]
-        return np.asarray(frame_between(axes[0], axes[1]) @ to_base)
+            return self._nominal_ends[0]
+        axes = joint_axes(robot)
+        return np.asarray(frame_between(axes[0], axes[1]) @ self._base_on_axes)
 
     def _flange_of(self, robot: Robot) -> Array:
-        axes, plain = joint_axes(robot), joint_axes(self.nominal)
-        to_flange = np.linalg.inv(frame_between(plain[-1], plain[-2])) @ base_and_flange(self.nominal)[1]
-        return np.asarray(frame_between(axes[-1], axes[-2]) @ to_flange)
+        axes = joint_axes(robot)
+        return np.asarray(frame_between(axes[-1], axes[-2]) @ self._flange_on_axes)
+
+    @cached_property
+    def _nominal_ends(self) -> tuple[Array, Array]:
+        """Base and flange of the nominal robot in the world, ``(4, 4)`` each."""
+        return base_and_flange(self.nominal)
+
+    @cached_property
+    def _base_on_axes(self) -> Array:
+        """The nominal base in the frame that axes 1 and 2 fix, ``(4, 4)``."""
+        axes = joint_axes(self.nominal)
+        return np.asarray(np.linalg.inv(frame_between(axes[0], axes[1])) @ self._nominal_ends[0])
+
+    @cached_property
+    def _flange_on_axes(self) -> Array:
+        """The nominal flange in the frame that the last two axes fix, ``(4, 4)``."""
+        axes = joint_axes(self.nominal)
+        return np.asarray(np.linalg.inv(frame_between(axes[-1], axes[-2])) @ self._nominal_ends[1])
 
     def framed(self, robot: Robot) -> Robot:
         """Return measured axes as a robot between the two frames that they fix."""

@@ -272,16 +272,23 @@ def _judged(rest: _Remainder, cause: str, columns: Array, mass: float, freedom: 
     mass
         Of a payload [kg].
     """
-    r, k = rest.residual, columns.shape[1]
-    everything, pull = columns.T @ columns, columns.T @ r
-    ridge = np.eye(k) + 1e-9 * np.trace(everything) * np.eye(k)
-    found = np.linalg.solve(everything + ridge, np.column_stack([pull, columns.T]))
-    value, spread = found[:, 0], found[:, 1:]
-    left = r - columns @ value
+    r, (rows, k) = rest.residual, columns.shape
+    # The smaller of two systems: (A'A + c)^-1 A' = A' (AA' + c)^-1. Their eigenvalues differ by zeros alone.
+    products = columns.T @ columns if k <= rows else columns @ columns.T
+    ridge = 1.0 + 1e-9 * np.trace(products)
+    system = products + ridge * np.eye(len(products))
     # What a fold is off by, estimated from the others, follows from one solution for all (Allen 1974, "The relationship
     # between variable selection and data augmentation and a method for prediction"): no system for each fold.
     parts = [np.flatnonzero(rest.fold == fold) for fold in range(_FOLDS)]
-    unseen = [np.linalg.solve(np.eye(len(p)) - columns[p] @ spread[:, p], left[p]) for p in parts]
+    if k <= rows:
+        spread = np.linalg.solve(system, columns.T)
+        left = r - columns @ (spread @ r)
+        own = [np.eye(len(p)) - columns[p] @ spread[:, p] for p in parts]
+    else:
+        of_rows = ridge * np.linalg.inv(system)  # 1 - A (A'A + c)^-1 A'
+        left = of_rows @ r
+        own = [of_rows[np.ix_(p, p)] for p in parts]
+    unseen = [np.linalg.solve(of, left[p]) for of, p in zip(own, parts, strict=True)]
     gains = np.array([float(r[p] @ r[p] - e @ e) for p, e in zip(parts, unseen, strict=True)])  # of squares
     total = float(r @ r)
     gain = float(gains.sum())
@@ -289,8 +296,8 @@ def _judged(rest: _Remainder, cause: str, columns: Array, mass: float, freedom: 
     remaining = math.sqrt(max(1.0 - gain / total, 0.0))
     if remaining > 1.0 - _LEAST_GAIN or gain < _LEAST_DEVIATIONS * error:
         return None
-    share = min(float(2.0 * value @ pull - value @ everything @ value) / total, 1.0 - 1e-12)
-    rank = int(np.linalg.matrix_rank(everything + 1e-12 * np.eye(k), tol=1.0, hermitian=True))
+    share = min(1.0 - float(left @ left) / total, 1.0 - 1e-12)
+    rank = int(np.linalg.matrix_rank(products, tol=1.0, hermitian=True))
     if freedom <= rank + _LEAST_FREEDOM // 2:
         return None
     # F of two mean squares, times its numerator's freedom, as chi squared: the denominator has many degrees.

@@ -180,11 +180,11 @@ class Likelihood:
         self.M, self.t = (np.tensordot(by, part, 1) for part in (of.M, of.t))
         root = np.sqrt(joints)
         inner = np.eye(len(joints)) + root[:, None] * self.M * root
-        self.E = root[:, None] * np.linalg.inv(inner) * root
+        factor = np.linalg.cholesky(inner)  # its eigenvalues are one or more
+        half = np.linalg.inv(factor) * root
+        self.E = np.swapaxes(half, 1, 2) @ half
         whole, b = np.tensordot(by, of.C, 1), by @ of.c
         seen = (self.E @ self.t[..., None])[..., 0]
-        values, vectors = np.linalg.eigh(self.E)
-        half = np.sqrt(np.maximum(values, 0.0))[..., None] * np.swapaxes(vectors, 1, 2)
         for mine, _, T in self._parts():
             HT = half[mine] @ T
             whole -= _product(HT, HT)
@@ -194,7 +194,7 @@ class Likelihood:
         self.L = _root(whole + of.known)
         self.found = np.linalg.solve(self.L.T, np.linalg.solve(self.L, b))
         left = float(by @ of.q - np.einsum("ak,akl,al->", self.t, self.E, self.t) - b @ self.found)
-        logs = float(of.rows @ np.log(factors)) + float(np.linalg.slogdet(inner)[1].sum())
+        logs = float(of.rows @ np.log(factors)) + 2.0 * float(np.linalg.slogdet(factor)[1].sum())
         self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.abs(np.diag(self.L))).sum()) + left)
 
     def _parts(self, *, always: bool = False) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:

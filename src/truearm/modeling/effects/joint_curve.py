@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import ClassVar, Final
 
 import numpy as np
@@ -40,7 +40,7 @@ class JointCurve(LinearEffect):
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Sine and cosine of every period of each turning joint."""
-        return tuple(self.parameter(name, "rad", PRIOR) for names in self.terms.values() for name in names)
+        return _parameters_of(tuple(self.layout.turning))
 
     @cached_property
     def terms(self) -> Mapping[int, tuple[str, ...]]:
@@ -72,6 +72,13 @@ class JointCurve(LinearEffect):
             parts = [amounts @ curve_waves(q[n : n + _AT_ONCE], highest) for n in range(0, len(q), _AT_ONCE)]
             moved[i] = np.concatenate(parts, axis=-1) if parts else np.zeros((*amounts.shape[:-1], 0))
         return moved
+
+
+@lru_cache(maxsize=16)
+def _parameters_of(turning: tuple[int, ...]) -> tuple[Parameter, ...]:
+    """Return the parameters of joints (from 0): hundreds of them, which every robot that is tried with curves has."""
+    names = (name for i in turning for name in curve_names(i + 1))
+    return tuple(Parameter.plain(name, "rad", JointCurve.name, 0.0, PRIOR) for name in names)
 
 
 def curve_names(number: int) -> tuple[str, ...]:

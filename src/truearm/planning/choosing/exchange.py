@@ -177,6 +177,7 @@ def exchanged(candidates: Candidates, chosen: list[int], objective: Objective) -
     """Exchange each of the chosen for a better one as long as there is one."""
     chosen = list(chosen)
     total = candidates.total(chosen)
+    reached = objective.value(total)
     for _ in range(_ROUNDS):
         changed = False
         own = candidates.information(np.array(chosen, dtype=np.intp))
@@ -185,9 +186,11 @@ def exchanged(candidates: Candidates, chosen: list[int], objective: Objective) -
             without = total - own[place]
             others = chosen[:place] + chosen[place + 1 :]
             best, information = _best(candidates, without, objective, promise[:, place], others)
-            gain = objective.value(without + information) - objective.value(total)
-            if best != old and gain > _LEAST_GAIN:
-                chosen[place], total, changed = best, without + information, True
+            if best == old:
+                continue
+            exchanged_for = objective.value(without + information)
+            if exchanged_for - reached > _LEAST_GAIN:
+                chosen[place], total, reached, changed = best, without + information, exchanged_for, True
         if not changed:
             break
     return chosen

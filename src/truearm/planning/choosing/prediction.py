@@ -122,8 +122,8 @@ def variances(candidates: Sensitivity, measured: NDArray[np.intp], elsewhere: Se
     rows = rows.reshape(-1, len(known))
     information = rows.T @ rows
     spread = (1.0 - _COMMON_SHARE) * information + _COMMON_SHARE * (together.T @ together) + known
-    moved = elsewhere.rows @ np.linalg.solve(known + information, np.linalg.cholesky(spread))
-    return np.asarray(np.mean(np.sum(moved**2, axis=2), axis=1))
+    root = np.linalg.solve(known + information, np.linalg.cholesky(spread))
+    return np.tensordot(elsewhere.squares, root @ root.T, 2)
 
 
 def model_error(candidates: Sensitivity, measured: NDArray[np.intp], elsewhere: Sensitivity, noise: float) -> Array:

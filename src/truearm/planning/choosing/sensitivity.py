@@ -54,6 +54,11 @@ class Sensitivity:
         priors = np.diag((self.size / self.free.prior) ** 2)
         return priors if self.beside is None else priors + self.beside
 
+    @cached_property
+    def squares(self) -> Array:
+        """Mean product of the derivatives of a coordinate, ``(configurations, parameters, parameters)``."""
+        return np.asarray(self.rows.swapaxes(1, 2) @ self.rows / self.rows.shape[1])
+
     def identifiable(self, count: int) -> NDArray[np.intp]:
         """Return the indices of parameters that `count` average configurations can tell from all others."""
         R = np.linalg.qr(self.rows.reshape(-1, self.rows.shape[2]), mode="r")

@@ -155,9 +155,9 @@ class _Search:
         """Return of which rows ``(n, points, 3)`` all points are reached."""
         wanted = points.reshape(-1, 3)
         missed = np.arange(len(wanted))
-        samples = np.asarray(self._tree.query(wanted, _SEEDS)[1])
-        for sample in samples.T:
-            missed = missed[~self._met(wanted[missed], self._joints[sample[missed]])]
+        for nearest in range(1, _SEEDS + 1):
+            sample = np.asarray(self._tree.query(wanted[missed], [nearest])[1])[:, 0]
+            missed = missed[~self._met(wanted[missed], self._joints[sample])]
         lost = np.zeros(len(wanted), dtype=bool)
         lost[missed] = True
         return np.asarray(~lost.reshape(points.shape[:2]).any(axis=1))
@@ -167,11 +167,11 @@ class _Search:
         met = np.zeros(len(wanted), dtype=bool)
         going = np.arange(len(wanted))
         for _ in range(_MOST_STEPS):
-            state = self._tip.at(q)
-            error = wanted[going] - state.position
+            position, linear = self._tip.moved(q)
+            error = wanted[going] - position
             left = np.linalg.norm(error, axis=1) > _REACHED * self._length
             met[going[~left]] = True
-            going, q, error, J = going[left], q[left], error[left], state.jacobian[left, :3]
+            going, q, error, J = going[left], q[left], error[left], linear[left]
             normal = J @ J.swapaxes(1, 2) + (_DAMPING * self._length) ** 2 * np.eye(3)
             q = np.clip(q + (J * np.linalg.solve(normal, error[:, :, None])).sum(1), *self._limits)
         return met

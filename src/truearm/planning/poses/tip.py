@@ -59,6 +59,11 @@ class Tip:
             np.concatenate([to_base @ part.transpose(2, 1, 0) for part in (linear, angular)], axis=1),
         )
 
+    def moved(self, q: Array) -> tuple[Array, Array]:
+        """Return positions ``(n, 3)`` [m] and their derivatives by the joint positions ``(n, 3, joints)`` alone."""
+        position, linear = self.robot.moved_point(q, self.target)
+        return (position - self._origin) @ self._rotation, self._rotation.T @ linear
+
     def positions(self, q: Array | Postures) -> Array:
         """Return positions alone, ``(n, 3)`` [m]."""
         position = self.robot.forward_kinematics(q, self.target).position

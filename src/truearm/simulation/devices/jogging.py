@@ -62,7 +62,7 @@ def jogged(nominal: Robot, arm: Arm, target: str, joints: Array, gap: Gap) -> Ar
                 came=f"{beyond} of {len(joints)} postures beyond them",
                 cure="The truth is too far from the nominal robot: take another seed, or another truth.",
             )
-        joints += _least(nominal.joint_jacobian(joints, target)[:, :3], missing)
+        joints += _least(nominal.moved_point(joints, target)[1], missing)
     raise InputError(
         "the tool cannot be jogged to the place of measurement",
         where=nominal.name,
@@ -115,11 +115,12 @@ def postures_at(
         of = np.repeat(open_goals, max(2, min(_STARTS, _TOGETHER // len(open_goals))))
         q = nominal.random_configurations(len(of), rng)
         for _ in range(_STEPS):
-            missing = goals[of] - nominal.world_poses(q, target)[0]
+            place, linear = nominal.moved_point(q, target)
+            missing = goals[of] - place
             far = np.linalg.norm(missing, axis=1)
             if np.mean(far < 1e-8) > _MOST:
                 break
-            q = q + _least(nominal.joint_jacobian(q, target)[:, :3], missing)
+            q = q + _least(linear, missing)
         place, _ = nominal.world_poses(q, target)
         good = np.linalg.norm(goals[of] - place, axis=1) < 1e-8
         good &= ((q > low + room) & (q < high - room)).all(axis=1)
@@ -158,11 +159,12 @@ def followed(nominal: Robot, target: str, joints: Array, places: Array) -> tuple
     q, went, whole = joints, [], np.ones(len(joints), dtype=bool)
     for goal in places:
         for _ in range(_STEPS):
-            missing = goal - nominal.world_poses(q, target)[0]
+            place, linear = nominal.moved_point(q, target)
+            missing = goal - place
             far = np.abs(missing).max(axis=1)
             if float(far.max(where=whole, initial=0.0)) < _REACHED:
                 break
-            q = q + _least(nominal.joint_jacobian(q, target)[:, :3], missing)
+            q = q + _least(linear, missing)
         whole = whole & (far < _REACHED) & ((q > low + _MARGIN) & (q < high - _MARGIN)).all(axis=1)
         went.append(q)
     return np.array(went), whole

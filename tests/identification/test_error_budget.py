@@ -82,6 +82,18 @@ def test_the_shares_add_up_to_the_held_out_square() -> None:
     assert line.endswith(f"mm, held out {summary['rms_mm']:.3f} mm, the same within its uncertainty")
 
 
+def test_noise_that_nobody_declared_is_apparent_and_large_shares_are_told_though_they_may_be_chance() -> None:
+    budget, *_ = judged("random", 20, 0.02e-3, 1, declared=None)
+    (line,) = budget_lines(budget)
+    assert line.startswith("What limits the accuracy: apparent noise 0.03")
+    unsure = tuple(
+        replace(share, square=4e-6, deviation=3e-6) if share.source == "parameters" else share
+        for share in budget.shares
+    )
+    (line,) = budget_lines(replace(budget, shares=unsure))
+    assert line.startswith("What limits the accuracy: uncertain parameters perhaps 2.000 mm, apparent noise 0.03")
+
+
 def test_noise_alone_is_the_instruments() -> None:
     budgets = [judged("random", 60, 0.05e-3, seed)[0] for seed in range(5)]
     for budget in budgets:

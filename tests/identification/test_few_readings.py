@@ -94,3 +94,28 @@ def test_a_check_counts_the_numbers() -> None:
     (notice,) = check("ur5e", in_turn(16, 0, declared=False)).warnings[-1:]
     assert notice.code == FEW_READINGS
     assert "48 numbers, for 41 parameters of the geometric model" in notice.message
+
+
+def test_next_after_such_a_check_is_to_measure_more() -> None:
+    steps = check("ur5e", in_turn(16, 0, declared=False)).next
+    assert [step.code for step in steps][-1] == "measure-more"
+    assert not {"calibrate"} & {step.code for step in steps}
+
+
+def test_errors_that_the_fit_has_eaten_do_not_make_data_narrow() -> None:
+    """With nothing held out the expected error of an honest campaign was many times what the fit had left."""
+    whole = replace(campaign("irb120", 13, NOISE, 3)[1], sigma=None)
+    one = replace(whole, position=np.where((whole.target == 0)[:, None], whole.position, np.nan))
+    for poses, few in ((11, True), (13, False)):
+        found = calibrate("irb120", one.of_configurations(np.arange(poses)), train="all")
+        codes = [notice.code for notice in found.warnings]
+        assert (FEW_READINGS in codes) is few
+        assert "narrow-data" not in codes
+
+
+def test_a_loss_that_may_meet_readings_exactly_needs_more_of_them() -> None:
+    data = campaign("irb120", 16, NOISE, 3)[1]
+    data = replace(data, position=np.where((data.target == 0)[:, None], data.position, np.nan))
+    (notice,) = check_few_readings(identify(load_robot("irb120"), data, named_model("geometric"), loss="cauchy"))
+    assert notice.level == "error"
+    assert not check_few_readings(identify(load_robot("irb120"), data, named_model("geometric"), loss="huber"))

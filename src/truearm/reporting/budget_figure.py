@@ -10,7 +10,7 @@ import numpy as np
 from truearm.identification.judging.error_budget import ErrorBudget, Share, shown_shares
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded, significant
-from truearm.results.budgets import SOURCES
+from truearm.results.budgets import name_of
 
 _NEGATIVE = "#b3261e"
 #: Height of a bar with its gap, and of what stands around them.
@@ -33,7 +33,7 @@ def budget_rows(budget: ErrorBudget) -> tuple[BudgetRow, ...]:
     """Return a row for each source, and one for what they add up to."""
     rows = [
         BudgetRow(
-            SOURCES[share.source],
+            name_of(share),
             "–" if share.rms is None else _signed(share.rms * 1e3),
             "–" if share.square is None else _percent(share.square, budget.square),
             "–" if share.square is None else _squares(share.square, share.deviation),
@@ -66,7 +66,7 @@ def _stairs(shares: Sequence[Share], total: float, together: str) -> Figure:
     ends = np.cumsum(squares)
     begins = np.concatenate([ends - squares, [0.0]])
     lengths = np.concatenate([squares, [total * 1e6]])
-    names = [*(SOURCES[share.source] for share in shares), together]
+    names = [*map(name_of, shares), together]
     roots = [_signed(float(np.sign(s) * np.sqrt(abs(s)))) for s in lengths]
     parts = [_percent(s, total * 1e6) for s in lengths.tolist()]
     trace = {

@@ -9,7 +9,7 @@ from typing import Any, Final
 from truearm.identification.judging.error_budget import ErrorBudget, Share
 
 #: What the sources are called where people read.
-SOURCES: Final = {
+_SOURCES: Final = {
     "instrument": "instrument noise",
     "table": "table motion",
     "repeatability": "repeatability",
@@ -17,11 +17,19 @@ SOURCES: Final = {
     "parameters": "uncertain parameters",
     "remainder": "remainder",
 }
+_APPARENT: Final = "apparent noise"
 
 #: Many times the shares is not called the same, however uncertain: outliers make anything uncertain.
 _ALIKE: Final = 3.0
 #: Standard deviations of a share beyond which it is more than chance.
 _SURE: Final = 2.0
+#: Part of all shares from which one is told that may be chance.
+_LARGE: Final = 0.25
+
+
+def name_of(share: Share) -> str:
+    """Return what a source is called: noise of readings without declared deviations need not be the instrument's."""
+    return _APPARENT if share.apparent else _SOURCES[share.source]
 
 
 def budget_summary(budget: ErrorBudget) -> dict[str, Any]:
@@ -59,15 +67,22 @@ def _sum(shares: Sequence[Share]) -> float:
 
 
 def budget_lines(budget: ErrorBudget | None) -> list[str]:
-    """Return what limits the accuracy in a line: the shares that are more than chance, the largest first."""
+    """Return what limits the accuracy in a line: the shares that are more than chance, or large, the largest first."""
     if budget is None:
         return []
     places = min(max(3, 1 - math.floor(math.log10(max(budget.rms * 1e3, 1e-9)))), 6)
-    sure = [share for share in budget.shares if share.source != "remainder" and _is_sure(share)]
-    sure.sort(key=lambda share: -(share.square or 0.0))
-    parts = [f"{SOURCES[share.source]} {(share.rms or 0.0) * 1e3:.{places}f} mm" for share in sure]
     what = "held out" if budget.held_out else "to expect at configurations like these"
     shares = sum(share.square or 0.0 for share in budget.shares if share.source != "remainder")
+    told = [
+        share
+        for share in budget.shares
+        if share.source != "remainder" and (_is_sure(share) or (share.square or 0.0) > _LARGE * max(shares, 0.0))
+    ]
+    told.sort(key=lambda share: -(share.square or 0.0))
+    parts = [
+        f"{name_of(share)} {'' if _is_sure(share) else 'perhaps '}{(share.rms or 0.0) * 1e3:.{places}f} mm"
+        for share in told
+    ]
     together = math.sqrt(max(shares, 0.0))
     rest = "the same within its uncertainty" if budget.held_out else "which is their sum"
     if budget.held_out and not (budget.remainder_is_chance and budget.square < _ALIKE * shares):
@@ -75,7 +90,7 @@ def budget_lines(budget: ErrorBudget | None) -> list[str]:
         rest = f"in squares {abs(left) * 1e3:.{places}f} mm {'more' if left > 0.0 else 'less'} than they explain"
     for share in budget.shares:
         if share.square is not None and share.source != "remainder" and share.square < -_SURE * share.deviation:
-            rest += f"; {SOURCES[share.source]} takes {abs(share.rms or 0.0) * 1e3:.{places}f} mm away, see the report"
+            rest += f"; {name_of(share)} takes {abs(share.rms or 0.0) * 1e3:.{places}f} mm away, see the report"
     return [
         f"What limits the accuracy: {', '.join(parts) or 'nothing that is more than chance'}; all shares together, in "
         f"squares, {together * 1e3:.{places}f} mm, {what} {budget.rms * 1e3:.{places}f} mm, {rest}"

@@ -59,12 +59,15 @@ class Share:
         Standard deviation of the square [m^2].
     words
         What it was estimated from, what it may hold besides, or why it is not known.
+    apparent
+        Whether it is the scatter of readings whose deviations were not declared.
     """
 
     source: Source
     square: float | None
     deviation: float
     words: str
+    apparent: bool = False
 
     @property
     def rms(self) -> float | None:
@@ -215,7 +218,13 @@ def error_budget(
     returned = 0.0 if again is None else again.square
     beyond = seen.square + taken - seen.noise - left - returned
     shares = [
-        Share("instrument", judged.noise, _noise_deviation(fit, seen, judged), _instrument_words(fit, judged)),
+        Share(
+            "instrument",
+            judged.noise,
+            _noise_deviation(fit, seen, judged),
+            _instrument_words(fit, judged),
+            apparent=not fit.declared,
+        ),
         _table_share(table, kind),
         Share("repeatability", None, 0.0, "no posture was visited again: it is in what the model cannot express")
         if again is None

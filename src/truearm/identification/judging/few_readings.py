@@ -15,8 +15,9 @@ from truearm.units import from_si
 FEW_READINGS: Final = "few-readings"
 #: Numbers left by the parameters from which the readings tell their noise within a third.
 _ENOUGH: Final = 10.0
-#: Share of the numbers that parameters must leave for sums of absolute values, which meet as many exactly.
-_LEAST_SHARE: Final = 0.5
+#: Share of the numbers that parameters must leave for losses that may meet as many readings exactly, and doubt others.
+_LEAST_SHARE: Final = 2.0 / 3.0
+_MEETING: Final = ("cauchy", *ABSOLUTE)
 #: Numbers for each free parameter from which a robust fit tells which reading is wrong.
 _FEWEST_TO_DOUBT: Final = 1.5
 #: Deviations of a normal variable that 95 % are above.
@@ -32,7 +33,7 @@ def check_few_readings(fit: Fit) -> list[Notice]:
     It is an error for losses other than the linear one, whose deviations follow from what is left.
     """
     left = max(fit.numbers - fit.spent, 0.0)
-    enough = max(_ENOUGH, _LEAST_SHARE * fit.numbers) if fit.loss in ABSOLUTE else _ENOUGH
+    enough = max(_ENOUGH, _LEAST_SHARE * fit.numbers) if fit.loss in _MEETING else _ENOUGH
     if left >= enough and not fit.assumed:
         return []
     words = (

@@ -114,7 +114,9 @@ def judge(
     if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
         explained = check_remainder(left_over)
     narrow: list[Notice] = []
-    if not bent and not unlike and (hidden or not wrong_sigma):  # more configurations do not mend these
+    few = check_few_readings(fit)
+    eaten = bool(few) and not held_out  # then the error of the readings says nothing of the fit
+    if not bent and not unlike and not eaten and (hidden or not wrong_sigma):  # more configurations do not mend these
         if fit.model.groups and "geometry" not in fit.model.groups:
             narrow = check_narrow_data_without_geometry(fit, training, errors, loss, held_out=held_out)
         narrow = narrow or check_narrow_data(fit, expected, training, errors, held_out=held_out)
@@ -124,7 +126,7 @@ def judge(
         *wrong_robot,
         *of_split,
         *check_payload(fit.start),
-        *check_few_readings(fit),
+        *few,
         *(n for n in check_fit(fit, expected, doubted=doubted) if not bent or n.code != "residuals-exceed-sigma"),
         *narrow,
         *(notice for notice in noticed if notice.level != "error"),

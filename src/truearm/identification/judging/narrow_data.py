@@ -103,6 +103,8 @@ def check_narrow_data(
         return []
     fit = replace(fit, joint_error=expected.joint_error)
     known = of_readings.mean
+    if not held_out:  # the parameters have taken their part of these
+        known *= math.sqrt(fit.numbers / max(fit.numbers - fit.spent, 1.0))
     low, high = expected.overall.interval_90
     mean = expected.overall.mean
     if (judged.position is None or fit.gauge_freedoms) and mean > _NEGLIGIBLE:

@@ -188,7 +188,9 @@ def steps_after_check(
         off = off_configurations(left)
         steps, _ = _of_left_over(left, off, what_moved(left, off), _known(errors), checked=True)
     steps += _cures(notices, steps)
-    if not robot:
+    if any(notice.code == FEW_READINGS for notice in notices):
+        steps.append(NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters are."))
+    elif not robot:
         steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
     elif not any(step.code in ("other-model", "give-loads") for step in steps):
         told = left is not None and can_explain(left)

@@ -25,8 +25,8 @@ _PAUSE: Final = 0.5
 _MODELS: Final = (*(model.name for model in MODELS), AUTO, FRAMES.name)
 _STALE: Final = Notice(
     "other-settings",
-    "The figures below were made with other settings than those above. Calibrate again, or look at the page Proof: its "
-    "first line says what the result is of.",
+    "The figures below were made with another robot, payload, exclusions or settings than are chosen now. Calibrate "
+    "again, or look at the page Proof: it says what the result is of, and what differs.",
 )
 
 
@@ -50,7 +50,7 @@ class CalibratePage:
         self._lines, self._made = "", self._asked()
         self._course = Picture(window, "Cost and error, step by step", 0.75)
         self._now = gui.add_html("")
-        gui.add_html(words.paragraph("The result is judged on configurations that the fit has not seen."))
+        self._judged = gui.add_html("")
         self._said = gui.add_html("")
         self._data.on_update(window.action(lambda: choose_measurements(window, chosen(self._data))))
         self._model.on_update(window.action(lambda: window.edit(model=self._model.value)))
@@ -68,6 +68,11 @@ class CalibratePage:
         offer(self._loss, LOSSES, settings.loss, None)
         self._train.value = "" if settings.train is None else str(settings.train)
         self._seed.value = str(settings.seed)
+        self._judged.content = words.paragraph(
+            "Nothing is held out: the errors flatter the model."
+            if settings.train == "all"
+            else "The result is judged on configurations that the fit has not seen."
+        )
         self._said.content, stale = self._lines, bool(self._lines) and self._made != self._asked()
         self._now.content = words.notice(_STALE) if stale else ""
 

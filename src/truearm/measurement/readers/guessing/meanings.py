@@ -52,7 +52,7 @@ _LABEL: Final = frozenset(
     | {"station", "group", "no", "nr", "number", "index", "pt", "measurement", "messung", "pkt"}
 )
 _TARGET: Final = frozenset(
-    {"target", "ball", "smr", "reflector", "marker", "prism", "nest", "kugel", "feature", "body"}
+    {"target", "ball", "smr", "reflector", "reflektor", "marker", "prism", "nest", "kugel", "feature", "body"}
 )
 _TIME: Final = frozenset(
     {"time", "timestamp", "stamp", "date", "datum", "zeit", "uhrzeit", "datetime", "when", "day", "tag", "clock"}

@@ -63,7 +63,8 @@ def test_a_program_is_drawn_before_and_after_its_correction(
     serving: Serving, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, calibrated: Path
 ) -> None:
     folder = project(tmp_path)
-    window = serving(folder).window
+    studio = serving(folder)
+    window = studio.window
     page = programs(window)
     (jog,) = (page for page in window.pages if isinstance(page, JogPage))
     at_once(window, monkeypatch)
@@ -90,6 +91,12 @@ def test_a_program_is_drawn_before_and_after_its_correction(
     assert "This result is of the robot irb120, and gp25 is chosen" in proof._now.content
     window.edit(robot="irb120")
     assert "This result is of the robot" not in proof._now.content
+    typed(studio, page._accept, "nonsense, maker")
+    assert window.project.settings.accept == ("nonsense", "maker")
+    act(page._run)
+    assert "accept: there is no status or notice of this name" in notices(window)
+    typed(studio, page._accept, "")
+    assert window.project.settings.accept is None
     act(page._run)
     made = compensate(
         folder / "result/calibrated.yaml", [folder / "plate.mod"], taught=["none"], controller_kinematics="nominal"
@@ -305,6 +312,7 @@ def test_the_command_that_the_report_names_does_the_same(
         "tool",
         ["none"],
         "nominal",
+        ["maker", "not-better-here"],
         print,
     )
     found = re.search(

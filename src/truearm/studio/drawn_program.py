@@ -86,6 +86,7 @@ def corrected_program(
     wrench_frame: WrenchFrame | None,
     taught: Sequence[str] | None,
     controller_kinematics: str | None,
+    accept: Sequence[str],
     progress: Progress,
 ) -> DrawnProgram:
     """Correct a program and write it, :func:`truearm.compensate`, and find where the real robot goes with it."""
@@ -107,7 +108,10 @@ def corrected_program(
             wrench_frame=wrench_frame,
             taught=taught,
             controller_kinematics=controller_kinematics,
-            command=compensate_command(robot, program, places, wrench, wrench_frame, taught, controller_kinematics),
+            accept=accept,
+            command=compensate_command(
+                robot, program, places, wrench, wrench_frame, taught, controller_kinematics, accept
+            ),
             progress=progress,
         )
         progress("drawing the program")

@@ -66,6 +66,8 @@ class Settings(BaseModel):
         As for :func:`truearm.compensate`; None if that was not said.
     controller_kinematics
         Likewise.
+    accept
+        Names of what may speak against the calibration or a correction, likewise.
     corrected
         Folder of the corrected program.
     constraints
@@ -101,6 +103,7 @@ class Settings(BaseModel):
     wrench_frame: WrenchFrame | None = None
     taught: tuple[_Name, ...] | None = None
     controller_kinematics: _Name | None = None
+    accept: tuple[_Name, ...] | None = None
     corrected: _Name = "result/corrected"
     constraints: _Name | None = None
     path: _Name | None = None

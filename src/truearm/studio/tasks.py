@@ -83,6 +83,7 @@ def compensate_command(
     wrench_frame: str | None,
     taught: Sequence[str] | None,
     controller_kinematics: str | None,
+    accept: Sequence[str],
 ) -> str:
     """Return the command that does the same in the project's folder, as the report shows it.
 
@@ -90,7 +91,7 @@ def compensate_command(
     ----------
     places
         The files that say where tools and frames are.
-    wrench, wrench_frame, taught, controller_kinematics
+    wrench, wrench_frame, taught, controller_kinematics, accept
         As the job takes them.
     """
     words = ["truearm", "compensate", robot, program]
@@ -100,4 +101,5 @@ def compensate_command(
     words += [] if wrench_frame is None else ["--wrench-frame", wrench_frame]
     words += [] if controller_kinematics is None else ["--controller-kinematics", controller_kinematics]
     words += [] if taught is None else ["--taught", ",".join(taught)]
+    words += [word for name in accept for word in ("--accept", name)]
     return shlex.join([*words, "--out", "DIR"])

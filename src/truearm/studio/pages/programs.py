@@ -32,7 +32,7 @@ _REPORT: Final = "report"
 _UNSAID: Final = "(not said)"
 #: Settings that count for the drawing of a program, and for its correction.
 _DRAWN: Final = ("robot", "program")
-_ASKED: Final = ("cell", "wrench", "wrench_frame", "taught", "controller_kinematics")
+_ASKED: Final = ("cell", "wrench", "wrench_frame", "taught", "controller_kinematics", "accept")
 _CORRECTED: Final = (*_DRAWN, "result", "corrected", *_ASKED)
 #: What was taught at the robot, as the job takes it.
 _TAUGHT: Final = (
@@ -58,6 +58,7 @@ class ProgramsPage:
         self._kinematics = gui.add_dropdown(
             "Controller has", (_UNSAID, *STATED), hint="with what it turns poses into joint positions; or a file"
         )
+        self._accept: Any = gui.add_text("Accept", "", hint="names of what a refusal names, with commas between")
         self._read = gui.add_button("Draw the program")
         self._run = gui.add_button("Correct the program")
         self._space = ProgramInSpace(window)
@@ -73,6 +74,7 @@ class ProgramsPage:
         self._kinematics.on_update(
             window.action(lambda: window.edit(controller_kinematics=chosen(self._kinematics, _UNSAID)))
         )
+        self._accept.on_update(window.settled(self._accepted))
         self._read.on_click(window.action(self._show))
         self._run.on_click(window.action(self._correct))
         self._downloads.on_click(window.action(self._download))
@@ -90,6 +92,7 @@ class ProgramsPage:
         self.force.refresh()
         offer(self._taught, _TAUGHT, None if settings.taught is None else ", ".join(settings.taught), _UNSAID)
         offer(self._kinematics, (*STATED, *kinematics_files(project)), settings.controller_kinematics, _UNSAID)
+        self._accept.value = ", ".join(settings.accept or ())
         if self._told_of.differs(window):
             self._said.content, self._told_of = "", _Of()
         if self._of.differs(window):
@@ -120,6 +123,10 @@ class ProgramsPage:
     def _teach(self) -> None:
         said = chosen(self._taught, _UNSAID)
         self._window.edit(taught=None if said is None else said.split(", "))
+
+    def _accepted(self) -> None:
+        names = tuple(name.strip() for name in self._accept.value.split(",") if name.strip())
+        self._window.edit(accept=names or None)
 
     def _show(self) -> None:
         window, settings = self._window, self._window.project.settings
@@ -177,6 +184,7 @@ class ProgramsPage:
             wrench_frame=settings.wrench_axes,
             taught=settings.taught,
             controller_kinematics=settings.controller_kinematics,
+            accept=settings.accept or (),
         )
 
     def _done(self, drawn: DrawnProgram, of: _Of) -> None:

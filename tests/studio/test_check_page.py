@@ -15,7 +15,9 @@ from tests.studio.pressing import act, at_once, notices
 from truearm.errors import InputError
 from truearm.jobs import following
 from truearm.jobs.calibrate import calibrate
+from truearm.library import load_robot
 from truearm.measurement.readers.canonical import csv_text
+from truearm.modeling.formats.robot_file import robot_text
 from truearm.notices import Notice
 from truearm.studio.checked import Checked
 from truearm.studio.pages.calibrate import CalibratePage
@@ -256,3 +258,20 @@ def test_readings_without_a_place_are_chosen_and_not_drawn() -> None:
     assert found.rows_of((("2", "a"), ("9", "z"))).tolist() == [2]
     assert found.named([1, 2]) == {("1", "b"): (), ("2", "a"): ((3.0,),)}
     assert Notice("x", "y") == Notice("x", "y", at=(("1", "a"),))
+
+
+def test_files_that_were_edited_under_their_names_make_what_stands_there_old(window: Window) -> None:
+    page, _ = page_of(window)
+    (calibrating,) = (page for page in window.pages if isinstance(page, CalibratePage))
+    folder = window.project.folder
+    (folder / "arm.yaml").write_text(robot_text(load_robot("irb120")))
+    window.edit(robot="arm.yaml")
+    act(page._run)
+    act(calibrating._run)
+    assert calibrating._now.content == ""
+    for name in ("arm.yaml", "data.csv"):
+        act(page._run)
+        (folder / name).write_text((folder / name).read_text() + "\n")
+        window._reload()
+        assert "Robot or measurements have changed: check again." in page._found.content
+        assert "(other-settings)" in calibrating._now.content

@@ -86,7 +86,7 @@ def stamps_of(project: Project) -> tuple[Any, ...]:
     files = project.settings.performance
     plan = () if files.plan is None else sorted(project.path(files.plan).parent.glob("*.y*ml"))
     chosen = [project.path(name) for name in (getattr(files, one) for one in (*_MEASURED, *_HOW)) if name is not None]
-    robot = project.path(project.settings.robot.partition("#")[0])  # no file for a robot of the library
+    robot = project.robot_file()  # no file for a robot of the library
     return tuple((path, stamp_of(path)) for path in (*plan, *chosen, robot))
 
 

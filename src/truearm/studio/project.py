@@ -132,6 +132,10 @@ class Project:
         name = self.settings.robot
         return name if name in library() else self.path(name, "robot")
 
+    def robot_file(self) -> Path:
+        """Return the path of the robot's file, without the part of it that is named; of a library id none is there."""
+        return self.path(self.settings.robot.partition("#")[0], "robot")
+
     def file(self, setting: str) -> Path | None:
         """Return the path that a setting names; None if it names none."""
         name = getattr(self.settings, setting)
@@ -325,6 +329,15 @@ class Project:
                     continue
                 found[self.relative(here / name)] = (known.st_size, known.st_mtime_ns)
         return found
+
+
+def stamp_of(path: Path | None) -> tuple[str, int, int] | None:
+    """Return path, size and time of the last change of a file, which tell whether it changed; None if none is there."""
+    try:
+        known = None if path is None else path.stat()
+    except (OSError, ValueError):
+        known = None
+    return None if known is None else (str(path), known.st_size, known.st_mtime_ns)
 
 
 def _is_among(name: str, names: Iterable[str]) -> bool:

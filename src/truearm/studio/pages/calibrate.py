@@ -17,6 +17,7 @@ from truearm.studio.fit_course import fit_course
 from truearm.studio.pages.check import choose_measurements, data_of
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pictures import Picture
+from truearm.studio.project import stamp_of
 from truearm.studio.tasks import Outcome, calibrate
 from truearm.studio.window import Window
 
@@ -81,7 +82,8 @@ class CalibratePage:
         project = self._window.project
         of, excluded = project.settings, project.file("exclude")
         without = read_text(excluded) if excluded is not None and exists(excluded) else ""
-        return of.robot, of.data, of.model, of.train, of.seed, of.loss, of.payload, without, of.result
+        files = stamp_of(project.robot_file()), stamp_of(project.file("data"))
+        return of.robot, of.data, files, of.model, of.train, of.seed, of.loss, of.payload, without, of.result
 
     def _calibrate(self) -> None:
         window, settings = self._window, self._window.project.settings

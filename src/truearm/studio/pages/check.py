@@ -17,6 +17,7 @@ from truearm.studio import words
 from truearm.studio.checked import Checked, checked, with_exclusions
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.jog import JogPage
+from truearm.studio.project import stamp_of
 from truearm.studio.window import Window
 
 #: What is chosen instead of a finding, and instead of a reading.
@@ -232,10 +233,9 @@ class CheckPage:
     # -- what is shown is of what --------------------------------------------------------------------------
 
     def _now(self) -> tuple[Any, ...]:
-        settings, data = self._window.project.settings, self._window.project.file("data")
-        stat = None if data is None or not exists(data) else data.stat()
-        stamp = stat and (stat.st_size, stat.st_mtime_ns)
-        return settings.robot, (settings.data, stamp), self._excluded
+        project = self._window.project
+        data = (project.settings.data, stamp_of(project.file("data")))
+        return (project.settings.robot, stamp_of(project.robot_file())), data, self._excluded
 
 
 def choose_measurements(window: Window, name: str | None) -> None:

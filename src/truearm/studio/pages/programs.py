@@ -22,6 +22,7 @@ from truearm.studio.drawn_program import DrawnProgram, corrected_program, read_p
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.fields import Fields
 from truearm.studio.pages.program_in_space import ProgramInSpace
+from truearm.studio.project import stamp_of
 from truearm.studio.window import Window
 
 #: Whose axes a force is in where nothing was said.
@@ -150,7 +151,7 @@ class ProgramsPage:
         window, project = self._window, self._window.project
         folder, program = project.file("corrected"), project.file("program")
         written = () if folder is None or program is None else _stamps(folder / program.name)
-        beside = () if folder is None else (_stamp(folder / REPORT), _stamp(folder / MANIFEST))
+        beside = () if folder is None else (stamp_of(folder / REPORT), stamp_of(folder / MANIFEST))
         at = (project.settings, _Of.now(window, _CORRECTED), written, beside)
         if at != self._corrected_at:
             self._corrected = corrected_now(project, lambda: (window.calibrated(), window.result_of_another()))
@@ -238,11 +239,11 @@ class _Of:
             said = getattr(project.settings, name)
             state.append(said)
             if name == "result":
-                state += [_stamp(project.path(f"{said}/{file}")) for file in RESULT_FILES[:2]]
+                state += [stamp_of(project.path(f"{said}/{file}")) for file in RESULT_FILES[:2]]
             elif name == "program" and said is not None:
                 state += _stamps(project.path(said))
             elif isinstance(said, str) and name != "corrected":
-                state.append(_stamp(project.path(said)))
+                state.append(stamp_of(project.path(said)))
         return cls(named, tuple(state))
 
     def differs(self, window: Window) -> bool:
@@ -253,13 +254,4 @@ class _Of:
 def _stamps(program: Path) -> tuple[Any, ...]:
     """Return the stamps of a program and of all files of its name: those that belong to it, and its record."""
     beside = sorted(program.parent.glob(f"{escape(program.stem)}.*")) if exists(program.parent) else []
-    return tuple((path.name, _stamp(path)) for path in beside)
-
-
-def _stamp(path: Path) -> tuple[int, int] | None:
-    """Return size and time of the last change of a file; None if there is none."""
-    try:
-        known = path.stat()
-    except (OSError, ValueError):
-        return None
-    return known.st_size, known.st_mtime_ns
+    return tuple((path.name, stamp_of(path)) for path in beside)

@@ -17,6 +17,7 @@ from truearm.studio.made_with import MadeWith, made_with
 from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.error_arrows import ErrorArrows
 from truearm.studio.pictures import Picture, report_figures
+from truearm.studio.project import stamp_of
 from truearm.studio.window import Window
 
 _PARTS: Final = (("nominal", "before"), ("validation", "after, held out"), ("train", "after, training"))
@@ -57,9 +58,9 @@ class ProofPage:
             return
         stat = (folder / "result.json").stat()
         settings = project.settings
-        robot = project.path(settings.robot.partition("#")[0])  # no file for a robot of the library
+        robot = project.robot_file()  # no file for a robot of the library
         others = (folder / "calibrated.yaml", project.file("data"), project.file("exclude"), robot)
-        shown = (folder, stat.st_mtime_ns, stat.st_size, *map(_stamp, others), settings.dark, settings.robot)
+        shown = (folder, stat.st_mtime_ns, stat.st_size, *map(stamp_of, others), settings.dark, settings.robot)
         shown += (settings.model, settings.train, settings.seed, settings.loss, settings.payload, settings.data)
         if shown == self._shown:
             return
@@ -147,14 +148,6 @@ def _read_result(path: Path) -> dict[str, Any]:
     if not isinstance(result, dict) or not str(result.get("truearm")).startswith("truearm-result/"):
         raise _no_result(path)
     return result
-
-
-def _stamp(file: Path | None) -> tuple[str, int, int] | None:
-    """Return what tells whether a file has changed."""
-    if file is None or not exists(file):
-        return None
-    stat = file.stat()
-    return str(file), stat.st_mtime_ns, stat.st_size
 
 
 def _no_result(path: Path) -> InputError:

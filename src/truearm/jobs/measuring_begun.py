@@ -75,12 +75,19 @@ def begin(
             value, was = value[changed[0]], f"{was[changed[0]]} ({changed[0]})"
         elif was == json.loads(json.dumps(value)):
             continue
+        came, allowed = json.dumps(value), f"{was if name == 'about' else json.dumps(was)}"
+        if name == "plan":  # a hash
+            came, allowed = "the plan as it is now", "the plan as it was then"
+        elif name == "robot":  # a name and a hash
+            came, allowed = (str(said).rpartition(" ")[0] for said in (value, was))
+            if came == allowed:
+                came, allowed = f"{came} with other values", f"{allowed} as it was then"
         raise InputError(
             f"the measuring in this folder began with another {_CALLED.get(name, name)}",
             parameter="out",
             where=str(path),
-            came="another one" if name in ("plan", "robot") else json.dumps(value),
-            allowed=None if name in ("plan", "robot") else f"{was if name == 'about' else json.dumps(was)}",
+            came=came,
+            allowed=allowed,
             cure="Go on as it began, or measure into another folder.",
         )
 

@@ -345,7 +345,10 @@ class MeasurePage:
         project = self._window.project
         out = project.settings.measure.out
         if exists(project.path(out, "out") / LOG):
-            return f"In {out} a plan was measured already, as a whole or in part: Start goes on where it stood."
+            return (
+                f"In {out} a plan was measured already, as a whole or in part: Start goes on where it stood, with the "
+                "plan and the robot of then. For others choose another folder."
+            )
         return "Start begins with the first configuration of the plan, or with the nests."
 
     def _pictures(self) -> None:

@@ -371,6 +371,20 @@ def test_the_demo_ends_with_a_corrected_program(demonstrated: Demonstration, tmp
         demo(out)
 
 
+def test_relative_errors_say_what_is_not_in_them(demonstrated: Demonstration, truearm: Truearm, tmp_path: Path) -> None:
+    """One of two targets was left unchanged, and the error to expect was said to be 0.000 mm."""
+    head = "MODULE m\n  PROC main()\n"
+    lines = [
+        f"    MoveL [[{x},0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n" for x in (374, 2000)
+    ]
+    (tmp_path / "m.mod").write_text(f"{head}{''.join(lines)}  ENDPROC\nENDMODULE\n")
+    robot, known = demonstrated.folder / "calibrated.yaml", ("--taught", "none", "--controller-kinematics", "nominal")
+    done = truearm("compensate", robot, tmp_path / "m.mod", *known, "--out", tmp_path / "out")
+    said = " ".join(done.out.split())
+    assert "1 corrected, 1 left unchanged" in said
+    assert "Of a single target they are zero, and say nothing. What is left unchanged is not in them" in said
+
+
 def test_a_fit_that_lost_rank_is_accepted_by_name(truearm: Truearm, cell: Path) -> None:
     made = calibrate("irb120", campaign("irb120", 3, 2e-5, 1)[1], model="geometric", train="all")
     (cell / "calibrated.yaml").write_text(robot_text(made.robot))

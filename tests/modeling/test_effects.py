@@ -260,6 +260,7 @@ NAMED_ELSEWHERE = {
     "studies/": "a study chooses models as its document does",
     "studio/cell_rules.py": "what keeps clear of a cell is called like an effect",
     "studio/plan_fields.py": "and its field",
+    "studio/planned.py": "and its option",
     "planning/driving/": "a stop of a tour is called like an effect",
     "planning/iso9283/": "a criterion of ISO 9283 is called like an effect",
     "validation/iso9283/": "and its value",

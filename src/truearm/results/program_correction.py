@@ -323,9 +323,14 @@ class ProgramCorrection(Record):
         if frames.frames != "assumed" or choice.was_taught("points"):
             return ""
         each = "in each frame" if choice.was_taught("frames") else "of all programs together"
-        return (
+        said = (
             f"These errors are of the targets relative to each other, {each}: where a frame is as a whole is not known."
         )
+        if sum(len(file.expected[0]) for file in self.files if file.expected is not None) == 1:
+            said += " Of a single target they are zero, and say nothing."
+        if any(file.skipped for file in self.files):
+            said += " What is left unchanged is not in them: it now lies off the others by as much as those were moved."
+        return said
 
     @property
     def frame_words(self) -> list[str]:

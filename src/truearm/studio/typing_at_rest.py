@@ -18,6 +18,8 @@ class TypingAtRest:
     ----------
     lock
         Held while something is taken.
+    sent
+        Returns the value that a window has sent for a field.
     take
         Takes a value that was typed into a field, by doing what follows; returns whether nothing was refused.
     begun
@@ -27,10 +29,11 @@ class TypingAtRest:
     def __init__(
         self,
         lock: threading.RLock,
+        sent: Callable[[Any], Any],
         take: Callable[[Any, Any, Callable[[], None]], bool],
         begun: Callable[[Any], None],
     ) -> None:
-        self._lock, self._take, self._begun = lock, take, begun
+        self._lock, self._sent, self._take, self._begun = lock, sent, take, begun
         self._typing: dict[object, tuple[threading.Timer, Callable[[], bool]]] = {}
 
     def settled(self, do: Callable[[], None]) -> Callable[[Any], None]:
@@ -40,7 +43,7 @@ class TypingAtRest:
         def called(event: Any) -> None:
             if getattr(event, "client", None) is None:
                 return
-            typed = event.target.value  # as it is now: the pages may be shown anew before the lock is free
+            typed = self._sent(event.target)  # the pages may be shown anew before the lock is free
             with self._lock:
                 if key in self._typing:
                     self._typing.pop(key)[0].cancel()

@@ -63,7 +63,10 @@ class Window:
         self._work: Work | None = None
         self._acted: Any = None  # the element whose callback is called now
         self._refusals = Refusals(self.gui)
-        self._typing = TypingAtRest(self.lock, self._take_typed, lambda field: self._refusals.keep_typed(field, None))
+        self._sent: dict[str, str] = {}  # texts, as a window has sent them last, by the number of the element
+        self._typing = TypingAtRest(
+            self.lock, self._value_of, self._take_typed, lambda field: self._refusals.keep_typed(field, None)
+        )
         self._stopped = threading.Event()
         self.pages: list[Page] = []
         self._theme()
@@ -85,7 +88,7 @@ class Window:
         def called(event: Any) -> None:
             if getattr(event, "client", None) is not None:
                 element = getattr(event, "target", None)
-                chosen = getattr(element, "value", None)
+                chosen = self._value_of(element)
                 with self.lock:
                     if self._typing.take_all():
                         if element is not None and chosen is not None and element.value != chosen:
@@ -118,6 +121,11 @@ class Window:
             threading.Thread(target=take, args=(upload,), daemon=True).start()
 
         self.gate.uploads.takers[button._impl.uuid] = begin
+
+    def _value_of(self, element: Any) -> Any:
+        """Return the value that a window has sent: that of the element may have been shown anew meanwhile."""
+        number = getattr(getattr(element, "_impl", None), "uuid", "")
+        return self._sent.get(number, getattr(element, "value", None))
 
     def _do(self, do: Callable[[], None], element: Any, typed: Any = None) -> bool:
         """Do something for the user, and show what is refused below the element; return whether nothing was.
@@ -428,4 +436,9 @@ class Window:
 
     def _fits(self, number: str, value: object) -> bool:
         element = self.gui._gui_input_handle_from_uuid.get(number)
-        return element is None or fits(element, value)  # viser drops what is for an element that is gone
+        if element is None:
+            return True  # viser drops what is for an element that is gone
+        can_be = fits(element, value)
+        if can_be and isinstance(value, str):
+            self._sent[number] = value
+        return can_be

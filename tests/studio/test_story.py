@@ -24,6 +24,8 @@ from truearm.studio.serving import Studio, serve
 
 #: Sizes at which pages are pictured.
 _SIZES = ((1366, 768), (1920, 1080))
+#: How far from the right edge the pages begin.
+_PANEL = "window.innerWidth - document.querySelector('[role=tab]').getBoundingClientRect().left"
 
 
 class Person:
@@ -38,6 +40,8 @@ class Person:
         page.set_default_timeout(90_000)
         page.goto(studio.access.entrance)
         page.get_by_role("tab", name="Cell").wait_for()
+        page.wait_for_timeout(1000)
+        self.panel = page.evaluate(_PANEL)
 
     def _asked(self, url: str) -> None:
         if not url.startswith((self.studio.access.address, "data:", "blob:")):
@@ -73,6 +77,9 @@ class Person:
         """Keep a picture of what is shown, at some sizes; nothing stands out of the window's right edge."""
         for width, height in sizes:
             self.page.set_viewport_size({"width": width, "height": height})
+            for _ in range(2):  # the panel slides into its place
+                self.page.wait_for_function(f"Math.abs({_PANEL} - {self.panel}) < 2")
+                self.page.wait_for_timeout(100)
             self.page.evaluate(_DRAWN)
             self.page.screenshot(path=self.pictures / f"{name}-{width}.png")
             beyond = self.page.evaluate(_BEYOND)

@@ -119,3 +119,12 @@ def test_a_loss_that_may_meet_readings_exactly_needs_more_of_them() -> None:
     (notice,) = check_few_readings(identify(load_robot("irb120"), data, named_model("geometric"), loss="cauchy"))
     assert notice.level == "error"
     assert not check_few_readings(identify(load_robot("irb120"), data, named_model("geometric"), loss="huber"))
+
+
+def test_noise_that_is_as_large_as_what_is_assumed_is_told_by_the_readings() -> None:
+    """The first round agrees with the assumption then, and it stays: that is no want of readings."""
+    data = replace(campaign("irb120", 30, 0.1e-3, 4)[1], sigma=None)
+    fit = identify(load_robot("irb120"), data, named_model("geometric"))
+    assert fit.sigma["position"] == pytest.approx(0.1e-3, rel=0.02)
+    assert not fit.assumed
+    assert not check_few_readings(fit)

@@ -13,15 +13,15 @@ from truearm.shown import counted
 from truearm.units import from_si
 
 FEW_READINGS: Final = "few-readings"
-#: Numbers left by the parameters from which the readings tell their noise within a third.
+#: Numbers left by the parameters from which the noise is at most 1.6 times what they tell, 19 times in 20.
 _ENOUGH: Final = 10.0
 #: Share of the numbers that parameters must leave for losses that may meet as many readings exactly, and doubt others.
 _LEAST_SHARE: Final = 2.0 / 3.0
 _MEETING: Final = ("cauchy", *ABSOLUTE)
 #: Numbers for each free parameter from which a robust fit tells which reading is wrong.
 _FEWEST_TO_DOUBT: Final = 1.5
-#: Deviations of a normal variable that 95 % are above.
-_ONE_SIDED_95: Final = 1.645
+#: How often the noise is larger than is said that it may be.
+_RARELY: Final = 0.05
 #: What more there must be to judge a fit.
 CURE: Final = "Measure more configurations, or read more targets at each."
 _UNIT: Final = {observation.name: "mm" if observation.unit == "m" else "mrad" for observation in OBSERVATIONS}
@@ -49,8 +49,8 @@ def check_few_readings(fit: Fit) -> list[Notice]:
         )
     elif not fit.declared:
         words += (
-            f"The noise may be {_may_be(left):.2g} times as large as is estimated from so few, and with it the "
-            "deviations of the parameters and the expected error. "
+            f"The noise may be {_may_be(max(left, 1.0)):.2g} times as large as is estimated from so few, and with it "
+            "the deviations of the parameters and the expected error. "
         )
     if fit.loss != "linear":
         words += (
@@ -62,9 +62,10 @@ def check_few_readings(fit: Fit) -> list[Notice]:
 
 
 def _may_be(freedom: float) -> float:
-    """Return how many times its estimate a deviation may be, by Wilson and Hilferty (1931); 1 time in 20 it is more."""
-    k = 2.0 / (9.0 * freedom)
-    return float(max(1.0 - k - _ONE_SIDED_95 * math.sqrt(k), 0.1) ** -1.5)
+    """Return how many times its estimate a deviation is at most, but for one time in twenty: by chi squared."""
+    from scipy.special import gammaincinv
+
+    return math.sqrt(freedom / (2.0 * float(gammaincinv(freedom / 2.0, _RARELY))))
 
 
 def check_few_to_doubt(fit: Fit) -> list[Notice]:

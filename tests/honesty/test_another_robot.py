@@ -7,6 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from tests.answered import ANSWERS
 from tests.honesty.telling import Told, told, written
 from tests.lookalikes import campaign_of
 
@@ -48,7 +49,7 @@ def test_the_check_tells_it_before_anything_is_fitted(folder: Path) -> None:
 def test_no_program_is_corrected_with_it_until_it_is_accepted(folder: Path) -> None:
     calibrated("ur10", folder)
     arm, program = folder / "ur10" / "calibrated.yaml", folder / "job.script"
-    words = ("compensate", arm, program, "--controller-kinematics", "nominal", "--out")
+    words = ("compensate", arm, program, *ANSWERS, "--out")
     refused = told(*words, folder / "out")
     assert refused.code == 2
     assert "ur10e of the library" in refused.refusal
@@ -61,7 +62,7 @@ def test_no_program_is_corrected_with_it_until_it_is_accepted(folder: Path) -> N
 
 def test_a_program_of_another_maker_is_not_corrected_until_it_is_accepted(folder: Path) -> None:
     calibrated("ur10e", folder)
-    words = ("compensate", folder / "ur10e" / "calibrated.yaml", folder / "plate.mod", "--out")
+    words = ("compensate", folder / "ur10e" / "calibrated.yaml", folder / "plate.mod", *ANSWERS, "--out")
     refused = told(*words, folder / "rapid")
     assert refused.code == 2
     assert "a robot of Universal Robots and programs in RAPID" in refused.refusal

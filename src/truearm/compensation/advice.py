@@ -49,9 +49,7 @@ def check_correction(
     corrections = result.corrections
     count = sum(int(one.corrected.sum()) for one in corrections)
     if any(one.program.targets for one in corrections):
-        made = _asked(result) if count else []
-        made += _assumed(result)
-        made += _by_joints(corrections)
+        made = [*_assumed(result), *_by_joints(corrections)]
     else:
         made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
     skipped = sum(len(one.skipped) for one in corrections)
@@ -189,26 +187,6 @@ def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
     shown = [(one.program.sources, one.program.targets[row]) for one, row in targets[:_LISTED]]
     lines = ", ".join(f"{sources[target.source].path.name} line {target.line}" for sources, target in shown)
     return f"{lines}{', ..' if len(targets) > _LISTED else ''}"
-
-
-def _asked(result: CorrectedPrograms) -> list[Notice]:
-    """Ask what was taught, as long as nobody has said it."""
-    if result.choice.taught is not None:
-        return []
-    places = ["points"]
-    places += [
-        what for what, known in (("frames", result.frames.frames), ("tools", result.frames.tools)) if known == "assumed"
-    ]
-    words = " and ".join([*[", ".join(places[:-1])][: len(places) - 1], places[-1]])
-    answers = ", ".join(f"`taught={what}`" for what in places)
-    return [
-        Notice(
-            "computed-or-taught",
-            f"Were the {words} of these programs computed, or taught with this robot? Nothing says it, and "
-            "they were taken as computed. Points that were taught are right already, and a correction moves them away. "
-            f"Answer with {answers}, or `taught=none`.",
-        )
-    ]
 
 
 def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:

@@ -19,6 +19,11 @@ What acts on the tool at targets, by name or pattern, or with tools::
       - {targets: ["pHole*"], force: [0, 0, 80], moment: [0, 0, 1.5], frame: tool}
       - {tools: [tSpindle], force: [12, 0, 0]}
 
+What only the user knows can be kept there too, as :func:`truearm.compensate` takes it::
+
+    taught: [none]
+    controller_kinematics: nominal
+
 ``world`` is the instrument's frame, in which the robot was calibrated; ``base`` and ``flange`` are the identified base
 and flange; ``controller`` says what the controller has where the program does not define it. The robot's own base and
 flange are called ``base`` and ``flange``.
@@ -27,6 +32,7 @@ flange are called ``base`` and ``flange``.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -34,8 +40,9 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, model_validator
 
-from truearm.errors import InputError, refusals_at
+from truearm.errors import InputError, refusals_at, refusals_of
 from truearm.files import read_yaml
+from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.entries import STRICT, Number, Triple
 from truearm.modeling.orientations import (
     FIXED_XYZ_ANGLES,
@@ -139,6 +146,8 @@ class CellFile(_Entry):
     tools: dict[Name, _Tool] = {}
     frames: dict[Name, _Frame] = {}
     wrenches: list[_Wrench] = []
+    taught: list[str] | None = None
+    controller_kinematics: str | None = None
 
 
 @dataclass(frozen=True)
@@ -275,9 +284,62 @@ def refuse_wrenches_left_out(path: Path | None, parameter: str) -> None:
     )
 
 
+@dataclass(frozen=True)
+class Answers:
+    """What cell files answer of the programs and their controller; None where they do not.
+
+    Attributes
+    ----------
+    taught
+        What was taught with the robot.
+    controller_kinematics
+        With what the controller computes poses: a word, or the path of its kinematics file.
+    """
+
+    taught: tuple[str, ...] | None = None
+    controller_kinematics: str | None = None
+
+
+def read_answers(files: Mapping[str, Path | None]) -> Answers:
+    """Read what cell files answer; a kinematics file is named from the folder of the file that names it.
+
+    Parameters
+    ----------
+    files
+        By the parameters that name them.
+
+    Raises
+    ------
+    InputError
+        If one is not of the schema, or two answer differently.
+    """
+    taught: dict[tuple[str, ...], Path] = {}
+    kinematics: dict[str, Path] = {}
+    for parameter, path in files.items():
+        if path is None:
+            continue
+        with refusals_of(parameter):
+            content = read_yaml(path, CellFile)
+        if content.taught is not None:
+            taught[tuple(content.taught)] = path
+        if (said := content.controller_kinematics) is not None:
+            kinematics[said if said in STATED else str(path.parent / said)] = path
+    for name, given in (("taught", taught), ("controller_kinematics", kinematics)):
+        if len(given) > 1:
+            raise InputError(
+                "two files answer this differently",
+                where=f"{list(given.values())[1]}, {name}",
+                came=list(given)[1],
+                allowed=f"{next(iter(given))}, as {next(iter(given.values()))} says",
+                cure="Take one of the entries out.",
+            )
+    return Answers(next(iter(taught), None), next(iter(kinematics), None))
+
+
 def _file(path: Path, part: str) -> CellFile:
     content = read_yaml(path, CellFile)
-    if not getattr(content, part):
+    answers = content.taught is not None or content.controller_kinematics is not None
+    if not getattr(content, part) and not (answers and part != "wrenches"):
         raise InputError(f"the file has no {part}", where=str(path), cure=f"Name them under {part}:.")
     return content
 

@@ -14,6 +14,7 @@ from fnmatch import translate
 from typing import Final, Literal
 
 from truearm.compensation.programs.program import Program, ProgramTarget
+from truearm.compensation.questions import Question
 from truearm.errors import InputError, did_you_mean
 
 #: What may have been taught with the robot itself.
@@ -74,6 +75,21 @@ def kept_by_choice(programs: Sequence[Program], choice: Choice) -> list[dict[int
         }
         for program in programs
     ]
+
+
+def taught_question(programs: Sequence[Program], choice: Choice) -> Question | None:
+    """Return what to ask where nobody has said what was taught, and there is something to correct."""
+    kept = kept_by_choice(programs, choice)
+    nothing = all(len(rows) == len(one.targets) for one, rows in zip(programs, kept, strict=True))
+    if choice.taught is not None or nothing:
+        return None
+    return Question(
+        "taught",
+        "Were the points of these programs computed off-line, or taught with this robot? Points that were taught are "
+        "right already, and a correction moves them away.",
+        "`taught=none` (all was computed), or with what was taught: `taught=points`, `taught=frames`, `taught=tools`",
+        "A cell file keeps the answer (taught: [none]).",
+    )
 
 
 def _why_kept(target: ProgramTarget, choice: Choice, only: Patterns, keep: Patterns) -> Kept | None:

@@ -15,53 +15,66 @@ from truearm.compensation.fake_targets import nominal_robot
 from truearm.compensation.gauge import disagreement
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.program import MakersCalibration, Program
+from truearm.compensation.questions import Question
 from truearm.errors import InputError
 from truearm.modeling.controller import OTHER_ARM, ControllerKinematics
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
-_ANSWER: Final = (
-    "`controller_kinematics=nominal` says that it computes with the table of the robot file, "
-    "`controller_kinematics=proprietary` that it has a calibration which nobody else can read"
+_KEPT: Final = (
+    "The robot file keeps the answer (controller: {{kinematics: {0}}}), or a cell file (controller_kinematics: {0})."
 )
 
 
-def refuse_unknown_controller(robot: Robot, programs: Sequence[Program]) -> None:
-    """Refuse to correct poses for a controller whose kinematics cannot be known, or surely are not the nominal ones.
+def refuse_proprietary_controller(robot: Robot, programs: Sequence[Program]) -> None:
+    """Refuse to correct poses for a controller that computes them with a model which nobody else can read.
 
     Raises
     ------
     InputError
-        If the robot's controller computes poses with a model that nobody can read; or if nothing is said of it, and its
-        maker delivers every arm with kinematics of its own.
+        With what to do instead.
     """
-    if not _poses(programs):
+    if robot.controller.kinematics.kind != "proprietary" or not _poses(programs):
         return
-    kind, calibration = robot.controller.kinematics.kind, _calibration(programs)
-    if kind == "proprietary":
-        name = calibration.name if calibration is not None else "its maker's calibration"
-        raise InputError(
-            "the controller computes poses with a model that nobody else can read, so it is not known where a "
-            "corrected pose would take the arm",
-            parameter="controller_kinematics",
-            where=robot.name,
-            came="proprietary",
-            allowed="nominal, or the file of the controller's kinematics",
-            cure=f"Turn {name} off while these programs run and give `controller_kinematics=nominal`, or write the "
-            "targets as joint positions, which do not pass through it as far as is known.",
+    calibration = _calibration(programs)
+    name = calibration.name if calibration is not None else "its maker's calibration"
+    raise InputError(
+        "the controller computes poses with a model that nobody else can read, so it is not known where a "
+        "corrected pose would take the arm",
+        parameter="controller_kinematics",
+        where=robot.name,
+        came="proprietary",
+        allowed="nominal, or the file of the controller's kinematics",
+        cure=f"Turn {name} off while these programs run and give `controller_kinematics=nominal`, or write the "
+        "targets as joint positions, which do not pass through it as far as is known.",
+    )
+
+
+def controller_question(robot: Robot, programs: Sequence[Program]) -> Question | None:
+    """Return what to ask where nothing says with what the controller computes, and its maker offers a calibration."""
+    calibration = _calibration(programs)
+    if robot.controller.kinematics.kind != "unknown" or calibration is None or not _poses(programs):
+        return None
+    answers = (
+        "`controller_kinematics=nominal` (it computes with the data sheet) or `controller_kinematics=proprietary` (it "
+        "has a calibration that nobody else can read)"
+    )
+    if calibration.always:
+        return Question(
+            "controller_kinematics",
+            f"Which kinematics does the controller compute with? {calibration.maker} controllers compute with what "
+            "the factory measured of each arm; corrected against the data sheet, the poses would become worse.",
+            "`controller_kinematics` and the file calibration.conf from the folder .urcontrol of the controller, or "
+            f"that of the ROS driver; or with {answers}",
+            _KEPT.format("calibration.conf"),
         )
-    if kind == "unknown" and calibration is not None and calibration.always:
-        raise InputError(
-            f"controllers of {calibration.maker} compute with what the factory measured of each arm, and it is not "
-            "known what that is here. Corrected against the data sheet, the poses would become worse",
-            parameter="controller_kinematics",
-            where=robot.name,
-            came="unknown",
-            allowed="the file of the controller's kinematics, calibration.conf or that of the ROS driver; nominal; "
-            "proprietary",
-            cure="Copy calibration.conf from the folder .urcontrol of the controller and give it with "
-            f"`controller_kinematics`. {_ANSWER}.",
-        )
+    return Question(
+        "controller_kinematics",
+        f"Does this controller have {calibration.name}? {calibration.maker} delivers it where it was ordered. A "
+        "controller that has it corrects the poses once more, and the program becomes worse.",
+        answers,
+        _KEPT.format("nominal"),
+    )
 
 
 def refuse_kinematics_of_another_arm(robot: Robot, accepted: Collection[str]) -> None:
@@ -91,27 +104,18 @@ def refuse_kinematics_of_another_arm(robot: Robot, accepted: Collection[str]) ->
 
 
 def controller_notices(robot: Robot, programs: Sequence[Program]) -> list[Notice]:
-    """Say where it was not told with what a controller computes, and its maker offers a calibration."""
-    calibration, kind = _calibration(programs), robot.controller.kinematics.kind
-    if calibration is None or not _poses(programs):
+    """Say where it was answered that a controller computes with the data sheet, and its maker calibrates every arm."""
+    calibration = _calibration(programs)
+    if calibration is None or not calibration.always or robot.controller.kinematics.kind != "nominal":
         return []
-    if kind == "nominal" and calibration.always:
-        return [
-            Notice(
-                "controller-nominal",
-                f"Controllers of {calibration.maker} compute with what the factory measured of each arm, and the poses "
-                "were corrected for one that computes with the data sheet, as was said. On an arm with its own "
-                "controller that makes programs worse; give its file with `controller_kinematics`.",
-            )
-        ]
-    if kind != "unknown":
+    if not _poses(programs):
         return []
     return [
         Notice(
-            "controller-unknown",
-            f"{calibration.maker} delivers robots with {calibration.name} where it was ordered, and nothing says "
-            "whether this one has it. The poses are corrected for a controller without it; one that has it corrects "
-            f"once more, and the programs become worse. Look on the controller, and answer: {_ANSWER}.",
+            "controller-nominal",
+            f"Controllers of {calibration.maker} compute with what the factory measured of each arm, and the poses "
+            "were corrected for one that computes with the data sheet, as was said. On an arm with its own "
+            "controller that makes programs worse; give its file with `controller_kinematics`.",
         )
     ]
 

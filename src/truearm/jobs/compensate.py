@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from truearm.arrays import finite_number
 from truearm.compensation.advice import check_correction
@@ -14,21 +15,24 @@ from truearm.compensation.cell import (
     Cell,
     Placed,
     TargetWrench,
+    read_answers,
     read_frames,
     read_tools,
     read_wrenches,
     refuse_wrenches_left_out,
 )
-from truearm.compensation.chosen_targets import TAUGHT, Choice, Taught
+from truearm.compensation.chosen_targets import TAUGHT, Choice, Taught, taught_question
 from truearm.compensation.controller_model import (
     controller_notices,
+    controller_question,
     refuse_kinematics_of_another_arm,
-    refuse_unknown_controller,
+    refuse_proprietary_controller,
 )
 from truearm.compensation.correction import Correction
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
 from truearm.compensation.programs.program import Edit
+from truearm.compensation.questions import refuse_unanswered
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
 from truearm.errors import InputError, refusals_at, refusals_of
 from truearm.files import path_argument
@@ -51,7 +55,15 @@ from truearm.jobs.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, check_maker, known_of, refuse_unaccepted
+from truearm.jobs.proof import (
+    NOT_BETTER,
+    SKIPPED,
+    accept_argument,
+    changed_since,
+    check_maker,
+    known_of,
+    refuse_unaccepted,
+)
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
@@ -59,6 +71,10 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.notices import Notice
 from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
+from truearm.shown import counted
+
+#: Targets that cannot be corrected, shown one by one in a refusal.
+_SHOWN: Final = 5
 
 
 def compensate(
@@ -72,7 +88,6 @@ def compensate(
     wrench: Wrench | Sequence[float] | str | Path | None = None,
     wrench_frame: WrenchFrame | None = None,
     controller_kinematics: str | Path | None = None,
-    strict: bool = False,
     split: float | None = None,
     again: bool = False,
     joint_targets: str = "keep",
@@ -109,9 +124,7 @@ def compensate(
     controller_kinematics
         With what the controller turns poses into joint positions: ``nominal`` (the table of the robot file),
         ``proprietary`` (a calibration of its maker that nobody else can read), ``unknown``, or the file of its
-        kinematics, as :func:`truearm.import_ur_kinematics` reads it; None for what the robot file says.
-    strict
-        Refuse if a target cannot be corrected.
+        kinematics, as :func:`truearm.import_ur_kinematics` reads it; None for what a cell file or the robot file says.
     split
         Split straight and circular moves where the correction between targets would deviate farther [m].
     again
@@ -122,14 +135,14 @@ def compensate(
     only, keep
         Names of targets, or patterns such as ``pHole*``: the only ones that are corrected, and some that stay.
     taught
-        What was taught with this robot and is right already: ``points``, ``frames``, ``tools``, or ``none``. None if
-        it is not known: then all is taken as computed off-line.
+        What was taught with this robot and is right already: ``points``, ``frames``, ``tools``, or ``none``, if all
+        was computed off-line. None for what a cell file says.
     accept
         What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
         ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with, such as
         ``wrong-robot``; ``maker`` for programs in the language of another maker; ``other-kinematics`` for kinematics of
-        the controller that are not this arm's; and ``not-better-here`` to correct also the targets that would rather
-        get worse.
+        the controller that are not this arm's; ``skipped`` for programs of which some targets cannot be corrected and
+        stay as they are; and ``not-better-here`` to correct also the targets that would rather get worse.
     notes
         What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other.
     command
@@ -141,8 +154,8 @@ def compensate(
     ------
     InputError
         If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
-        badly or is another maker's, a tool or frame is not defined, it is not known with what the controller computes
-        and its maker calibrates every arm, or with `strict` a target cannot be corrected.
+        badly or is another maker's, a tool or frame is not defined, a target cannot be corrected and that is not
+        accepted, or nothing says what was taught, or with what a controller computes whose maker offers a calibration.
     """
     progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
@@ -154,31 +167,32 @@ def compensate(
     if wrench_file is not None and wrench_frame is not None:
         raise InputError("the file says the frame of each force", parameter="wrench_frame", came=wrench_frame)
     notes = notes_argument(notes)
-    strict, again = flag_argument(strict, "strict"), flag_argument(again, "again")
+    again = flag_argument(again, "again")
     if split is not None:
         split = finite_number(split, "split")
         check_tolerance(split)
+    answers = read_answers({"tools": tool_file, "frames": frame_file})
+    kinematics = answers.controller_kinematics if controller_kinematics is None else controller_kinematics
+    said_by = "controller_kinematics" if controller_kinematics is not None else "tools, frames"
     choice = Choice(
         joint_targets=choice_argument(joint_targets, "joint_targets", {"keep": False, "correct": True}),
         only=names_argument(only, "only"),
         keep=names_argument(keep, "keep"),
-        taught=_taught(taught),
+        taught=_taught(answers.taught if taught is None else taught),
     )
     folder = (
         None
         if out is None
-        else folder_for(
-            (REPORT,), out, robot, tools, frames, wrench_file, *_kinematics_file(controller_kinematics), *paths
-        )
+        else folder_for((REPORT,), out, robot, tools, frames, wrench_file, *_kinematics_file(kinematics), *paths)
     )
     hashes = hashes_of(
         robot=robot,
         tools=tools,
         frames=frames,
         wrench=wrench_file,
-        controller_kinematics=next(iter(_kinematics_file(controller_kinematics)), None),
+        controller_kinematics=next(iter(_kinematics_file(kinematics)), None),
     )
-    arm = _with_controller(robot_argument(robot).with_payload(payload), controller_kinematics)
+    arm = _with_controller(robot_argument(robot).with_payload(payload), kinematics, said_by)
     if arm.wrench is not None:
         raise InputError(
             "something acts on the tool of this robot already",
@@ -197,7 +211,6 @@ def compensate(
         wrench=wrench,
         wrench_frame=wrench_frame,
         controller_kinematics=controller_kinematics,
-        strict=strict or None,
         split=split,
         again=again or None,
         joint_targets="correct" if choice.joint_targets else None,
@@ -224,7 +237,8 @@ def compensate(
         read = read_programs(files)
     language = language_called(read[0].language)
     foreign = check_maker(arm, language, accepted)
-    refuse_unknown_controller(arm, read)
+    refuse_proprietary_controller(arm, read)
+    refuse_unanswered([taught_question(read, choice), controller_question(arm, read)])
     with refusals_of("robot"):
         refuse_kinematics_of_another_arm(arm, accepted)
     with refusals_of("robot"):
@@ -237,7 +251,7 @@ def compensate(
             weigh_tools=payload is None,
             wrenches=acting,
         )
-    if strict:
+    if SKIPPED not in accepted:
         _refuse_skipped(result)
     splits: tuple[ProgramSplit, ...] = ()
     if split is not None:
@@ -269,7 +283,7 @@ def compensate(
             *check_correction(arm, result, splits),
         ),
         command=invocation,
-        inputs=files_of(robot, tools, frames, wrench_file, *_kinematics_file(controller_kinematics)),
+        inputs=files_of(robot, tools, frames, wrench_file, *_kinematics_file(kinematics)),
         hashes=hashes,
         notes=notes,
     )
@@ -303,12 +317,12 @@ def _payloads_unlikely(arm: Robot, result: CorrectedPrograms) -> list[Notice]:
     return [notice for load in [arm.payload, *loads] for notice in check_payload(arm.with_payload(load))][:1]
 
 
-def _with_controller(arm: Robot, said: str | Path | None) -> Robot:
-    """Return a robot with what was said of its controller's kinematics."""
+def _with_controller(arm: Robot, said: str | Path | None, said_by: str) -> Robot:
+    """Return a robot with what was said of its controller's kinematics, by which parameter."""
     if said is None:
         return arm
-    with refusals_of("controller_kinematics"):
-        return with_controller_kinematics(arm, str(path_argument(said, "controller_kinematics")), Path())
+    with refusals_of(said_by):
+        return with_controller_kinematics(arm, str(path_argument(said, said_by)), Path())
 
 
 def _kinematics_file(said: str | Path | None) -> tuple[str | Path, ...]:
@@ -345,19 +359,20 @@ def _refuse_taught_and_measured(choice: Choice, cell: Cell) -> None:
 
 
 def _refuse_skipped(result: CorrectedPrograms) -> None:
+    """Refuse a program that would be corrected in part."""
     skipped = [
-        (correction.program.sources[one.source].where(one.line), one.reason)
+        f"{correction.program.sources[one.source].where(one.line)}: {one.reason}"
         for correction in result.corrections
         for one in correction.skipped
     ]
     if skipped:
-        more = f", and {len(skipped) - 1} more" if len(skipped) > 1 else ""
-        where, reason = skipped[0]
+        more = f"; and {len(skipped) - _SHOWN} more" if len(skipped) > _SHOWN else ""
         raise InputError(
-            f"a target cannot be corrected{more}, and `strict` refuses that",
-            parameter="strict",
-            where=where,
-            came=reason,
+            f"{counted(len(skipped), 'target')} cannot be corrected, and the others would move without "
+            f"{'it' if len(skipped) == 1 else 'them'} ({'; '.join(skipped[:_SHOWN])}{more})",
+            parameter="programs",
+            cure="Mend the program, leave a target as it is on purpose by its name with `keep`, or accept all of them "
+            f"with `accept={SKIPPED}`.",
         )
 
 

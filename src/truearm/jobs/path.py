@@ -8,11 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from truearm.arrays import finite_number
-from truearm.compensation.controller_model import controller_notices, refuse_unknown_controller
+from truearm.compensation.controller_model import (
+    controller_notices,
+    controller_question,
+    refuse_proprietary_controller,
+)
 from truearm.compensation.corrected_path import correct_path
 from truearm.compensation.path_program import BY_NAME, TargetKind, path_program
 from truearm.compensation.programs.new_program import NewProgram
 from truearm.compensation.programs.program import Language, Source
+from truearm.compensation.questions import refuse_unanswered
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
 from truearm.identification.judging.external_force import check_force
@@ -188,7 +193,8 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
         theirs = not arm.maker or language.runs_on(arm.maker)
         if content.corrected and theirs:
             as_read = [language.read([Source(Path(file), text) for file, text in files.items()])]
-            refuse_unknown_controller(arm, as_read)
+            refuse_proprietary_controller(arm, as_read)
+            refuse_unanswered([controller_question(arm, as_read)])
             notices += controller_notices(arm, as_read)
         texts |= files
     foreign = [one for one in languages if arm.maker and not one.runs_on(arm.maker)]

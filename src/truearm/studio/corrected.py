@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from truearm.compensation.cell import CellFile
+from truearm.compensation.cell import Answers, CellFile, read_answers
 from truearm.compensation.program_files import CorrectionRecord, ProgramFile, correction_record, program_files
 from truearm.errors import InputError, Words
 from truearm.files import exists, read_bytes, read_text, read_yaml
@@ -148,8 +149,11 @@ def _changed(
         yield "the result, of which the record says nothing"
     elif calibrated is None or said["robot"] != _hash_of(project, f"{settings.result}/calibrated.yaml"):
         yield "the result"
+    answers = Answers()
     try:
-        parts = () if settings.cell is None else cell_parts(project.path(settings.cell))
+        cell = None if settings.cell is None else project.path(settings.cell)
+        parts = () if cell is None else cell_parts(cell)
+        answers = read_answers({"cell": cell})
     except InputError:
         parts = _PARTS
     if any(said.get(part) != (_hash_of(project, settings.cell) if part in parts else None) for part in _PARTS):
@@ -158,10 +162,13 @@ def _changed(
         settings.wrench_file is None and applied.get("wrenches", []) != _acting(settings)
     ):
         yield "the process force"
-    taught = None if settings.taught is None else sorted({*settings.taught} - {"none"})
-    if applied.get("taught") != taught:
+    taught = answers.taught if settings.taught is None else settings.taught
+    if applied.get("taught") != (None if taught is None else sorted({*taught} - {"none"})):
         yield "what was taught"
     kinematics, read = settings.controller_kinematics, None
+    if kinematics is None and answers.controller_kinematics is not None:
+        said_there = answers.controller_kinematics
+        kinematics = said_there if said_there in STATED else os.path.relpath(said_there, project.folder)
     if kinematics is not None and kinematics not in STATED:
         read = _hash_of(project, kinematics)
         same = read is not None

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
@@ -10,7 +13,9 @@ from tests.studio.conftest import Serving
 from tests.studio.talking import eventually
 from viser._messages import GuiPlotlyMessage
 
-from truearm.studio.pictures import Picture
+from truearm.jobs.following import FitStep
+from truearm.studio.fit_course import fit_course
+from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.window import Window
 
 Figure = dict[str, Any]
@@ -55,7 +60,10 @@ class _Seen:
 
     def __init__(self, picture: Picture, browser: Any) -> None:
         self.picture = picture
+        self.faults: list[str] = []
         self.page = browser.new_page(viewport={"width": 1366, "height": 900})
+        self.page.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.page.on("console", lambda said: self.faults.append(said.text) if said.type == "error" else None)
         self.page.goto(f"http://127.0.0.1:{picture._window.server.get_port()}/")
         self.page.get_by_text("below").wait_for()
 
@@ -171,3 +179,33 @@ def test_a_picture_is_a_new_element_unless_the_same_run_goes_on(picture: Picture
     assert (third := element()) != second
     picture.show(_residuals(_ERRORS))
     assert element() != third
+
+
+def test_what_cannot_be_drawn_leaves_the_page_as_it_is(seen: _Seen) -> None:
+    nothing: Figure = {"data": [], "layout": {}}
+    unknown = {**_residuals([math.nan, math.inf, 0.1]), "layout": {"yaxis": {"type": "log", "range": [math.nan, 1.0]}}}
+    alone = seen.show(_residuals(_ERRORS))
+    assert seen.show(nothing) == []
+    assert len(seen.show(unknown)) == 1
+    seen.show(fit_course([FitStep.of(1, math.inf, math.nan, "training")]))
+    assert seen.show(_residuals(_ERRORS)) == alone
+    assert seen.faults == []
+
+
+def test_the_course_of_a_fit_is_drawn_where_a_step_has_no_finite_cost() -> None:
+    steps = [FitStep.of(1, math.inf, math.nan, "training"), FitStep.of(2, 100.0, 1e-3, "training")]
+    drawn = fit_course(steps)["layout"]
+    assert drawn["yaxis2"]["range"] == fit_course(steps[1:])["layout"]["yaxis2"]["range"]
+    low, high = drawn["yaxis2"]["range"]
+    assert low < 2.0 < high  # the logarithm of the cost
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    [5, {}, {"data": 3, "layout": {}}, {"data": [], "layout": []}, {"data": [], "layout": {"xaxis": 5}}],
+)
+def test_of_a_damaged_report_those_pictures_are_shown_that_are_some(tmp_path: Path, damaged: Any) -> None:
+    report, whole = tmp_path / "report.html", _residuals(_ERRORS)
+    figures = json.dumps({"damaged": damaged, "residuals": whole})
+    report.write_text(f'<script type="application/json" id="figures">{figures}</script>')
+    assert report_figures(report) == {"residuals": whole}

@@ -77,7 +77,7 @@ def _curves(figure: Any) -> list[tuple[str, str | None]]:
 
 
 def report_figures(path: Path) -> dict[str, Any]:
-    """Return the pictures of a report by their names; none if it has none."""
+    """Return the pictures of a report by their names, without those that have not the form of one."""
     if not exists(path):
         return {}
     found = _FIGURES.search(read_text(path))
@@ -85,7 +85,16 @@ def report_figures(path: Path) -> dict[str, Any]:
         figures = json.loads(found[1]) if found else {}
     except (json.JSONDecodeError, RecursionError):
         return {}
-    return figures if isinstance(figures, dict) else {}
+    return {name: drawn for name, drawn in figures.items() if _is_drawn(drawn)} if isinstance(figures, dict) else {}
+
+
+def _is_drawn(drawn: Any) -> bool:
+    """Return whether this has the form of a picture; a report may be damaged."""
+    layout = drawn.get("layout") if isinstance(drawn, dict) else None
+    if not isinstance(layout, dict) or not isinstance(drawn.get("data"), list):
+        return False
+    parts = (part for name, part in layout.items() if name.startswith(("xaxis", "yaxis", "font")))
+    return all(isinstance(part, dict) for part in parts)
 
 
 def _narrow(layout: dict[str, Any]) -> dict[str, Any]:

@@ -33,7 +33,7 @@ def fit_course(steps: Sequence[FitStep]) -> dict[str, Any]:
         line("cost", [step.cost for step in steps], BEFORE, "y2"),
         line("error", [step.error * 1e3 for step in steps], AFTER, "y"),
     ]
-    cost, error = ([value for value in line["y"] if value > 0.0] or [1.0] for line in drawn)
+    cost, error = ([value for value in line["y"] if 0.0 < value < math.inf] or [1.0] for line in drawn)
     return figure(
         drawn,
         420,

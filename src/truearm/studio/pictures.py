@@ -26,6 +26,9 @@ _BUTTONS: Final = {
 class Picture:
     """A place for one picture at a time.
 
+    Each picture is an element of its own. viser gives all that one element draws the same `uirevision`, so Plotly would
+    take the axes, the zoom, the camera and the hidden curves of a picture over to the next one.
+
     Attributes
     ----------
     place
@@ -36,9 +39,17 @@ class Picture:
         self._window, self._aspect = window, aspect
         self.place = window.gui.add_folder(title, visible=False)
         self._plot: Any = None
+        self._of: Any = None
 
-    def show(self, drawn: dict[str, Any]) -> None:
-        """Show a picture as the report has it, in the colours of the window."""
+    def show(self, drawn: dict[str, Any], of: object = None) -> None:
+        """Show a picture as the report has it, in the colours of the window.
+
+        Parameters
+        ----------
+        of
+            The run that it follows while that goes on, if any: the same object with the same curves is the same
+            picture with more in it, and keeps what the user has zoomed.
+        """
         import plotly.graph_objects as go
 
         from truearm.reporting.drawing import DARK
@@ -48,16 +59,25 @@ class Picture:
         layout = {name: value for name, value in drawn["layout"].items() if name not in ("width", "height")}
         layout = {**_narrow(layout), "modebar": _BUTTONS}
         figure = go.Figure(data=drawn["data"], layout=layout, skip_invalid=True)
-        self.place.visible = True
-        if self._plot is None:
-            with self.place:
-                self._plot = self._window.gui.add_plotly(figure, aspect=self._aspect)
-        else:
-            self._plot.figure = figure
+        goes_on = of is not None and of is self._of and _curves(figure) == _curves(self._plot.figure)
+        self._of = of
+        with self._window.server.atomic(), self.place:
+            self.place.visible = True
+            if goes_on:
+                self._plot.figure = figure
+                return
+            if self._plot is not None:
+                self._plot.remove()
+            self._plot = self._window.gui.add_plotly(figure, aspect=self._aspect)
+
+
+def _curves(figure: Any) -> list[tuple[str, str | None]]:
+    """Return the kinds and the names of a picture's curves."""
+    return [(curve.type, curve.name) for curve in figure.data]
 
 
 def report_figures(path: Path) -> dict[str, Any]:
-    """Return the pictures of a report by their names; none if it has none."""
+    """Return the pictures of a report by their names, without those that have not the form of one."""
     if not exists(path):
         return {}
     found = _FIGURES.search(read_text(path))
@@ -65,7 +85,16 @@ def report_figures(path: Path) -> dict[str, Any]:
         figures = json.loads(found[1]) if found else {}
     except (json.JSONDecodeError, RecursionError):
         return {}
-    return figures if isinstance(figures, dict) else {}
+    return {name: drawn for name, drawn in figures.items() if _is_drawn(drawn)} if isinstance(figures, dict) else {}
+
+
+def _is_drawn(drawn: Any) -> bool:
+    """Return whether this has the form of a picture; a report may be damaged."""
+    layout = drawn.get("layout") if isinstance(drawn, dict) else None
+    if not isinstance(layout, dict) or not isinstance(drawn.get("data"), list):
+        return False
+    parts = (part for name, part in layout.items() if name.startswith(("xaxis", "yaxis", "font")))
+    return all(isinstance(part, dict) for part in parts)
 
 
 def _narrow(layout: dict[str, Any]) -> dict[str, Any]:

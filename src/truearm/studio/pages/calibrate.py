@@ -117,7 +117,7 @@ class CalibratePage:
         shown = (len(self._steps), self._window.project.settings.dark)
         if self._steps and shown != self._shown:
             self._shown = shown
-            self._course.show(fit_course(self._steps))
+            self._course.show(fit_course(self._steps), self._steps)
             self._drawn = time.monotonic()
 
     def _done(self, outcome: Outcome, asked: tuple[object, ...]) -> None:

@@ -357,6 +357,6 @@ class MeasurePage:
         session = self.measuring.campaign.session
         for place, drawn in ((self._drift, drift_figure(session)), (self._quality, quality_figure(session))):
             if drawn is not None:
-                place.show(drawn)
+                place.show(drawn, self.measuring)
             else:
                 place.place.visible = False

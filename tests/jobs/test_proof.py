@@ -188,7 +188,10 @@ def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -
     (told,) = done.summary()["programs"]
     assert told["expected_mm"]["before"]["max"] == pytest.approx(1e3 * before.max())
     assert told["expected_mm"]["after"]["mean"] == pytest.approx(1e3 * now.mean())
-    assert f"error to expect {1e3 * before.mean():.3f} mm before, {1e3 * now.mean():.3f} mm now" in done.lines()[0]
+    said = done.lines()[0]
+    assert f"RAPID: relative error to expect {1e3 * before.mean():.3f} mm before, {1e3 * now.mean():.3f} mm" in said
+    assert f"largest expected, not a bound: {1e3 * before.max():.3f} and {1e3 * now.max():.3f} mm" in said
+    assert "at most" not in said
     page = (tmp_path / "out" / "compensation.html").read_text()
     assert 'id="expected"' in page
     assert f'<td class="n">{1e3 * now.mean():.3f}</td>' in page
@@ -212,6 +215,35 @@ def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
         done = compensate(sealed(robot, replace(robot.proof, lower_bound=bound)), [program])
         assert done.summary()["expected_is_lower_bound"] is bound
         assert any("lower bounds" in line for line in done.lines()) is bound
+        low, high = done.summary()["programs"][0]["expected_mm"]["after"]["interval_90"]
+        assert low > 0.0
+        assert (high is None) is bound
+        assert (" mm or more now; " in done.lines()[0]) is bound
+        assert ("(90 %: " in done.lines()[0]) is not bound
+
+
+def test_errors_in_measured_frames_are_not_called_relative(robot: Robot, program: Path, tmp_path: Path) -> None:
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(
+        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+        "frames:\n  wobjPlate: {of: base, translation: [310, -110, 60]}\n"
+    )
+    assert "RAPID: error to expect" in compensate(robot, [program], frames=cell).lines()[0]
+
+
+def test_nothing_is_promised_that_no_robot_repeats(robot: Robot, program: Path) -> None:
+    """A calibration from hundreds of readings without noise knows its parameters to nanometres; no arm goes there."""
+    assert robot.proof is not None
+    known = replace(
+        robot.proof,
+        deviations=tuple(1e-6 * d for d in robot.proof.deviations),
+        joint_error=tuple(0.0 for _ in robot.proof.joint_error),
+        lower_bound=False,
+    )
+    done = compensate(sealed(robot, known), [program])
+    assert " mm before, 0.010 mm or more now (no robot repeats better); " in done.lines()[0]
+    after = done.summary()["programs"][0]["expected_mm"]["after"]
+    assert (after["mean"], after["max"]) == pytest.approx((0.01, 0.01))
 
 
 def test_targets_that_rather_get_worse_are_kept_and_listed(robot: Robot, program: Path, tmp_path: Path) -> None:

@@ -26,6 +26,9 @@ from truearm.modeling.chain import Array
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 
+#: Nothing better is promised of a target [m]: to this makers of small precise arms state the pose repeatability (RP of
+#: ISO 9283; ABB for the IRB 120), and what a calibration knows of its robot's is rarely more than that of the joints.
+REPEATABILITY: Final = 1e-5
 #: Targets looked at together: their derivatives by every parameter take some ten MB.
 _AT_ONCE: Final = 2000
 #: Targets and draws from which the interval of the mean error follows.
@@ -168,6 +171,13 @@ class ExpectedErrors:
     group_worse: Array
     drawn: DrawnErrors
 
+    def at_least(self, least: float) -> ExpectedErrors:
+        """Return it with no distance below one [m]."""
+        drawn = replace(
+            self.drawn, before=np.maximum(self.drawn.before, least), after=np.maximum(self.drawn.after, least)
+        )
+        return replace(self, before=np.maximum(self.before, least), after=np.maximum(self.after, least), drawn=drawn)
+
     def of_some(self, rows: NDArray[np.intp], count: int) -> ExpectedErrors:
         """Return it for `count` targets, of which these are the ones in `rows`; NaN for the others."""
 
@@ -201,11 +211,15 @@ def expected_errors(
         Whether the places of tools and frames were given, or assumed. Frames that were given are taken as exact in the
         world of the calibration. A tool whose tip is a target of the calibration is known as well as that; any other
         only as well as the flange, which a shift of the tool against the last joint leaves to the priors.
+
+    Notes
+    -----
+    No distance is below :data:`REPEATABILITY`.
     """
     model = _ModelErrors(robot, proof, tools == "assumed", frames == "assumed")
     if frames == "assumed":
         model = replace(model, shared=model.shared_by(programs))
-    return tuple(_expected(model, one) for one in programs)
+    return tuple(_expected(model, one).at_least(REPEATABILITY) for one in programs)
 
 
 def _expected(model: _ModelErrors, targets: TargetsReached) -> ExpectedErrors:

@@ -99,6 +99,11 @@ class CorrectedPrograms:
     tools_apart: Mapping[str, float]
     pushed: tuple[tuple[Robot, Array], ...] = ()
 
+    @property
+    def relative(self) -> bool:
+        """Whether errors of targets are of one to the other: where a frame is as a whole is not known."""
+        return self.frames.frames == "assumed" and not self.choice.was_taught("points")
+
 
 def corrected_programs(
     robot: Robot,

@@ -266,7 +266,8 @@ def compensate(
         for index, source in enumerate(correction.program.sources):
             file = next(file for file in files if file.path == source.path)
             text = edited(source.text, [edit for edit in edits if edit.source == index])
-            corrected.append(FileCorrection(file, correction, index, text.encode("latin-1")))
+            bounded = arm.proof is not None and arm.proof.lower_bound
+            corrected.append(FileCorrection(file, correction, index, text.encode("latin-1"), result.relative, bounded))
     corrected.sort(key=lambda one: files.index(one.file))
     made = ProgramCorrection(
         robot=arm,

@@ -15,6 +15,7 @@ import numpy as np
 from truearm.compensation.advice import frame_words
 from truearm.compensation.chosen_targets import Kept
 from truearm.compensation.correction import Correction
+from truearm.compensation.expected_errors import REPEATABILITY
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms
 from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
@@ -48,12 +49,18 @@ class FileCorrection(Record):
         Which file of that program, from 0.
     text
         Its new bytes.
+    relative
+        Whether the errors to expect are of the targets relative to each other.
+    lower_bound
+        Whether they may be larger, for a reason that the calibration knows.
     """
 
     file: ProgramFile
     correction: Correction
     source: int
     text: bytes
+    relative: bool = False
+    lower_bound: bool = False
 
     @property
     def name(self) -> str:
@@ -160,7 +167,7 @@ class FileCorrection(Record):
             when: {
                 "mean": float(values.mean()) * 1e3,
                 "max": float(values.max()) * 1e3,
-                "interval_90": [1e3 * low, 1e3 * high],
+                "interval_90": [1e3 * low, None if self.lower_bound else 1e3 * high],
             }
             for when, values, (low, high) in zip(("before", "after"), self.expected, self.intervals, strict=True)
         }
@@ -183,9 +190,14 @@ class FileCorrection(Record):
             return f"{self.name}  {self.language}: the error to expect is not known"
         low, high = self.intervals[1]
         (mean, most), (mean_now, most_now) = ((v.mean() * 1e3, v.max() * 1e3) for v in self.expected)
+        interval = f" now (90 %: {low * 1e3:.3f} to {high * 1e3:.3f})"
+        if self.lower_bound:
+            interval = " or more now"
+        elif mean_now < 1.01e3 * REPEATABILITY:
+            interval = " or more now (no robot repeats better)"
         return (
-            f"{self.name}  {self.language}: error to expect {mean:.3f} mm before, {mean_now:.3f} mm now "
-            f"(90 %: {low * 1e3:.3f} to {high * 1e3:.3f}), at most {most:.3f} and {most_now:.3f} mm"
+            f"{self.name}  {self.language}: {'relative ' * self.relative}error to expect {mean:.3f} mm before, "
+            f"{mean_now:.3f} mm{interval}; largest expected, not a bound: {most:.3f} and {most_now:.3f} mm"
         )
 
     @property
@@ -319,15 +331,14 @@ class ProgramCorrection(Record):
     @property
     def relative(self) -> str:
         """What the errors to expect are relative to, in words; empty where frames were measured."""
-        frames, choice = self.result.frames, self.result.choice
-        if frames.frames != "assumed" or choice.was_taught("points"):
+        if not self.result.relative:
             return ""
-        each = "in each frame" if choice.was_taught("frames") else "of all programs together"
+        each = "in each frame" if self.result.choice.was_taught("frames") else "of all programs together"
         said = (
             f"These errors are of the targets relative to each other, {each}: where a frame is as a whole is not known."
         )
         if sum(len(file.expected[0]) for file in self.files if file.expected is not None) == 1:
-            said += " Of a single target they are zero, and say nothing."
+            said += " Of a single target they say nothing."
         if any(file.skipped for file in self.files):
             said += " What is left unchanged is not in them: it now lies off the others by as much as those were moved."
         return said

@@ -201,17 +201,20 @@ def error_line(errors: Errors) -> str:
 def expected_summary(expected: ExpectedError) -> dict[str, Any]:
     """Return the error to expect over the workspace in mm, as JSON holds it."""
     return {
-        **_expectation(expected.overall),
+        **_expectation(expected.overall, expected.lower_bound),
         "lower_bound": expected.lower_bound,
         "omissions": list(expected.omissions),
-        "targets": {name: _expectation(of_target) for name, of_target in expected.targets.items()},
+        "targets": {
+            name: _expectation(of_target, expected.lower_bound) for name, of_target in expected.targets.items()
+        },
         "frame": expected.frame,
         "payload": payload_words(expected.payload),
     }
 
 
-def _expectation(of: Expectation) -> dict[str, Any]:
-    return {"mean": of.mean * 1e3, "p95": of.p95 * 1e3, "interval_90": [end * 1e3 for end in of.interval_90]}
+def _expectation(of: Expectation, lower_bound: bool) -> dict[str, Any]:
+    low, high = (end * 1e3 for end in of.interval_90)
+    return {"mean": of.mean * 1e3, "p95": of.p95 * 1e3, "interval_90": [low, None if lower_bound else high]}
 
 
 def expected_lines(expected: ExpectedError) -> list[str]:
@@ -220,11 +223,11 @@ def expected_lines(expected: ExpectedError) -> list[str]:
         figure * 1e3 for figure in (expected.overall.mean, expected.overall.p95, *expected.overall.interval_90)
     )
     places = max(3, -math.floor(math.log10(max(mean, 1e-6))) + 1)
-    end = "or more" if expected.lower_bound else f"to {high:.{places}f}"
-    lines = [
-        f"Expected over the workspace: mean {mean:.{places}f} mm (90 %: {low:.{places}f} {end}), "
-        f"95 % below {p95:.{places}f} mm; {expected_of(expected)}"
-    ]
+    if expected.lower_bound:
+        figures = f"{mean:.{places}f} mm or more (90 %: {low:.{places}f} or more), 95 % {p95:.{places}f} mm or more"
+    else:
+        figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), 95 % below {p95:.{places}f} mm"
+    lines = [f"Expected over the workspace: mean {figures}; {expected_of(expected)}"]
     if expected.lower_bound:
         lines.append(f"  a lower bound: {'; '.join(expected.omissions)}")
     return lines

@@ -13,6 +13,7 @@ from tests.simulated import campaign
 from truearm.compensation.cell import Cell, Placed
 from truearm.compensation.chosen_targets import Choice
 from truearm.compensation.correction import Correction
+from truearm.compensation.expected_errors import REPEATABILITY
 from truearm.compensation.program_correction import corrected_programs
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID

@@ -111,8 +111,10 @@ def test_a_cell_file_keeps_the_answers(tmp_path: Path) -> None:
     job, cell, other = [program(tmp_path, RAPID)], tmp_path / "cell.yaml", tmp_path / "other.yaml"
     cell.write_text(f"{CELL}taught: [none]\ncontroller_kinematics: nominal\n")
     told = compensate(worn("irb120"), job)
-    for part in ("tools", "frames"):
-        kept = truearm.compensate(worn("irb120"), job, **{part: cell})
+    for kept in (
+        truearm.compensate(worn("irb120"), job, tools=cell),
+        truearm.compensate(worn("irb120"), job, frames=cell),
+    ):
         assert (kept.files[0].text, kept.applied()["taught"]) == (told.files[0].text, [])
         assert kept.applied()["controller"] == told.applied()["controller"]
     assert truearm.compensate(worn("irb120"), job, tools=cell, taught=["points"]).files[0].corrected == 0

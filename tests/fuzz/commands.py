@@ -36,7 +36,7 @@ COMMANDS: Final[tuple[str, ...]] = (
     "validate calibrated.yaml data.csv --json --payload 2kg,0mm,0mm,50mm",
     "distances calibrated.yaml data.csv --json",
     "compensate calibrated.yaml plate.mod --out out",
-    "compensate calibrated.yaml plate.mod --out out --tool cell.yaml --taught none --controller-kinematics nominal --json",
+    "compensate calibrated.yaml plate.mod --out out --tool cell.yaml --taught none --json",
     "compensate calibrated.yaml plate.mod --out out --split 0.05",
     "compensate calibrated.yaml plate.mod --out out --wrench 0,0,9,0,0,0.1 --wrench-frame tool",
     "compensate calibrated.yaml plate.mod --out out --wrench forces.yaml",

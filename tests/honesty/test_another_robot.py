@@ -67,5 +67,5 @@ def test_a_program_of_another_maker_is_not_corrected_until_it_is_accepted(folder
     assert refused.code == 2
     assert "a robot of Universal Robots and programs in RAPID" in refused.refusal
     assert "--accept maker" in refused.refusal
-    accepted = told(*words, folder / "rapid", "--accept", "maker")
+    accepted = told(*words, folder / "rapid", "--accept", "maker", "--accept", "skipped")
     assert accepted.says("maker", "warning", "RAPID runs on controllers of ABB"), accepted

@@ -91,7 +91,7 @@ def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, colu
         ("frames:\n  f: {of: base, turn: 3}\n", "not known here"),
         ('tools:\n  t: {of: flange, target: "7"}\n', "no target of this name"),
         ('tools:\n  t: {of: controller, target: "1"}\n', "a target is on the identified flange"),
-        ('tools:\n  t: {of: flange, target: "1", wpr: [0, 0, 9]}\n', "the target says where the tool is"),
+        ('tools:\n  t: {of: flange, target: "1", translation: [0, 0, 9]}\n', "the target says where the tool is"),
         ("frames:\n  T: {of: base}\n  t: {of: base}\n", "this name is given twice"),
         ("frames:\n  base: {of: controller, translation: [0, 0, 1]}\n", "its own base at zero"),
         ("tools:\n  flange: {of: flange, controller: {translation: [0, 0, 1]}}\n", "its own flange at zero"),

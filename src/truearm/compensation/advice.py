@@ -21,8 +21,6 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import counted, listed
 
-#: Corrections of calibration errors are smaller [m]; a larger mean comes of a wrong tool, frame or robot.
-_LARGE_MEAN: Final = 0.02
 #: With so few targets and no frame, a correction without a mean is no correction.
 _FEW_TARGETS: Final = 3
 _LISTED: Final = 5
@@ -86,15 +84,6 @@ def check_correction(
                 "posture-guessed",
                 f"Nothing says in which posture the robot reaches its first pose ({'; '.join(result.guessed)}): it was "
                 "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be.",
-            )
-        )
-    moved = np.concatenate([one.moved[one.corrected] for one in corrections]) if count else np.zeros(0)
-    if count and float(moved.mean()) > _LARGE_MEAN:
-        made.append(
-            Notice(
-                "corrections-large",
-                f"Targets move by {moved.mean() * 1e3:.1f} mm on average, more than calibration errors do: check that "
-                "tools, frames and robot belong together, and the convention of their angles.",
             )
         )
     unsplit = sum(len(one.unsplit) for one in splits)

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from truearm.arrays import finite_number
 from truearm.compensation.advice import check_correction
 from truearm.compensation.cell import (
@@ -25,9 +27,11 @@ from truearm.compensation.controller_model import (
     refuse_kinematics_of_another_arm,
     refuse_unknown_controller,
 )
-from truearm.compensation.correction import Correction
+from truearm.compensation.correction import Correction, shared_motion
+from truearm.compensation.correction_limit import CorrectionLimit, check_size, correction_limit
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
+from truearm.compensation.program_poses import place
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
 from truearm.errors import InputError, refusals_at, refusals_of
@@ -80,6 +84,7 @@ def compensate(
     keep: Sequence[str] = (),
     taught: Sequence[str] | None = None,
     accept: Sequence[str] = (),
+    accept_correction: str | None = None,
     notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
@@ -130,6 +135,9 @@ def compensate(
         ``wrong-robot``; ``maker`` for programs in the language of another maker; ``other-kinematics`` for kinematics of
         the controller that are not this arm's; and ``not-better-here`` to correct also the targets that would rather
         get worse.
+    accept_correction
+        How far targets may be moved and turned, such as ``95mm,3deg``, in place of the limit: twice the largest
+        deviation of the calibrated from the nominal robot, see :mod:`truearm.compensation.correction_limit`.
     notes
         What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other.
     command
@@ -142,7 +150,8 @@ def compensate(
     InputError
         If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
         badly or is another maker's, a tool or frame is not defined, it is not known with what the controller computes
-        and its maker calibrates every arm, or with `strict` a target cannot be corrected.
+        and its maker calibrates every arm, a target would be moved or turned farther than the robot's errors explain,
+        or with `strict` a target cannot be corrected.
     """
     progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
@@ -178,7 +187,9 @@ def compensate(
         wrench=wrench_file,
         controller_kinematics=next(iter(_kinematics_file(controller_kinematics)), None),
     )
-    arm = _with_controller(robot_argument(robot).with_payload(payload), controller_kinematics)
+    allowed = None if accept_correction is None else CorrectionLimit.of(accept_correction, "accept_correction")
+    calibrated = _with_controller(robot_argument(robot), controller_kinematics)
+    arm = calibrated.with_payload(payload)
     if arm.wrench is not None:
         raise InputError(
             "something acts on the tool of this robot already",
@@ -205,24 +216,25 @@ def compensate(
         keep=list(choice.keep) or None,
         taught=None if choice.taught is None else sorted(choice.taught) or ["none"],
         accept=list(accepted) or None,
+        accept_correction=accept_correction,
         notes=notes or None,
     )
     refuse_unaccepted(arm, accepted)
-    with refusals_of("tools"):
-        tools_given = read_tools(arm, tool_file)
-    with refusals_of("frames"):
-        frames_given = read_frames(arm, frame_file)
-    cell = Cell(tools_given, frames_given)
     acting = _wrenches(arm, pushed, wrench_file)
     for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
         if path != wrench_file:
             refuse_wrenches_left_out(path, parameter)
-    _refuse_taught_and_measured(choice, cell)
     with refusals_of("programs"):
         files = program_files(paths, again=again)
         progress("reading the programs")
         read = read_programs(files)
     language = language_called(read[0].language)
+    with refusals_of("tools"):
+        tools_given = read_tools(arm, tool_file, language.flange)
+    with refusals_of("frames"):
+        frames_given = read_frames(arm, frame_file, language.base)
+    cell = Cell(tools_given, frames_given)
+    _refuse_taught_and_measured(choice, cell)
     foreign = check_maker(arm, language, accepted)
     refuse_unknown_controller(arm, read)
     with refusals_of("robot"):
@@ -237,6 +249,7 @@ def compensate(
             weigh_tools=payload is None,
             wrenches=acting,
         )
+    large = _check_size(result, correction_limit(calibrated), allowed)
     if strict:
         _refuse_skipped(result)
     splits: tuple[ProgramSplit, ...] = ()
@@ -266,6 +279,7 @@ def compensate(
             *controller_notices(arm, read),
             *_payloads_unlikely(arm, result),
             *check_force(result.pushed),
+            *large,
             *check_correction(arm, result, splits),
         ),
         command=invocation,
@@ -342,6 +356,27 @@ def _refuse_taught_and_measured(choice: Choice, cell: Cell) -> None:
                 came=measured[0] or ("flange" if what == "tools" else "base"),
                 cure=f"Leave {what} out of `taught`, or say with `of: controller` what the controller has.",
             )
+
+
+def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: CorrectionLimit | None) -> list[Notice]:
+    """Refuse corrections that errors of the robot do not explain, or say that they were accepted."""
+    rows = [(one, np.flatnonzero(one.corrected)) for one in result.corrections]
+    targets = [one.program.targets[row] for one, some in rows for row in some.tolist()]
+    programs = [one.program for one, some in rows for _ in some]
+    given = [name for name in ("frames", "tools") if getattr(result.frames, name) == "identified"]
+    shared = shared_motion([one.motions(some) for one, some in rows])
+    common = "" if shared is None else f"All targets share a shift of {shared.moved * 1e3:.2f} mm. "
+    return check_size(
+        np.concatenate([one.moved[some] for one, some in rows]),
+        np.concatenate([one.turned[some] for one, some in rows]),
+        limit,
+        accepted,
+        where=lambda row: place(programs[row], targets[row]),
+        check=f"{common}Usual causes are a frame or a tool that is elsewhere or turned otherwise than the file says, "
+        "numbers of the controller for them that are not those of this program, and a wrong unit or convention of "
+        "angles.",
+        parameter=", ".join(given) or "programs",
+    )
 
 
 def _refuse_skipped(result: CorrectedPrograms) -> None:

@@ -257,7 +257,7 @@ def test_a_program_without_targets_says_so(truearm: Truearm, cell: Path) -> None
     assert code == 0
     told = json.loads(said)
     assert [warning["code"] for warning in told["warnings"]] == ["no-targets", "unproven"]
-    assert told["programs"][0]["shift_mm"] == {"mean": 0.0, "max": 0.0}
+    assert told["programs"][0]["shift_mm"] == {"mean": 0.0, "max": 0.0, "common": None, "remainder": None}
     assert (cell / "out" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.compensation.chosen_targets import ALONE
 from truearm.compensation.correction import Correction
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.kept_targets import LARGEST_STEP, LIKELY
@@ -24,6 +25,8 @@ from truearm.shown import counted, listed
 #: With so few targets and no frame, a correction without a mean is no correction.
 _FEW_TARGETS: Final = 3
 _LISTED: Final = 5
+#: Said before everything else.
+NOTHING_CORRECTED: Final = "nothing-corrected"
 #: Share by which masses differ that are the same load.
 _SAME_MASS: Final = 0.1
 #: A tool is measured where the program has it, within what a calibration cannot know of the flange [m].
@@ -48,7 +51,8 @@ def check_correction(
     count = sum(int(one.corrected.sum()) for one in corrections)
     if any(one.program.targets for one in corrections):
         made = _asked(result) if count else []
-        made += _assumed(result)
+        alone = sum(why == ALONE for one in corrections for why in one.kept.values())
+        made += _nothing(alone) if alone and not count else _assumed(result)
         made += _by_joints(corrections)
     else:
         made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
@@ -196,6 +200,18 @@ def _asked(result: CorrectedPrograms) -> list[Notice]:
             f"Were the {words} of these programs computed, or taught with this robot? Nothing says it, and "
             "they were taken as computed. Points that were taught are right already, and a correction moves them away. "
             f"Answer with {answers}, or `taught=none`.",
+        )
+    ]
+
+
+def _nothing(alone: int) -> list[Notice]:
+    """Say that no target can be corrected, because where the frame of the only one is is not known."""
+    left = "only one target is left to correct" if alone == 1 else f"{alone} targets are left, each alone in its frame"
+    return [
+        Notice(
+            NOTHING_CORRECTED,
+            f"Nothing can be corrected: {left}, and `frames` is not given. The error of a single target could as well be "
+            f"that of its frame. {'It stays as it is' if alone == 1 else 'They stay as they are'}: give `frames`.",
         )
     ]
 

@@ -221,9 +221,6 @@ def compensate(
     )
     refuse_unaccepted(arm, accepted)
     acting = _wrenches(arm, pushed, wrench_file)
-    for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
-        if path != wrench_file:
-            refuse_wrenches_left_out(path, parameter)
     with refusals_of("programs"):
         files = program_files(paths, again=again)
         progress("reading the programs")
@@ -234,6 +231,9 @@ def compensate(
     with refusals_of("frames"):
         frames_given = read_frames(arm, frame_file, language.base)
     cell = Cell(tools_given, frames_given)
+    for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
+        if path != wrench_file:
+            refuse_wrenches_left_out(path, parameter)
     _refuse_taught_and_measured(choice, cell)
     foreign = check_maker(arm, language, accepted)
     refuse_unknown_controller(arm, read)

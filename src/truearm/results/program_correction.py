@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.compensation.advice import frame_words
+from truearm.compensation.advice import NOTHING_CORRECTED, frame_words
 from truearm.compensation.chosen_targets import Kept
 from truearm.compensation.correction import Correction, Shared, shared_motion
 from truearm.compensation.gauge import turns_between
@@ -313,9 +313,10 @@ class ProgramCorrection(Record):
     def lines(self) -> list[str]:
         """Return a line for each file, what was skipped and what to know."""
         parts = [file.lines() for file in self.files]
-        text = []
-        for file, (first, second, *_) in zip(self.files, parts, strict=True):
-            text += [first, second]
+        first = [one for one in self.warnings if one.code == NOTHING_CORRECTED]
+        text = notice_lines(first)
+        for file, (headline, counts, *_) in zip(self.files, parts, strict=True):
+            text += [headline, counts]
             if file.shared_words and self.result.frames.frames != "assumed":
                 text.append(f"  {file.shared_words}")
         skipped = [line for _, _, *lines in parts for line in lines]
@@ -331,7 +332,7 @@ class ProgramCorrection(Record):
             if split.moves:
                 moves, more = split.moves, split.added
                 text.append(f"  {moves} move{'s'[: moves > 1]} split by {more} more target{'s'[: more > 1]}")
-        text += notice_lines(self.warnings)
+        text += notice_lines([one for one in self.warnings if one not in first])
         return text if self.simulated is None else [*text, *self.simulated.lines()]
 
     @property
@@ -349,8 +350,6 @@ class ProgramCorrection(Record):
         said = (
             f"These errors are of the targets relative to each other, {each}: where a frame is as a whole is not known."
         )
-        if sum(len(file.expected[0]) for file in self.files if file.expected is not None) == 1:
-            said += " Of a single target they are zero, and say nothing."
         if any(file.skipped for file in self.files):
             said += " What is left unchanged is not in them: it now lies off the others by as much as those were moved."
         return said

@@ -93,6 +93,7 @@ def corrected_program(
     from truearm.compensation.cell import Cell, read_frames, read_tools
     from truearm.compensation.correction import way_through
     from truearm.compensation.program_correction import commanded
+    from truearm.compensation.program_files import language_called
     from truearm.jobs.compensate import compensate
 
     os.chdir(folder)
@@ -116,7 +117,8 @@ def corrected_program(
         )
         progress("drawing the program")
         tools, frames = (None if part not in places else Path(places[part]) for part in ("tools", "frames"))
-        known = Cell(read_tools(made.robot, tools), read_frames(made.robot, frames))
+        language = language_called(made.files[0].language)
+        known = Cell(read_tools(made.robot, tools, language.flange), read_frames(made.robot, frames, language.base))
         before, after = (
             commanded(made.robot, one, known) for one in (made.result.corrections[0].program, made.as_written()[0])
         )

@@ -210,8 +210,8 @@ def _nothing(alone: int) -> list[Notice]:
     return [
         Notice(
             NOTHING_CORRECTED,
-            f"Nothing can be corrected: {left}, and `frames` is not given. The error of a single target could as well be "
-            f"that of its frame. {'It stays as it is' if alone == 1 else 'They stay as they are'}: give `frames`.",
+            f"Nothing can be corrected: {left}, and `frames` is not given. The error of a single target could as well "
+            f"be that of its frame. {'It stays as it is' if alone == 1 else 'They stay as they are'}: give `frames`.",
         )
     ]
 

@@ -42,10 +42,13 @@ class CorrectionLimit:
         [m].
     turned
         [rad].
+    words
+        Where it comes from.
     """
 
     moved: float
     turned: float
+    words: str = "as accepted"
 
     @classmethod
     def of(cls, text: object, parameter: str) -> CorrectionLimit:
@@ -77,6 +80,10 @@ class CorrectionLimit:
         """In words, in mm and deg."""
         return f"{self.moved * 1e3:.2f} mm and {math.degrees(self.turned):.2f} deg"
 
+    def beside(self, turned: float) -> CorrectionLimit:
+        """Return it for targets that a base which had to be assumed turns by so much with itself [rad]."""
+        return CorrectionLimit(self.moved, self.turned + turned, f"{self.words}, and the turn of the assumed base")
+
     def allows(self, other: CorrectionLimit) -> bool:
         """Return whether what moves and turns so far is within it."""
         return other.moved <= self.moved and other.turned <= self.turned
@@ -100,7 +107,8 @@ def correction_limit(robot: Robot) -> CorrectionLimit:
     apart = (real - nominal)[:, :3] @ np.array(points or [[0.0, 0.0, 0.0, 1.0]]).T
     moved = float(np.linalg.norm(apart, axis=1).max())
     turned = float(np.linalg.norm(turns_between(nominal, real), axis=1).max())
-    return CorrectionLimit(_TIMES * moved, _TIMES * max(turned, moved / reach(believed, None)))
+    words = "twice the largest deviation of the calibrated from the nominal robot in its workspace"
+    return CorrectionLimit(_TIMES * moved, _TIMES * max(turned, moved / reach(believed, None)), words)
 
 
 def check_size(
@@ -141,12 +149,11 @@ def check_size(
         With the largest move and turn, and both limits.
     """
     largest = CorrectionLimit(float(moved.max(initial=0.0)), float(turned.max(initial=0.0)))
-    explained = f"{limit.text}, twice the largest deviation of the calibrated from the nominal robot in its workspace"
     holds = limit if accepted is None else accepted
     if holds.allows(largest):
         said = (
             f"Targets are moved and turned by up to {largest.text}, which was accepted. Errors of this robot explain "
-            f"up to {explained}. {check}"
+            f"{limit.text}: {limit.words}. {check}"
         )
         return [] if limit.allows(largest) else [Notice("corrections-large", said)]
     worst = int((moved if largest.moved > holds.moved else turned).argmax())
@@ -158,7 +165,7 @@ def check_size(
         parameter=parameter,
         where=where(worst),
         came=Words(f"up to {largest.text}"),
-        allowed=f"up to {explained}" if accepted is None else f"up to {accepted.text}, as `accept_correction` says",
+        allowed=f"up to {holds.text}, {holds.words}",
         cure=f"{check} If it is right all the same, `accept_correction={enough}` allows it.",
     )
 

@@ -29,6 +29,7 @@ from truearm.compensation.controller_model import (
 )
 from truearm.compensation.correction import Correction, shared_motion
 from truearm.compensation.correction_limit import CorrectionLimit, check_size, correction_limit
+from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
 from truearm.compensation.program_poses import place
@@ -364,6 +365,10 @@ def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: Cor
     targets = [one.program.targets[row] for one, some in rows for row in some.tolist()]
     programs = [one.program for one, some in rows for _ in some]
     given = [name for name in ("frames", "tools") if getattr(result.frames, name) == "identified"]
+    if result.frames.frames == "assumed":
+        bases = np.array([*result.frames.bases.values()]).reshape(-1, 4, 4)
+        turns = np.linalg.norm(turns_between(np.broadcast_to(np.eye(4), bases.shape), bases), axis=1)
+        limit = limit.beside(float(turns.max(initial=0.0)))
     shared = shared_motion([one.motions(some) for one, some in rows])
     common = "" if shared is None else f"All targets share a shift of {shared.moved * 1e3:.2f} mm. "
     return check_size(

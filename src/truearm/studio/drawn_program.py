@@ -87,6 +87,7 @@ def corrected_program(
     taught: Sequence[str] | None,
     controller_kinematics: str | None,
     accept: Sequence[str],
+    accept_correction: str | None,
     progress: Progress,
 ) -> DrawnProgram:
     """Correct a program and write it, :func:`truearm.compensate`, and find where the real robot goes with it."""
@@ -110,8 +111,9 @@ def corrected_program(
             taught=taught,
             controller_kinematics=controller_kinematics,
             accept=accept,
+            accept_correction=accept_correction,
             command=compensate_command(
-                robot, program, places, wrench, wrench_frame, taught, controller_kinematics, accept
+                robot, program, places, wrench, wrench_frame, taught, controller_kinematics, accept, accept_correction
             ),
             progress=progress,
         )

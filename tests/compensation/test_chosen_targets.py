@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -270,6 +272,8 @@ OWN_NAMES = (
     "  PROC main()\n    MoveL a,v100,fine,tool0\\WObj:=wobj0;\n    MoveL b,v100,fine,tool0;\n"
     "    MoveL c,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
 )
+#: All was computed, for a controller that computes with the nominal values.
+ANSWERED: Mapping[str, Any] = {"taught": ["none"], "controller_kinematics": "nominal"}
 CELL = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
 
 
@@ -305,7 +309,7 @@ def test_tool0_and_wobj0_are_the_flange_and_the_base(tmp_path: Path, declared: b
 def test_a_single_target_is_corrected_where_its_frame_is_known(tmp_path: Path) -> None:
     program, cell = own_names(tmp_path), tmp_path / "cell.yaml"
     cell.write_text(f"{CELL}frames:\n  wobj0: {{of: base}}\n")
-    alone = truearm.compensate(worn(), [program], only=["a"], taught=["none"], controller_kinematics="nominal")
+    alone = truearm.compensate(worn(), [program], only=["a"], **ANSWERED)
     assert alone.lines()[0].startswith("Warning (nothing-corrected): Nothing can be corrected: only one target is left")
     assert "0.000 mm" not in " ".join(alone.lines())
     assert alone.summary()["programs"][0]["expected_mm"] is None
@@ -316,11 +320,7 @@ def test_a_single_target_is_corrected_where_its_frame_is_known(tmp_path: Path) -
     assert known.files[0].corrected == 1
     assert known.files[0].largest_shift > 1e-4
     assert "nothing-corrected" not in {notice.code for notice in known.warnings}
-    assert (
-        not truearm.compensate(worn(), [program], taught=["none"], controller_kinematics="nominal")
-        .lines()[0]
-        .startswith("Warning")
-    )
+    assert not truearm.compensate(worn(), [program], **ANSWERED).lines()[0].startswith("Warning")
 
 
 def test_of_frames_that_were_taught_one_with_a_single_target_leaves_it(tmp_path: Path) -> None:
@@ -335,5 +335,5 @@ def test_of_frames_that_were_taught_one_with_a_single_target_leaves_it(tmp_path:
     apart = truearm.compensate(worn(), [program], taught=["frames"], controller_kinematics="nominal")
     assert corrected_lines(apart) == ["a", "b", "c"]
     assert apart.files[0].kept == {"alone, with `frames` not given": 1}
-    together = truearm.compensate(worn(), [program], taught=["none"], controller_kinematics="nominal")
+    together = truearm.compensate(worn(), [program], **ANSWERED)
     assert sorted(corrected_lines(together)) == ["a", "b", "c", "d"]

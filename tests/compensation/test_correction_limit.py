@@ -93,8 +93,8 @@ def test_position_and_orientation_count_each_for_itself(
 
     def checked() -> list[str]:
         sizes = np.array([0.0, moved]), np.array([0.0, turned])
-        words = {"where": lambda row: f"line {row}", "check": "Look.", "parameter": "frames"}
-        return [notice.code for notice in check_size(*sizes, limit, given, **words)]
+        found = check_size(*sizes, limit, given, where=lambda row: f"line {row}", check="Look.", parameter="frames")
+        return [notice.code for notice in found]
 
     if refused:
         with pytest.raises(InputError, match=r"^line 1: the correction is larger"):

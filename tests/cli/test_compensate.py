@@ -379,7 +379,7 @@ def test_relative_errors_say_what_is_not_in_them(demonstrated: Demonstration, tr
     head = "MODULE m\n  PROC main()\n"
     lines = [
         f"    MoveL [[{x},0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n"
-        for x in (374, 394, 2000)
+        for x in (250, 420, 2000)
     ]
     (tmp_path / "m.mod").write_text(f"{head}{''.join(lines)}  ENDPROC\nENDMODULE\n")
     robot, known = demonstrated.folder / "calibrated.yaml", ("--taught", "none", "--controller-kinematics", "nominal")

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.cell import Cell, read_frames, read_tools
+from truearm.compensation.cell import Cell, read_frames, read_known_places, read_tools
+from truearm.compensation.programs import LANGUAGES
+from truearm.compensation.programs.program import Language
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.robot import Robot
@@ -45,6 +47,58 @@ def test_own_base_and_flange_are_the_frames_without_a_name(tmp_path: Path) -> No
     cell = read(tmp_path, "tools:\n  flange: {of: flange}\nframes:\n  Base: {of: base, translation: [1, 2, 3]}\n")
     assert cell.tools[""].identified == Transform()
     assert cell.frames[""].identified == Transform((0.001, 0.002, 0.003))
+
+
+#: What each language calls the flange and the base, besides `flange` and `base`; from its maker's manuals.
+OWN = {
+    "RAPID": (["tool0", "TOOL0"], ["wobj0"]),
+    "KRL": (["0", "$NULLFRAME"], ["0", "$NULLFRAME", "$WORLD", "$ROBROOT"]),
+    "FANUC LS": (["0"], ["0"]),
+    "URScript": ([], []),
+    "INFORM": ([], ["ROBOT"]),
+    "VAL3": ([], ["world"]),
+}
+
+
+@pytest.mark.parametrize("language", LANGUAGES, ids=lambda language: language.name)
+def test_own_base_and_flange_are_called_as_the_language_calls_them(tmp_path: Path, language: Language) -> None:
+    file = tmp_path / "cell.yaml"
+    flange, base = OWN[language.name]
+    for name in ["flange", *flange]:
+        file.write_text(f'{HEAD}tools:\n  "{name}": {{of: flange, translation: [0, 0, 1]}}\n')
+        assert list(read_tools(robot(), file, language.flange)) == [""]
+    for name in ["base", *base]:
+        file.write_text(f'{HEAD}frames:\n  "{name}": {{of: world}}\n')
+        assert list(read_frames(robot(), file, language.base)) == [""]
+    # In another language it is the name of any tool; tool 0 of a Yaskawa is a tool like the others.
+    file.write_text(f'{HEAD}tools:\n  "0": {{of: controller}}\n  tool0: {{of: controller}}\n  myTool: {{of: flange}}\n')
+    if "0" in language.flange or "tool0" in language.flange:
+        with pytest.raises(InputError, match="its own flange at zero"):
+            read_tools(robot(), file, language.flange)
+    else:
+        assert list(read_tools(robot(), file, language.flange)) == ["0", "tool0", "mytool"]
+
+
+def test_two_names_of_one_flange_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "cell.yaml"
+    file.write_text(f"{HEAD}tools:\n  tool0: {{of: flange}}\n  flange: {{of: flange, translation: [0, 0, 1]}}\n")
+    assert set(read_tools(robot(), file)) == {"tool0", ""}
+    with pytest.raises(InputError, match="own flange is given twice; got 'tool0 and flange'") as refusal:
+        read_tools(robot(), file, ("tool0",))
+    assert refusal.value.where == f"{file}, tools.flange"
+    file.write_text(f'{HEAD}frames:\n  "0": {{of: base}}\n  $World: {{of: base}}\n')
+    with pytest.raises(InputError, match=r"own base is given twice; got '0 and \$World'"):
+        read_frames(robot(), file, ("0", "$world"))
+
+
+def test_a_target_that_is_a_point_may_be_given_an_orientation(tmp_path: Path) -> None:
+    cell = read(tmp_path, 'tools:\n  t: {of: flange, target: "1", wpr: [0, 90, 0]}\n')
+    placed = cell.tools["t"].identified
+    assert placed is not None
+    assert placed.translation == (0.01, 0.02, 0.125)
+    np.testing.assert_allclose(placed.rotation @ [0, 0, 1], [1, 0, 0], atol=1e-12)
+    (known,) = read_known_places(robot(), tmp_path / "cell.yaml")[0].values()
+    assert (known.place, known.turned) == (placed, True)
 
 
 def test_a_number_is_a_name(tmp_path: Path) -> None:
@@ -91,7 +145,7 @@ def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, colu
         ("frames:\n  f: {of: base, turn: 3}\n", "not known here"),
         ('tools:\n  t: {of: flange, target: "7"}\n', "no target of this name"),
         ('tools:\n  t: {of: controller, target: "1"}\n', "a target is on the identified flange"),
-        ('tools:\n  t: {of: flange, target: "1", wpr: [0, 0, 9]}\n', "the target says where the tool is"),
+        ('tools:\n  t: {of: flange, target: "1", translation: [0, 0, 9]}\n', "the target says where the tool is"),
         ("frames:\n  T: {of: base}\n  t: {of: base}\n", "this name is given twice"),
         ("frames:\n  base: {of: controller, translation: [0, 0, 1]}\n", "its own base at zero"),
         ("tools:\n  flange: {of: flange, controller: {translation: [0, 0, 1]}}\n", "its own flange at zero"),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -261,3 +263,75 @@ def test_a_record_that_is_not_ours_or_holds_the_only_original_is_not_lost(tmp_pa
     with pytest.raises(InputError, match="was not written by truearm or was changed since"):
         compensate(worn(), [program], out=out)
     assert (out / "plate.mod.truearm.json").read_text() == "mine"
+
+
+OWN_NAMES = (
+    "MODULE m\n  CONST robtarget a:={a};\n  CONST robtarget b:={b};\n  CONST robtarget c:={c};\n"
+    "  PROC main()\n    MoveL a,v100,fine,tool0\\WObj:=wobj0;\n    MoveL b,v100,fine,tool0;\n"
+    "    MoveL c,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
+)
+#: All was computed, for a controller that computes with the nominal values.
+ANSWERED: Mapping[str, Any] = {"taught": ["none"], "controller_kinematics": "nominal"}
+CELL = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+
+
+def own_names(folder: Path, more: str = "") -> Path:
+    path = folder / "own.mod"
+    poses = {name: POSE.format(x=x, y=y) for name, x, y in (("a", 300, 10), ("b", 350, 60), ("c", 320, 90))}
+    path.write_text(OWN_NAMES.format(**poses).replace("MODULE m\n", f"MODULE m\n{more}"))
+    return path
+
+
+@pytest.mark.parametrize("declared", [False, True])
+def test_tool0_and_wobj0_are_the_flange_and_the_base(tmp_path: Path, declared: bool) -> None:
+    """They were unknown in a cell file, and in a program that has the module BASE of its controller along."""
+    data = (
+        "PERS tooldata tool0:=[TRUE,[[0,0,0],[1,0,0,0]],[0.001,[0,0,0.001],[1,0,0,0],0,0,0]];\n"
+        'PERS wobjdata wobj0:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+    )
+    program, cell, texts = own_names(tmp_path, data if declared else ""), tmp_path / "cell.yaml", []
+    for tool, frame in (("tool0", "wobj0"), ("flange", "base"), ("Tool0", "WOBJ0")):
+        cell.write_text(
+            f"{CELL}tools:\n  {tool}: {{of: flange, translation: [0.1, 0, 0]}}\n"
+            f"frames:\n  {frame}: {{of: base, translation: [0, 0.2, 0]}}\n"
+        )
+        made = truearm.compensate(
+            worn(), [program], tools=cell, frames=cell, taught=["none"], controller_kinematics="nominal"
+        )
+        assert made.files[0].corrected == 3
+        assert made.result.frames.tools == made.result.frames.frames == "identified"
+        texts.append(made.files[0].text)
+    assert texts[0] == texts[1] == texts[2] != program.read_bytes()
+
+
+def test_a_single_target_is_corrected_where_its_frame_is_known(tmp_path: Path) -> None:
+    program, cell = own_names(tmp_path), tmp_path / "cell.yaml"
+    cell.write_text(f"{CELL}frames:\n  wobj0: {{of: base}}\n")
+    alone = truearm.compensate(worn(), [program], only=["a"], **ANSWERED)
+    assert alone.lines()[0].startswith("Warning (nothing-corrected): Nothing can be corrected: only one target is left")
+    assert "0.000 mm" not in " ".join(alone.lines())
+    assert alone.summary()["programs"][0]["expected_mm"] is None
+    assert alone.files[0].text == program.read_bytes()
+    known = truearm.compensate(
+        worn(), [program], only=["a"], frames=cell, taught=["none"], controller_kinematics="nominal"
+    )
+    assert known.files[0].corrected == 1
+    assert known.files[0].largest_shift > 1e-4
+    assert "nothing-corrected" not in {notice.code for notice in known.warnings}
+    assert not truearm.compensate(worn(), [program], **ANSWERED).lines()[0].startswith("Warning")
+
+
+def test_of_frames_that_were_taught_one_with_a_single_target_leaves_it(tmp_path: Path) -> None:
+    other = (
+        'PERS wobjdata wOther:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+        f"CONST robtarget d:={POSE.format(x=310, y=20)};\n"
+    )
+    program = own_names(tmp_path, other)
+    program.write_text(
+        program.read_text().replace("  ENDPROC", "    MoveJ d,v100,fine,tool0\\WObj:=wOther;\n  ENDPROC")
+    )
+    apart = truearm.compensate(worn(), [program], taught=["frames"], controller_kinematics="nominal")
+    assert corrected_lines(apart) == ["a", "b", "c"]
+    assert apart.files[0].kept == {"alone, with `frames` not given": 1}
+    together = truearm.compensate(worn(), [program], **ANSWERED)
+    assert sorted(corrected_lines(together)) == ["a", "b", "c", "d"]

@@ -313,6 +313,7 @@ def test_the_command_that_the_report_names_does_the_same(
         ["none"],
         "nominal",
         ["maker", "not-better-here"],
+        "95mm,3deg",
         print,
     )
     found = re.search(

@@ -95,6 +95,14 @@ def compensate(
             show_default=False,
         ),
     ] = None,
+    accept_correction: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH,ANGLE",
+            help="How far targets may be moved and turned, for instance 95mm,3deg; a larger correction is refused.",
+            show_default="twice the robot's largest deviation",
+        ),
+    ] = None,
     notes: NoteTexts = None,
     revert: Annotated[bool, typer.Option("--revert", help="Write the originals of corrected programs.")] = False,
     json: Json = False,
@@ -122,6 +130,7 @@ def compensate(
             keep=keep or None,
             taught=taught,
             accept=accept or None,
+            accept_correction=accept_correction,
             notes=notes or None,
         )
         return
@@ -146,6 +155,7 @@ def compensate(
             keep=keep or (),
             taught=None if taught is None else [word.strip() for word in taught.split(",")],
             accept=accept or (),
+            accept_correction=accept_correction,
             notes=read_notes(notes),
             command=command_line(),
             progress=say,

@@ -54,6 +54,14 @@ def path(
         list[str] | None,
         typer.Option(metavar="NAME", help="What may speak against the calibration; repeatable.", show_default=False),
     ] = None,
+    accept_correction: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH,ANGLE",
+            help="How far a program may move and turn the tip from the path, for instance 95mm,3deg.",
+            show_default="twice the robot's largest deviation",
+        ),
+    ] = None,
     joints: JointsText = None,
     json: Json = False,
 ) -> None:
@@ -77,6 +85,7 @@ def path(
         name=name,
         controller_kinematics=controller_kinematics,
         accept=accept or [],
+        accept_correction=accept_correction,
         joints=joints,  # type: ignore[arg-type]
         out=out,
         command=command_line(),

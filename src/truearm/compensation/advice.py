@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.compensation.chosen_targets import ALONE
 from truearm.compensation.correction import Correction
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.kept_targets import LARGEST_STEP, LIKELY
@@ -21,11 +22,11 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import counted, listed
 
-#: Corrections of calibration errors are smaller [m]; a larger mean comes of a wrong tool, frame or robot.
-_LARGE_MEAN: Final = 0.02
 #: With so few targets and no frame, a correction without a mean is no correction.
 _FEW_TARGETS: Final = 3
 _LISTED: Final = 5
+#: Said before everything else.
+NOTHING_CORRECTED: Final = "nothing-corrected"
 #: Share by which masses differ that are the same load.
 _SAME_MASS: Final = 0.1
 #: A tool is measured where the program has it, within what a calibration cannot know of the flange [m].
@@ -49,7 +50,9 @@ def check_correction(
     corrections = result.corrections
     count = sum(int(one.corrected.sum()) for one in corrections)
     if any(one.program.targets for one in corrections):
-        made = [*_assumed(result), *_by_joints(corrections)]
+        alone = sum(why == ALONE for one in corrections for why in one.kept.values())
+        made = _nothing(alone) if alone and not count else _assumed(result)
+        made += _by_joints(corrections)
     else:
         made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
     skipped = sum(len(one.skipped) for one in corrections)
@@ -84,15 +87,6 @@ def check_correction(
                 "posture-guessed",
                 f"Nothing says in which posture the robot reaches its first pose ({'; '.join(result.guessed)}): it was "
                 "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be.",
-            )
-        )
-    moved = np.concatenate([one.moved[one.corrected] for one in corrections]) if count else np.zeros(0)
-    if count and float(moved.mean()) > _LARGE_MEAN:
-        made.append(
-            Notice(
-                "corrections-large",
-                f"Targets move by {moved.mean() * 1e3:.1f} mm on average, more than calibration errors do: check that "
-                "tools, frames and robot belong together, and the convention of their angles.",
             )
         )
     unsplit = sum(len(one.unsplit) for one in splits)
@@ -187,6 +181,18 @@ def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
     shown = [(one.program.sources, one.program.targets[row]) for one, row in targets[:_LISTED]]
     lines = ", ".join(f"{sources[target.source].path.name} line {target.line}" for sources, target in shown)
     return f"{lines}{', ..' if len(targets) > _LISTED else ''}"
+
+
+def _nothing(alone: int) -> list[Notice]:
+    """Say that no target can be corrected, because where the frame of the only one is is not known."""
+    left = "only one target is left to correct" if alone == 1 else f"{alone} targets are left, each alone in its frame"
+    return [
+        Notice(
+            NOTHING_CORRECTED,
+            f"Nothing can be corrected: {left}, and `frames` is not given. The error of a single target could as well "
+            f"be that of its frame. {'It stays as it is' if alone == 1 else 'They stay as they are'}: give `frames`.",
+        )
+    ]
 
 
 def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:

@@ -10,7 +10,12 @@ calibration has identified, somebody has to measure; a file says it::
       tGripper: {of: flange, translation: [0.1, -0.2, 150.3], quaternion: [1, 0, 0, 0]}
     frames:
       wobjTable: {of: world, translation: [812.4, 3.1, 250.0], quaternion: [1, 0, 0, 0]}
-      "2": {of: controller, translation: [500, 0, 0], wpr: [0, 0, 90]}
+      "2":
+        of: world
+        translation: [1312.0, 4.0, 251.2]
+        wpr: [0, 0, 90.1]
+        controller: {translation: [500, 0, 0], wpr: [0, 0, 90]}
+      "3": {of: controller, translation: [500, 0, 0], wpr: [0, 0, 90]}
 
 What acts on the tool at targets, by name or pattern, or with tools::
 
@@ -25,14 +30,15 @@ What only the user knows can be kept there too, as :func:`truearm.compensate` ta
     controller_kinematics: nominal
 
 ``world`` is the instrument's frame, in which the robot was calibrated; ``base`` and ``flange`` are the identified base
-and flange; ``controller`` says what the controller has where the program does not define it. The robot's own base and
-flange are called ``base`` and ``flange``.
+and flange; ``controller`` says what the controller has where the program does not define it. No measured place says
+that: the controller's numbers are in its own base and flange. The robot's own base and flange are called ``base`` and
+``flange``, or as the language of the programs calls them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -199,7 +205,7 @@ class TargetWrench:
 EMPTY_CELL: Final = Cell({}, {})
 
 
-def read_tools(robot: Robot, path: Path | None) -> dict[str, Placed]:
+def read_tools(robot: Robot, path: Path | None, flange: Sequence[str] = ()) -> dict[str, Placed]:
     """Read where a program's tools are.
 
     Parameters
@@ -208,16 +214,18 @@ def read_tools(robot: Robot, path: Path | None) -> dict[str, Placed]:
         Calibrated; ``target`` refers to its targets.
     path
         File of the schema above, of which the tools are taken; None for none.
+    flange
+        What the language of the programs calls the robot's own flange, in small letters.
 
     Raises
     ------
     InputError
         If the file is not of the schema, or has no tools.
     """
-    return {} if path is None else _tools(robot, path, _file(path, "tools"))
+    return {} if path is None else _tools(robot, path, _file(path, "tools"), ("flange", *flange))
 
 
-def read_frames(robot: Robot, path: Path | None) -> dict[str, Placed]:
+def read_frames(robot: Robot, path: Path | None, base: Sequence[str] = ()) -> dict[str, Placed]:
     """Read where a program's frames are.
 
     Parameters
@@ -226,13 +234,15 @@ def read_frames(robot: Robot, path: Path | None) -> dict[str, Placed]:
         Calibrated; ``world`` refers to its base.
     path
         File of the schema above, of which the frames are taken; None for none.
+    base
+        What the language of the programs calls the robot's own base, in small letters.
 
     Raises
     ------
     InputError
         If the file is not of the schema, or has no frames.
     """
-    return {} if path is None else _frames(robot, path, _file(path, "frames"))
+    return {} if path is None else _frames(robot, path, _file(path, "frames"), ("base", *base))
 
 
 def read_wrenches(path: Path) -> tuple[TargetWrench, ...]:
@@ -344,42 +354,56 @@ def _file(path: Path, part: str) -> CellFile:
     return content
 
 
-def _tools(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
+def _tools(robot: Robot, path: Path, content: CellFile, flange: Sequence[str]) -> dict[str, Placed]:
     made: dict[str, Placed] = {}
+    keys = _keys(content.tools, flange, f"{path}, tools")
     for name, entry in content.tools.items():
         where = f"{path}, tools.{name}"
-        if entry.target is None:
-            place = _transform(entry, content.units, where)
-        else:
-            if entry.of == "controller":
-                raise InputError("a target is on the identified flange", where=where, came="of: controller")
-            if entry.model_fields_set & {"translation", *_ORIENTATIONS}:
-                raise InputError("the target says where the tool is", where=where, cure="Leave its numbers out.")
-            with refusals_at(f"{where}.target"):
-                place = _of_target(robot, entry.target)
-        _add(made, name, "flange", _placed(entry.of, place, entry.controller, content.units, where), where)
+        if entry.target is not None and entry.of == "controller":
+            raise InputError("a target is on the identified flange", where=where, came="of: controller")
+        place, _ = _tool_place(robot, entry, content.units, where)
+        made[keys[name]] = _placed(entry.of, place, entry.controller, content.units, where)
+        _refuse_moved(keys[name], made[keys[name]], "flange", where)
     return made
 
 
-def _frames(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
+def _frames(robot: Robot, path: Path, content: CellFile, base: Sequence[str]) -> dict[str, Placed]:
     made: dict[str, Placed] = {}
+    keys = _keys(content.frames, base, f"{path}, frames")
     for name, entry in content.frames.items():
         where = f"{path}, frames.{name}"
         place = _transform(entry, content.units, where)
         if entry.of == "world":
             in_base = np.linalg.inv(robot.base.matrix) @ place.matrix
             place = Transform.from_matrix(in_base[:3, :3], in_base[:3, 3])
-        _add(made, name, "base", _placed(entry.of, place, entry.controller, content.units, where), where)
+        made[keys[name]] = _placed(entry.of, place, entry.controller, content.units, where)
+        _refuse_moved(keys[name], made[keys[name]], "base", where)
     return made
 
 
-def _add(made: dict[str, Placed], name: str, own: str, placed: Placed, where: str) -> None:
-    key = "" if name.lower() == own else name.lower()
-    if key in made:
-        raise InputError("this name is given twice", where=where, cure="Large and small letters are the same here.")
+def _keys(names: Iterable[str], own: Sequence[str], where: str) -> dict[str, str]:
+    """Return the key of each name: the name in small letters, and nothing for the names of the flange or the base."""
+    made: dict[str, str] = {}
+    called: dict[str, str] = {}
+    for name in names:
+        key = "" if name.lower() in own else name.lower()
+        before = called.setdefault(key, name)
+        if before != name:
+            alike = before.lower() == name.lower()
+            raise InputError(
+                "this name is given twice" if alike else f"the robot's own {own[0]} is given twice",
+                where=f"{where}.{name}",
+                came=f"{before} and {name}",
+                cure="Large and small letters are the same here." if alike else "Both names mean it: keep one entry.",
+            )
+        made[name] = key
+    return made
+
+
+def _refuse_moved(key: str, placed: Placed, own: str, where: str) -> None:
+    """Refuse numbers that the controller had for its own flange or base."""
     if key == "" and placed.controller is not None:
         raise InputError(f"the controller has its own {own} at zero, and nowhere else", where=where)
-    made[key] = placed
 
 
 def _placed(of: str, place: Transform, controller: _Place | None, units: _Units, where: str) -> Placed:
@@ -390,9 +414,21 @@ def _placed(of: str, place: Transform, controller: _Place | None, units: _Units,
     return Placed(None if controller is None else _transform(controller, units, f"{where}.controller"), place)
 
 
-def _of_target(robot: Robot, name: str) -> Transform:
-    kinematics = robot.target(name).chain.forward_kinematics(np.zeros((0, 1)), robot.values)
-    return Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0])
+def _tool_place(robot: Robot, entry: _Tool, units: _Units, where: str) -> tuple[Transform, bool]:
+    """Return where a tool is, and whether it is known how it is turned: by a target, or by the entry's numbers."""
+    place, turned = _transform(entry, units, where), bool(entry.model_fields_set & {*_ORIENTATIONS})
+    if entry.target is None:
+        return place, turned
+    with refusals_at(f"{where}.target"):
+        target = robot.target(entry.target)
+    of_target = target.quaternion is not None
+    if "translation" in entry.model_fields_set or (turned and of_target):
+        raise InputError("the target says where the tool is", where=where, cure="Leave its numbers out.")
+    kinematics = target.chain.forward_kinematics(np.zeros((0, 1)), robot.values)
+    x, y, z = kinematics.position[:, 0].tolist()
+    if not of_target:
+        return Transform((x, y, z), place.quaternion), turned
+    return Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0]), True
 
 
 def _transform(place: _Place, units: _Units, where: str) -> Transform:
@@ -456,11 +492,10 @@ def read_known_places(robot: Robot, path: Path) -> tuple[dict[str, KnownPlace], 
                     allowed="of: flange" if part == "tools" else "of: world, of: base",
                     cure="Leave the entry out, or say where it was measured.",
                 )
-            turned = bool(entry.model_fields_set & {*_ORIENTATIONS})
-            if isinstance(entry, _Tool) and entry.target is not None:
-                with refusals_at(f"{where}.target"):
-                    place, turned = _of_target(robot, entry.target), robot.target(entry.target).quaternion is not None
+            if isinstance(entry, _Tool):
+                place, turned = _tool_place(robot, entry, content.units, where)
             else:
                 place = _transform(entry, content.units, where)
+                turned = bool(entry.model_fields_set & {*_ORIENTATIONS})
             found[name] = KnownPlace(entry.of, place, turned, where)
     return tools, frames

@@ -21,7 +21,11 @@ from truearm.errors import InputError, did_you_mean
 Taught = Literal["points", "frames", "tools"]
 TAUGHT: Final[tuple[Taught, ...]] = ("points", "frames", "tools")
 #: Why a target stays, in words for a count: ``3 <words>``.
-Kept = Literal["given by joints", "taught", "not in `only`", "in `keep`", "not better corrected"]
+Kept = Literal[
+    "given by joints", "taught", "not in `only`", "in `keep`", "not better corrected", "alone, with `frames` not given"
+]
+#: The only target from which the place of a frame would follow.
+ALONE: Final[Kept] = "alone, with `frames` not given"
 
 
 @dataclass(frozen=True)

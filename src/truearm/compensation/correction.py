@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation.chosen_targets import Kept
 from truearm.compensation.expected_errors import ExpectedErrors
-from truearm.compensation.gauge import turns_between
+from truearm.compensation.gauge import common_motion, turns_between
 from truearm.compensation.programs.program import Edit, Program, Skipped
 from truearm.modeling.chain import Array
+
+#: So few targets can be moved almost anyhow by a common motion: of them no remainder says anything.
+_FEW_TARGETS: Final = 3
 
 
 def way_through(program: Program, tips: Array, most: int) -> Array:
@@ -91,3 +95,42 @@ class Correction:
     def turned(self) -> Array:
         """By how much each target was turned [rad], ``(n,)``."""
         return np.asarray(np.linalg.norm(turns_between(self.before, self.after), axis=1))
+
+    def motions(self, rows: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        """Return what a correction does to targets, as :func:`truearm.compensation.gauge.common_motion` takes it."""
+        axes = self.tips[rows, :3, :3] @ self.before[rows, :3, :3].swapaxes(1, 2)
+        moved = axes @ (self.after - self.before)[rows, :3, 3:]
+        turned = axes @ turns_between(self.before[rows], self.after[rows])[:, :, None]
+        return self.tips[rows, :3, 3], moved, turned
+
+
+@dataclass(frozen=True)
+class Shared:
+    """The part of a correction that all targets have in common, as one rigid body, and what is left.
+
+    Attributes
+    ----------
+    moved
+        By how much the middle of the targets is moved [m].
+    turned
+        By how much the body is turned [rad].
+    remainder
+        How far targets are moved beside that, on average [m].
+    """
+
+    moved: float
+    turned: float
+    remainder: float
+
+
+def shared_motion(parts: Sequence[tuple[Array, Array, Array]]) -> Shared | None:
+    """Return what corrected targets share, of what :meth:`Correction.motions` gives; None of three targets or fewer."""
+    if sum(len(places) for places, _, _ in parts) <= _FEW_TARGETS:
+        return None
+    motion = common_motion(parts)
+    left = np.concatenate([moved - motion.of(places) for places, moved, _ in parts])
+    return Shared(
+        float(np.linalg.norm(motion.moved)),
+        float(np.linalg.norm(motion.turned)),
+        float(np.linalg.norm(left, axis=1).mean()),
+    )

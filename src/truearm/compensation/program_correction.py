@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.cell import EMPTY_CELL, Cell, TargetWrench
-from truearm.compensation.chosen_targets import EVERY_POSE, Choice, kept_by_choice
+from truearm.compensation.chosen_targets import ALONE, EVERY_POSE, Choice, kept_by_choice
 from truearm.compensation.correction import Correction
 from truearm.compensation.expected_errors import expected_errors
 from truearm.compensation.fake_targets import nominal_robot
@@ -35,6 +35,7 @@ from truearm.modeling.robot import Robot
 #: A base that was not measured is found with this many targets, evenly along the programs.
 _TARGETS_FOR_BASE: Final = 2000
 _JOINTS: Final = 6
+_MORE_THAN_ONE: Final = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +185,11 @@ def corrected_programs(
         bases = {}
         for group in together:
             bases |= dict.fromkeys(group, _base_of(resolved, group, start, flange))
+            found = [(one, one.some(_MORE_THAN_ONE, group)) for one in resolved]
+            if sum(len(rows) for _, rows in found) == 1:
+                # The frame takes up all that a correction could do to it.
+                for one, rows in found:
+                    one.keep(rows, ALONE)
     progress("finding fake targets")
     corrections = [one.correction(bases, flange) for one in resolved]
     if robot.proof is not None and arm_is_known(robot):

@@ -87,7 +87,9 @@ class Places:
         nominal, real = [], []
         for name in unique:
             entry = given.get(name, Placed(None, None))
-            here = defined.get(name, IDENTITY if name == "" else entry.controller or entry.identified)
+            here = IDENTITY if name == "" else defined.get(name, entry.controller)
+            if here is None and entry.identified is not None:
+                raise _measured_only(program, names.index(name), kind)
             if here is None:
                 raise _undefined(program, name, names, kind, [*defined, *given])
             nominal.append(own @ here.matrix)
@@ -136,6 +138,21 @@ class Places:
             by = shift[name] if isinstance(shift, Mapping) else shift
             every.append(by @ nominal if real is None else real)
         return np.asarray(np.reshape(every, (-1, 4, 4))[self._index[rows]])
+
+
+def _measured_only(program: Program, row: int, kind: Kind) -> InputError:
+    """Return the refusal of a measured place beside which nothing says what the controller has."""
+    target = program.targets[row]
+    pendant = {"tool": "UTOOL, TOOL_DATA, TCP", "frame": "UFRAME, BASE_DATA, wobjdata"}[kind]
+    return InputError(
+        f"the file says where this {kind} was measured, and nothing says which numbers the controller has for it",
+        parameter=f"{kind}s",
+        where=place(program, target),
+        came=target.tool if kind == "tool" else target.frame,
+        cure=f"Read its numbers on the pendant ({pendant}) and write them into the entry, as in controller: "
+        f"{{translation: [..], wpr: [..]}}; or give the file that defines the {kind} along with the program. If the "
+        "numbers of the entry are the controller's own and nothing was measured, write of: controller.",
+    )
 
 
 def _undefined(program: Program, name: str, names: list[str], kind: str, known: list[str]) -> InputError:

@@ -204,6 +204,11 @@ class ResolvedProgram:
         evenly = np.linspace(0, len(usable) - 1, min(count, len(usable))).astype(int)
         return np.asarray(usable[np.unique(evenly)])
 
+    def keep(self, rows: NDArray[np.intp], why: Kept) -> None:
+        """Let targets stay from which no others are offsets."""
+        self._kept = {**self._kept, **dict.fromkeys(rows.tolist(), why)}
+        self._usable[rows] = False
+
     def joints_near(self, rows: NDArray[np.intp]) -> Array:
         """Return the joint positions of the nominal robot at targets, ``(n, joints)`` [rad or m]."""
         return np.asarray(self._resolved.joints[rows])

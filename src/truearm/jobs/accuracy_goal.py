@@ -120,14 +120,17 @@ def _at_poses(robot: Robot, path: Path) -> AccuracyGoal:
 def _at_targets(robot: Robot, path: Path, tools: str | Path | None, frames: str | Path | None) -> AccuracyGoal:
     from truearm.compensation.cell import Cell, read_frames, read_tools
     from truearm.compensation.fake_targets import controllers_robot
-    from truearm.compensation.program_files import program_files, read_programs
+    from truearm.compensation.program_files import language_called, program_files, read_programs
     from truearm.compensation.resolved_program import ResolvedProgram
 
-    with refusals_of("tools"):
-        placed = read_tools(robot, None if tools is None else path_argument(tools, "tools"))
-    with refusals_of("frames"):
-        cell = Cell(placed, read_frames(robot, None if frames is None else path_argument(frames, "frames")))
     programs = read_programs(program_files([path], again=True))
+    language = language_called(programs[0].language)
+    with refusals_of("tools"):
+        tool_file = None if tools is None else path_argument(tools, "tools")
+        placed = read_tools(robot, tool_file, language.flange)
+    with refusals_of("frames"):
+        frame_file = None if frames is None else path_argument(frames, "frames")
+        cell = Cell(placed, read_frames(robot, frame_file, language.base))
     believed = controllers_robot(robot)
     joints = np.concatenate([ResolvedProgram(robot, believed, program, cell).joints for program in programs])
     found = joints[~np.isnan(joints).any(axis=1)]

@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from truearm.arrays import finite_number
 from truearm.compensation.advice import check_correction
 from truearm.compensation.cell import (
@@ -28,9 +30,12 @@ from truearm.compensation.controller_model import (
     refuse_kinematics_of_another_arm,
     refuse_proprietary_controller,
 )
-from truearm.compensation.correction import Correction
+from truearm.compensation.correction import Correction, shared_motion
+from truearm.compensation.correction_limit import CorrectionLimit, check_size, correction_limit
+from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
+from truearm.compensation.program_poses import place
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.questions import refuse_unanswered
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
@@ -95,6 +100,7 @@ def compensate(
     keep: Sequence[str] = (),
     taught: Sequence[str] | None = None,
     accept: Sequence[str] = (),
+    accept_correction: str | None = None,
     notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
@@ -143,6 +149,9 @@ def compensate(
         ``wrong-robot``; ``maker`` for programs in the language of another maker; ``other-kinematics`` for kinematics of
         the controller that are not this arm's; ``skipped`` for programs of which some targets cannot be corrected and
         stay as they are; and ``not-better-here`` to correct also the targets that would rather get worse.
+    accept_correction
+        How far targets may be moved and turned, such as ``95mm,3deg``, in place of the limit: twice the largest
+        deviation of the calibrated from the nominal robot, see :mod:`truearm.compensation.correction_limit`.
     notes
         What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other.
     command
@@ -155,7 +164,8 @@ def compensate(
     InputError
         If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
         badly or is another maker's, a tool or frame is not defined, a target cannot be corrected and that is not
-        accepted, or nothing says what was taught, or with what a controller computes whose maker offers a calibration.
+        accepted, or would be moved or turned farther than the robot's errors explain, or nothing says what was taught,
+        or with what a controller computes whose maker offers a calibration.
     """
     progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
@@ -192,7 +202,9 @@ def compensate(
         wrench=wrench_file,
         controller_kinematics=next(iter(_kinematics_file(kinematics)), None),
     )
-    arm = _with_controller(robot_argument(robot).with_payload(payload), kinematics, said_by)
+    allowed = None if accept_correction is None else CorrectionLimit.of(accept_correction, "accept_correction")
+    calibrated = _with_controller(robot_argument(robot), kinematics, said_by)
+    arm = calibrated.with_payload(payload)
     if arm.wrench is not None:
         raise InputError(
             "something acts on the tool of this robot already",
@@ -218,24 +230,25 @@ def compensate(
         keep=list(choice.keep) or None,
         taught=None if choice.taught is None else sorted(choice.taught) or ["none"],
         accept=list(accepted) or None,
+        accept_correction=accept_correction,
         notes=notes or None,
     )
     refuse_unaccepted(arm, accepted)
-    with refusals_of("tools"):
-        tools_given = read_tools(arm, tool_file)
-    with refusals_of("frames"):
-        frames_given = read_frames(arm, frame_file)
-    cell = Cell(tools_given, frames_given)
     acting = _wrenches(arm, pushed, wrench_file)
-    for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
-        if path != wrench_file:
-            refuse_wrenches_left_out(path, parameter)
-    _refuse_taught_and_measured(choice, cell)
     with refusals_of("programs"):
         files = program_files(paths, again=again)
         progress("reading the programs")
         read = read_programs(files)
     language = language_called(read[0].language)
+    with refusals_of("tools"):
+        tools_given = read_tools(arm, tool_file, language.flange)
+    with refusals_of("frames"):
+        frames_given = read_frames(arm, frame_file, language.base)
+    cell = Cell(tools_given, frames_given)
+    for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
+        if path != wrench_file:
+            refuse_wrenches_left_out(path, parameter)
+    _refuse_taught_and_measured(choice, cell)
     foreign = check_maker(arm, language, accepted)
     refuse_proprietary_controller(arm, read)
     refuse_unanswered([taught_question(read, choice), controller_question(arm, read)])
@@ -251,6 +264,7 @@ def compensate(
             weigh_tools=payload is None,
             wrenches=acting,
         )
+    large = _check_size(result, correction_limit(calibrated), allowed)
     if SKIPPED not in accepted:
         _refuse_skipped(result)
     splits: tuple[ProgramSplit, ...] = ()
@@ -281,6 +295,7 @@ def compensate(
             *controller_notices(arm, read),
             *_payloads_unlikely(arm, result),
             *check_force(result.pushed),
+            *large,
             *check_correction(arm, result, splits),
         ),
         command=invocation,
@@ -357,6 +372,31 @@ def _refuse_taught_and_measured(choice: Choice, cell: Cell) -> None:
                 came=measured[0] or ("flange" if what == "tools" else "base"),
                 cure=f"Leave {what} out of `taught`, or say with `of: controller` what the controller has.",
             )
+
+
+def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: CorrectionLimit | None) -> list[Notice]:
+    """Refuse corrections that errors of the robot do not explain, or say that they were accepted."""
+    rows = [(one, np.flatnonzero(one.corrected)) for one in result.corrections]
+    targets = [one.program.targets[row] for one, some in rows for row in some.tolist()]
+    programs = [one.program for one, some in rows for _ in some]
+    given = [name for name in ("frames", "tools") if getattr(result.frames, name) == "identified"]
+    if result.frames.frames == "assumed":
+        bases = np.array([*result.frames.bases.values()]).reshape(-1, 4, 4)
+        turns = np.linalg.norm(turns_between(np.broadcast_to(np.eye(4), bases.shape), bases), axis=1)
+        limit = limit.beside(float(turns.max(initial=0.0)))
+    shared = shared_motion([one.motions(some) for one, some in rows])
+    common = "" if shared is None else f"All targets share a shift of {shared.moved * 1e3:.2f} mm. "
+    return check_size(
+        np.concatenate([one.moved[some] for one, some in rows]),
+        np.concatenate([one.turned[some] for one, some in rows]),
+        limit,
+        accepted,
+        where=lambda row: place(programs[row], targets[row]),
+        check=f"{common}Usual causes are a frame or a tool that is elsewhere or turned otherwise than the file says, "
+        "numbers of the controller for them that are not those of this program, and a wrong unit or convention of "
+        "angles.",
+        parameter=", ".join(given) or "programs",
+    )
 
 
 def _refuse_skipped(result: CorrectedPrograms) -> None:

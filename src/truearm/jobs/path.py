@@ -13,7 +13,9 @@ from truearm.compensation.controller_model import (
     controller_question,
     refuse_proprietary_controller,
 )
-from truearm.compensation.corrected_path import correct_path
+from truearm.compensation.corrected_path import TIP, CorrectedPath, correct_path
+from truearm.compensation.correction_limit import CorrectionLimit, check_size, correction_limit
+from truearm.compensation.gauge import turns_between
 from truearm.compensation.path_program import BY_NAME, TargetKind, path_program
 from truearm.compensation.programs.new_program import NewProgram
 from truearm.compensation.programs.program import Language, Source
@@ -44,6 +46,7 @@ from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import homogeneous
 from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.notices import Notice
 from truearm.planning.paths.path_file import read_path
@@ -71,6 +74,7 @@ def path(
     name: str = "truearm_path",
     controller_kinematics: str | Path | None = None,
     accept: Sequence[str] = (),
+    accept_correction: str | None = None,
     joints: JointsOf | None = None,
     out: str | Path | None = None,
     command: str | None = None,
@@ -107,6 +111,9 @@ def path(
     accept
         What may speak against the robot's calibration, by name, as :func:`truearm.compensate` takes it; asked for where
         programs are written.
+    accept_correction
+        How far a program may move and turn the tip from the path, such as ``95mm,3deg``, as for
+        :func:`truearm.compensate`.
     joints
         Whose joint positions the CSV files hold: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
@@ -118,7 +125,8 @@ def path(
     Raises
     ------
     InputError
-        If the file is malformed, or the robot cannot follow the path: with the place on it.
+        If the file is malformed, or the robot cannot follow the path: with the place on it. If the correction of a
+        program is larger than the robot's errors explain.
     """
     read = path_argument(file, "file")
     known = [*BY_NAME, ALL]
@@ -138,11 +146,13 @@ def path(
     folder = None if out is None else folder_beside(written, MOTION, out, robot, file, *kinematics)
     pushed = wrench_argument(wrench, wrench_frame)
     carried, fall = payload_argument(payload), gravity_argument(gravity)
-    arm = pushed_argument(robot_argument(robot).with_payload(carried, fall), pushed)
+    allowed = None if accept_correction is None else CorrectionLimit.of(accept_correction, "accept_correction")
+    calibrated = robot_argument(robot)
     if controller_kinematics is not None:
         with refusals_of("controller_kinematics"):
             said = str(path_argument(controller_kinematics, "controller_kinematics"))
-            arm = with_controller_kinematics(arm, said, Path())
+            calibrated = with_controller_kinematics(calibrated, said, Path())
+    arm = pushed_argument(calibrated.with_payload(carried, fall), pushed)
     accepted = accept_argument(accept, arm)
     call = command_argument(command) or python_call(
         "path",
@@ -159,6 +169,7 @@ def path(
         name=called,
         controller_kinematics=controller_kinematics,
         accept=list(accepted) or None,
+        accept_correction=accept_correction,
         joints=joints,
     )
     if languages:
@@ -173,6 +184,8 @@ def path(
     notices = [*changed_since(robot), *told_of(arm), *check_force([(arm, followed.joints[followed.best])])]
     texts: dict[str, str] = {}
     if chosen:
+        if followed.calibrated:
+            notices += _check_size(followed, correction_limit(calibrated), allowed)
         with refusals_of("name" if kind == "joints" else "targets"):
             content = path_program(followed, arm, called, targets=kind, spacing=time)
             texts = _programs(arm, content, chosen, notices)
@@ -182,6 +195,27 @@ def path(
     if folder is not None:
         made.save(folder)
     return made
+
+
+def _check_size(followed: CorrectedPath, limit: CorrectionLimit, accepted: CorrectionLimit | None) -> list[Notice]:
+    """Refuse a correction that errors of the robot do not explain, or say that it was accepted."""
+    before, after = (
+        homogeneous(rotation, position)
+        for position, rotation in (
+            followed.nominal.forward(followed.joints[name], target=TIP) for name in ("nothing", followed.best)
+        )
+    )
+    turned = np.linalg.norm(turns_between(before, after), axis=1)
+    trajectory = followed.planned.trajectory
+    return check_size(
+        np.linalg.norm(after[:, :3, 3] - before[:, :3, 3], axis=1),
+        turned if followed.planned.orientation == "full" else np.zeros_like(turned),
+        limit,
+        accepted,
+        where=lambda row: f"{followed.planned.source}, {trajectory.distance[row] * 1e3:.1f} mm along the path",
+        check="Usual causes are a payload or a force that the arm does not carry, and a calibration of another robot.",
+        parameter="file",
+    )
 
 
 def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], notices: list[Notice]) -> dict[str, str]:

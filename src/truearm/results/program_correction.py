@@ -12,9 +12,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.compensation.advice import frame_words
+from truearm.compensation.advice import NOTHING_CORRECTED, frame_words
 from truearm.compensation.chosen_targets import Kept
-from truearm.compensation.correction import Correction
+from truearm.compensation.correction import Correction, Shared, shared_motion
 from truearm.compensation.expected_errors import REPEATABILITY
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms
@@ -81,6 +81,12 @@ class FileCorrection(Record):
     def moved(self) -> Array:
         """By how much each corrected target was moved [m], ``(n,)``."""
         return np.asarray(self.correction.moved[[row for row in self.rows if self.correction.corrected[row]]])
+
+    @cached_property
+    def shared(self) -> Shared | None:
+        """What the corrected targets share; None of three or fewer."""
+        rows = np.array([row for row in self.rows if self.correction.corrected[row]], dtype=np.intp)
+        return shared_motion([self.correction.motions(rows)])
 
     @property
     def targets(self) -> int:
@@ -155,6 +161,8 @@ class FileCorrection(Record):
             "shift_mm": {
                 "mean": float(millimetres.mean()) if self.corrected else 0.0,
                 "max": float(millimetres.max()) if self.corrected else 0.0,
+                "common": None if self.shared is None else self.shared.moved * 1e3,
+                "remainder": None if self.shared is None else self.shared.remainder * 1e3,
             },
             "expected_mm": self._expected_summary(),
             "not_better": [self._not_better_summary(row) for row in self.not_better],
@@ -206,6 +214,17 @@ class FileCorrection(Record):
         parts = [f"{self.corrected} corrected", *(f"{number} kept ({why})" for why, number in self.kept.items())]
         parts += [f"{len(self.skipped)} left unchanged"] if self.skipped else []
         return f"{counted(self.targets, 'target')}: {', '.join(parts)}"
+
+    @property
+    def shared_words(self) -> str:
+        """What the corrected targets share, and who decides it, in words and figures; empty of few targets."""
+        if self.shared is None:
+            return ""
+        return (
+            f"{self.name}, common to its targets: shift {self.shared.moved * 1e3:.3f} mm, turn "
+            f"{math.degrees(self.shared.turned):.3f} deg, which frame and tool decide; remainder "
+            f"{self.shared.remainder * 1e3:.3f} mm on average, the robot"
+        )
 
     def lines(self) -> list[str]:
         """Return the error to expect, what became of the targets, and what was skipped."""
@@ -306,7 +325,12 @@ class ProgramCorrection(Record):
     def lines(self) -> list[str]:
         """Return a line for each file, what was skipped and what to know."""
         parts = [file.lines() for file in self.files]
-        text = [line for first, second, *_ in parts for line in (first, second)]
+        first = [one for one in self.warnings if one.code == NOTHING_CORRECTED]
+        text = notice_lines(first)
+        for file, (headline, counts, *_) in zip(self.files, parts, strict=True):
+            text += [headline, counts]
+            if file.shared_words and self.result.frames.frames != "assumed":
+                text.append(f"  {file.shared_words}")
         skipped = [line for _, _, *lines in parts for line in lines]
         known = any(file.expected is not None for file in self.files)
         if known and self.relative:
@@ -320,7 +344,7 @@ class ProgramCorrection(Record):
             if split.moves:
                 moves, more = split.moves, split.added
                 text.append(f"  {moves} move{'s'[: moves > 1]} split by {more} more target{'s'[: more > 1]}")
-        text += notice_lines(self.warnings)
+        text += notice_lines([one for one in self.warnings if one not in first])
         return text if self.simulated is None else [*text, *self.simulated.lines()]
 
     @property
@@ -337,8 +361,6 @@ class ProgramCorrection(Record):
         said = (
             f"These errors are of the targets relative to each other, {each}: where a frame is as a whole is not known."
         )
-        if sum(len(file.expected[0]) for file in self.files if file.expected is not None) == 1:
-            said += " Of a single target they say nothing."
         if any(file.skipped for file in self.files):
             said += " What is left unchanged is not in them: it now lies off the others by as much as those were moved."
         return said

@@ -87,12 +87,14 @@ def corrected_program(
     taught: Sequence[str] | None,
     controller_kinematics: str | None,
     accept: Sequence[str],
+    accept_correction: str | None,
     progress: Progress,
 ) -> DrawnProgram:
     """Correct a program and write it, :func:`truearm.compensate`, and find where the real robot goes with it."""
     from truearm.compensation.cell import Cell, read_frames, read_tools
     from truearm.compensation.correction import way_through
     from truearm.compensation.program_correction import commanded
+    from truearm.compensation.program_files import language_called
     from truearm.jobs.compensate import compensate
 
     os.chdir(folder)
@@ -109,14 +111,16 @@ def corrected_program(
             taught=taught,
             controller_kinematics=controller_kinematics,
             accept=accept,
+            accept_correction=accept_correction,
             command=compensate_command(
-                robot, program, places, wrench, wrench_frame, taught, controller_kinematics, accept
+                robot, program, places, wrench, wrench_frame, taught, controller_kinematics, accept, accept_correction
             ),
             progress=progress,
         )
         progress("drawing the program")
         tools, frames = (None if part not in places else Path(places[part]) for part in ("tools", "frames"))
-        known = Cell(read_tools(made.robot, tools), read_frames(made.robot, frames))
+        language = language_called(made.files[0].language)
+        known = Cell(read_tools(made.robot, tools, language.flange), read_frames(made.robot, frames, language.base))
         before, after = (
             commanded(made.robot, one, known) for one in (made.result.corrections[0].program, made.as_written()[0])
         )

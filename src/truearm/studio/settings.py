@@ -68,6 +68,8 @@ class Settings(BaseModel):
         Likewise.
     accept
         Names of what may speak against the calibration or a correction, likewise.
+    accept_correction
+        How far targets may be moved and turned, likewise; None for what the robot's errors explain.
     corrected
         Folder of the corrected program.
     constraints
@@ -104,6 +106,7 @@ class Settings(BaseModel):
     taught: tuple[_Name, ...] | None = None
     controller_kinematics: _Name | None = None
     accept: tuple[_Name, ...] | None = None
+    accept_correction: _Name | None = None
     corrected: _Name = "result/corrected"
     constraints: _Name | None = None
     path: _Name | None = None

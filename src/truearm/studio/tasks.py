@@ -84,6 +84,7 @@ def compensate_command(
     taught: Sequence[str] | None,
     controller_kinematics: str | None,
     accept: Sequence[str],
+    accept_correction: str | None,
 ) -> str:
     """Return the command that does the same in the project's folder, as the report shows it.
 
@@ -91,7 +92,7 @@ def compensate_command(
     ----------
     places
         The files that say where tools and frames are.
-    wrench, wrench_frame, taught, controller_kinematics, accept
+    wrench, wrench_frame, taught, controller_kinematics, accept, accept_correction
         As the job takes them.
     """
     words = ["truearm", "compensate", robot, program]
@@ -102,4 +103,5 @@ def compensate_command(
     words += [] if controller_kinematics is None else ["--controller-kinematics", controller_kinematics]
     words += [] if taught is None else ["--taught", ",".join(taught)]
     words += [word for name in accept for word in ("--accept", name)]
+    words += [] if accept_correction is None else ["--accept-correction", accept_correction]
     return shlex.join([*words, "--out", "DIR"])

@@ -354,6 +354,9 @@ class Language:
         Pairs of suffixes: beside a file of the first may lie one of the second that belongs to it.
     calibration
         How controllers that run it may have been calibrated by their maker; None if nothing is known of that.
+    flange, base
+        What the language calls the robot's own flange and base, in small letters. Every cell file may call them
+        ``flange`` and ``base``.
     """
 
     name: str
@@ -367,6 +370,8 @@ class Language:
     together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
     calibration: MakersCalibration | None = None
+    flange: tuple[str, ...] = ()
+    base: tuple[str, ...] = ()
 
     def runs_on(self, maker: str) -> bool:
         """Return whether controllers of a maker run it, whatever else is in the maker's full name."""

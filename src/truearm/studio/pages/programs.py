@@ -33,7 +33,7 @@ _REPORT: Final = "report"
 _UNSAID: Final = "(not said)"
 #: Settings that count for the drawing of a program, and for its correction.
 _DRAWN: Final = ("robot", "program")
-_ASKED: Final = ("cell", "wrench", "wrench_frame", "taught", "controller_kinematics", "accept")
+_ASKED: Final = ("cell", "wrench", "wrench_frame", "taught", "controller_kinematics", "accept", "accept_correction")
 _CORRECTED: Final = (*_DRAWN, "result", "corrected", *_ASKED)
 #: What was taught at the robot, as the job takes it.
 _TAUGHT: Final = (
@@ -60,6 +60,9 @@ class ProgramsPage:
             "Controller has", (_UNSAID, *STATED), hint="with what it turns poses into joint positions; or a file"
         )
         self._accept: Any = gui.add_text("Accept", "", hint="names of what a refusal names, with commas between")
+        self._largest: Any = gui.add_text(
+            "Largest correction", "", hint="length and angle, such as 95mm,3deg; empty for what the robot explains"
+        )
         self._read = gui.add_button("Draw the program")
         self._run = gui.add_button("Correct the program")
         self._space = ProgramInSpace(window)
@@ -76,6 +79,9 @@ class ProgramsPage:
             window.action(lambda: window.edit(controller_kinematics=chosen(self._kinematics, _UNSAID)))
         )
         self._accept.on_update(window.settled(self._accepted))
+        self._largest.on_update(
+            window.settled(lambda: window.edit(accept_correction=self._largest.value.strip() or None))
+        )
         self._read.on_click(window.action(self._show))
         self._run.on_click(window.action(self._correct))
         self._downloads.on_click(window.action(self._download))
@@ -94,6 +100,7 @@ class ProgramsPage:
         offer(self._taught, _TAUGHT, None if settings.taught is None else ", ".join(settings.taught), _UNSAID)
         offer(self._kinematics, (*STATED, *kinematics_files(project)), settings.controller_kinematics, _UNSAID)
         self._accept.value = ", ".join(settings.accept or ())
+        self._largest.value = settings.accept_correction or ""
         if self._told_of.differs(window):
             self._said.content, self._told_of = "", _Of()
         if self._of.differs(window):
@@ -186,6 +193,7 @@ class ProgramsPage:
             taught=settings.taught,
             controller_kinematics=settings.controller_kinematics,
             accept=settings.accept or (),
+            accept_correction=settings.accept_correction,
         )
 
     def _done(self, drawn: DrawnProgram, of: _Of) -> None:

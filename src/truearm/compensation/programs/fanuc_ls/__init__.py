@@ -176,4 +176,6 @@ FANUC_LS: Final = Language(
     new_program,
     motion_program,
     calibration=MakersCalibration("FANUC", "robot calibration (mechanism error parameters)"),
+    flange=("0",),
+    base=("0",),
 )

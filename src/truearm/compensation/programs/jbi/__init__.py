@@ -211,4 +211,5 @@ JBI: Final = Language(
     new_program,
     motion_program,
     calibration=MakersCalibration("Yaskawa", "absolute accuracy"),
+    base=("robot",),
 )

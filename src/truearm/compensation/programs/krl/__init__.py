@@ -65,4 +65,6 @@ KRL: Final = Language(
     together=True,
     companions=((".src", ".dat"), (".sub", ".dat"), (".dat", ".src")),
     calibration=MakersCalibration("KUKA", "the positionally accurate robot model ($ABS_ACCUR)"),
+    flange=("0", "$nullframe"),
+    base=("0", "$nullframe", "$world", "$robroot"),
 )

@@ -53,4 +53,6 @@ RAPID: Final = Language(
     motion=motion_program,
     together=True,
     calibration=MakersCalibration("ABB", "Absolute Accuracy"),
+    flange=("tool0",),
+    base=("wobj0",),
 )

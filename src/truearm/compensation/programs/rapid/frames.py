@@ -33,9 +33,11 @@ class _Kind:
         if _IDENTIFIER.fullmatch(text) is None:
             return "", f"is used with a {self.plain} that is computed"
         datum = self.listing.find(text, at)
+        folded = text.lower()
+        if folded == self.predefined and (datum is None or (datum.type == self.type and not datum.parameter)):
+            return "", None  # the module BASE of every controller declares it
         if datum is None:
-            folded = text.lower()
-            return "" if folded == self.predefined else self.spelling.setdefault(folded, text), None
+            return self.spelling.setdefault(folded, text), None
         if datum.parameter:
             return "", f"is used with a {self.plain} that is a parameter of the routine: {text}"
         if datum.type != self.type:

@@ -337,5 +337,13 @@ def _configuration(words: tuple[str, ...]) -> Configuration:
 
 
 VAL3: Final = Language(
-    "VAL3", (".dtx", ".pgx", ".pjx"), ("Stäubli",), is_one, read, new=new_program, motion=motion_program, together=True
+    "VAL3",
+    (".dtx", ".pgx", ".pjx"),
+    ("Stäubli",),
+    is_one,
+    read,
+    new=new_program,
+    motion=motion_program,
+    together=True,
+    base=("world",),
 )

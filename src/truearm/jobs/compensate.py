@@ -28,6 +28,7 @@ from truearm.compensation.controller_model import (
 from truearm.compensation.correction import Correction
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
+from truearm.compensation.programs.marks import correction_comment
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
 from truearm.errors import InputError, refusals_at, refusals_of
@@ -51,6 +52,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     wrench_argument,
 )
+from truearm.jobs.corrected_already import day_of, ledger_of, ledger_to_write, refuse_corrected_already
 from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, check_maker, known_of, refuse_unaccepted
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
@@ -237,6 +239,8 @@ def compensate(
             weigh_tools=payload is None,
             wrenches=acting,
         )
+    refuse_corrected_already(result, paths, folder, ledger_of(robot))
+    ledger, unremembered = ledger_to_write(ledger_of(robot))
     if strict:
         _refuse_skipped(result)
     splits: tuple[ProgramSplit, ...] = ()
@@ -246,12 +250,16 @@ def compensate(
             split_program(language, correction, between, split)
             for correction, between in zip(result.corrections, result.between, strict=True)
         )
+    day = day_of(notes)
+    comment = correction_comment(day, arm.name, hashes.get("robot", ""))
     corrected = []
     for number, correction in enumerate(result.corrections):
         edits = _edits(correction, splits[number] if splits else None)
         for index, source in enumerate(correction.program.sources):
             file = next(file for file in files if file.path == source.path)
             text = edited(source.text, [edit for edit in edits if edit.source == index])
+            if text != source.text:
+                text = language.comment(text, comment)
             corrected.append(FileCorrection(file, correction, index, text.encode("latin-1")))
     corrected.sort(key=lambda one: files.index(one.file))
     made = ProgramCorrection(
@@ -267,11 +275,14 @@ def compensate(
             *_payloads_unlikely(arm, result),
             *check_force(result.pushed),
             *check_correction(arm, result, splits),
+            *unremembered,
         ),
         command=invocation,
         inputs=files_of(robot, tools, frames, wrench_file, *_kinematics_file(controller_kinematics)),
         hashes=hashes,
         notes=notes,
+        date=day.isoformat(),
+        ledger=ledger,
     )
     if folder is not None:
         with refusals_of("out"):

@@ -14,6 +14,7 @@ import numpy as np
 
 from truearm.compensation.advice import frame_words
 from truearm.compensation.chosen_targets import Kept
+from truearm.compensation.corrected_targets import LedgerEntry, corrected_digests
 from truearm.compensation.correction import Correction
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms
@@ -268,6 +269,10 @@ class ProgramCorrection(Record):
         SHA-256 of these files, by the parameters that named them.
     notes
         What the user noted, by its name.
+    date
+        When they were corrected.
+    ledger
+        Where their targets are remembered beside their records; None for nowhere.
     """
 
     robot: Robot
@@ -280,6 +285,8 @@ class ProgramCorrection(Record):
     inputs: tuple[Path, ...] = ()
     hashes: dict[str, str] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    date: str = ""
+    ledger: Path | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm."""
@@ -397,10 +404,19 @@ class ProgramCorrection(Record):
         folder = output_folder(folder)
         progress("drawing the report")
         files: dict[str, str | bytes] = {}
+        entries = []
+        written = {path: targets for program in self.as_written() for path, targets in program.by_file().items()}
         for one in self.files:
+            path = one.file.path
+            targets = corrected_digests(one.correction.program.by_file()[path], written[path])
             files[one.name] = one.text
-            files[f"{one.name}.truearm.json"] = recorded(one.file, one.text, one.language, self.applied())
+            files[f"{one.name}.truearm.json"] = recorded(
+                one.file, one.text, one.language, self.applied(), self.date, targets
+            )
+            entries.append(LedgerEntry(program=one.name, date=self.date, robot=self.robot.name, targets=targets))
         files[REPORT] = program_html(self)
         progress("writing the files")
-        write_programs(folder, [*(one.file.path for one in self.files), *self.inputs], files, self.command)
+        read = [*(one.file.path for one in self.files), *self.inputs]
+        ledger = None if self.ledger is None else (self.ledger, entries)
+        write_programs(folder, read, files, self.command, ledger)
         return tuple(folder / name for name in files)

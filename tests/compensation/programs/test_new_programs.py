@@ -13,7 +13,8 @@ from truearm.compensation.corrected_path import CorrectedPath, correct_path
 from truearm.compensation.path_program import BY_NAME, path_program
 from truearm.compensation.program_correction import commanded
 from truearm.compensation.program_files import program_files
-from truearm.compensation.programs.new_program import MARK, NewProgram
+from truearm.compensation.programs.marks import MARK
+from truearm.compensation.programs.new_program import NewProgram
 from truearm.compensation.programs.program import Program, Source
 from truearm.errors import InputError
 from truearm.library import load_robot

@@ -15,6 +15,7 @@ import base64
 import binascii
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from hashlib import blake2b
 from itertools import product
 from pathlib import Path
@@ -118,13 +119,13 @@ def refuse_corrected(corrections: Sequence[Correction], known: Sequence[KnownCor
                     raise InputError(
                         "this program was corrected already",
                         where=source.where(min(found)),
-                        came=f"targets of {one.program} as it was written{_on(one.date)}, by {one.where}",
+                        came=f"targets of {one.program} as it was corrected{_on(one.date)}, says {one.where}",
                         cure="Give the original, or leave these targets as they are with `keep`.",
                     )
 
 
 def _on(date: str) -> str:
-    return f" corrected on {date}" if date else " corrected"
+    return f" on {date}" if date else ""
 
 
 def _unpacked(text: str) -> list[bytes]:
@@ -156,13 +157,21 @@ def ledger_beside(robot: Path) -> Path:
 
 
 def known_by_ledger(ledger: Path) -> list[KnownCorrection]:
-    """Return what a ledger says, nothing where there is none.
+    """Return what a ledger says, and those of the folders beside: there are other calibrations of the same robot.
 
     Raises
     ------
     InputError
-        If what has its name is no ledger.
+        If what has the name of the ledger is none.
     """
+    found = [*_known(ledger)]
+    for other in sorted(ledger.parent.parent.glob(f"*/{LEDGER}")):
+        with suppress(InputError):  # of another robot, perhaps
+            found += [] if other == ledger else _known(other)
+    return found
+
+
+def _known(ledger: Path) -> list[KnownCorrection]:
     content = read_bytes(ledger) if exists(ledger) else None
     return [KnownCorrection(one.program, one.date, one.targets, ledger) for one in _entries(content, ledger)]
 

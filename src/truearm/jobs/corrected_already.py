@@ -49,8 +49,8 @@ def ledger_to_write(ledger: Path | None) -> tuple[Path | None, list[Notice]]:
         writable_folder(ledger.parent)
     except InputError:
         message = (
-            f"{ledger} cannot be written. A copy of these programs is known as corrected by its comment and its record "
-            "alone."
+            f"{ledger} cannot be written. A copy of these programs may not be known as corrected once its comment is "
+            "removed."
         )
         return None, [Notice("ledger-not-written", message, "note")]
     return ledger, []

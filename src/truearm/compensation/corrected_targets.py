@@ -165,9 +165,10 @@ def known_by_ledger(ledger: Path) -> list[KnownCorrection]:
         If what has the name of the ledger is none.
     """
     found = [*_known(ledger)]
-    for other in sorted(ledger.parent.parent.glob(f"*/{LEDGER}")):
+    beside = {other.resolve() for other in ledger.parent.parent.glob(f"*/{LEDGER}")}
+    for other in sorted(beside - {ledger.resolve()}):
         with suppress(InputError):  # of another robot, perhaps
-            found += [] if other == ledger else _known(other)
+            found += _known(other)
     return found
 
 

@@ -301,7 +301,6 @@ def _original(path: Path, again: bool) -> bytes:
                 came=f"the comment '{comment}'",
                 cure="Give the original. A program of 'truearm path' has none: run it as it is.",
             )
-        _refuse_without_record(path, _hash(content))
         return content
     if not again:
         raise InputError(
@@ -311,19 +310,6 @@ def _original(path: Path, again: bool) -> bytes:
             cure="Give the original; or correct that original anew with `again`, or restore it with `revert`.",
         )
     return _unchanged_original(path, record)
-
-
-def _refuse_without_record(path: Path, content: str) -> None:
-    """Refuse what the manifest beside it knows as a corrected program: its record was removed, or it is a copy."""
-    for one in sets_in(path.parent):
-        for name, known in one.files.items():
-            if known == content and record_path(Path(name)).as_posix() in one.files:
-                raise InputError(
-                    "this program was corrected already",
-                    where=str(path),
-                    came=f"the content of {name}, written with its record",
-                    cure="Give the original, or put the record back beside it.",
-                )
 
 
 def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:

@@ -168,7 +168,7 @@ def test_a_corrected_program_is_not_corrected_again(name: str, paths: dict[str, 
         (tmp_path / Path(file).name).write_text(text)
         marked += [tmp_path / Path(file).name] if MARK in text else []
     assert marked
-    with pytest.raises(InputError, match="was written corrected"):
+    with pytest.raises(InputError, match="corrected already; got \"the comment 'corrected by truearm"):
         program_files(marked)
     plain = language.new(replace(program, corrected=False))
     assert MARK not in "".join(plain.values())

@@ -158,7 +158,17 @@ def read_programs(files: Sequence[ProgramFile]) -> tuple[Program, ...]:
             cure="Correct them one after the other, each with its own robot.",
         )
     language = languages[0]
-    sources = [Source(file.path, file.original.decode("latin-1")) for file in files]
+    return read_sources(language, [Source(file.path, file.original.decode("latin-1")) for file in files])
+
+
+def read_sources(language: Language, sources: Sequence[Source]) -> tuple[Program, ...]:
+    """Find targets and moves in the texts of programs of a language.
+
+    Raises
+    ------
+    InputError
+        If one of them is malformed.
+    """
     # Hundreds of thousands of targets are made that all stay: the collector would look through them again and again.
     collecting = gc.isenabled()
     gc.disable()

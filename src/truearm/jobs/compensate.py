@@ -133,7 +133,8 @@ def compensate(
         the controller that are not this arm's; and ``not-better-here`` to correct also the targets that would rather
         get worse.
     notes
-        What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other.
+        What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other. A date such as
+        ``2026-11-27`` is the one in the comment of the programs too.
     command
         How to do it again, for the report; None writes the call in Python.
     progress

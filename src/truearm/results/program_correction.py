@@ -18,7 +18,7 @@ from truearm.compensation.corrected_targets import LedgerEntry, corrected_digest
 from truearm.compensation.correction import Correction
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms
-from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
+from truearm.compensation.program_files import ProgramFile, language_called, read_sources, recorded, write_programs
 from truearm.compensation.programs.program import Program, Skipped, Source
 from truearm.compensation.split import ProgramSplit
 from truearm.modeling.chain import Array
@@ -385,7 +385,7 @@ class ProgramCorrection(Record):
     def as_written(self) -> tuple[Program, ...]:
         """Return the programs as they are read again from their new texts."""
         language = language_called(self.files[0].language)
-        return language.programs([Source(one.file.path, one.text.decode("latin-1")) for one in self.files])
+        return read_sources(language, [Source(one.file.path, one.text.decode("latin-1")) for one in self.files])
 
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write programs, their records and the report ``compensation.html`` into a folder, all or nothing.

@@ -14,6 +14,7 @@ from truearm.version import __version__
 MARK: Final = "corrected by truearm"
 #: FANUC's and Yaskawa's controllers take no longer comments [characters].
 _LONGEST: Final = 32
+_MARKED: Final = re.compile(rf"({MARK}(?: \d[\w.+]*+)?)[ \t;>-]*(?=[\r\n]|\Z)")
 _LINE_END: Final = re.compile(r"[\r\n]|\Z")
 #: What ends a comment in some language, or what a controller may not read.
 _UNSAFE: Final = re.compile(r"[^A-Za-z0-9 ./+-]|-(?=-)")
@@ -37,9 +38,15 @@ def correction_comment(day: date, robot: str = "", calibration: str = "") -> tup
 
 
 def comment_of(text: str) -> str | None:
-    """Return the words in a text that name it as corrected; None if there are none."""
-    found = re.search(rf"{MARK}[^\r\n]*", text)
-    return None if found is None else found[0].rstrip(" \t;->")
+    """Return the words in a text that name it as corrected; None if there are none.
+
+    They have a line of their own, without other words before them.
+    """
+    for found in _MARKED.finditer(text):
+        before = max(text.rfind("\n", 0, found.start()), text.rfind("\r", 0, found.start())) + 1
+        if not re.search("[A-Za-z]", text[before : found.start()]):
+            return found[1]
+    return None
 
 
 def with_lines_behind(text: str, place: int, lines: Sequence[str], comment: str | None) -> str:

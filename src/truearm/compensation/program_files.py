@@ -327,7 +327,7 @@ def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
         raise InputError(
             "this program was changed after it was corrected, so its record is no longer about it",
             where=str(path),
-            cure=f"Make the same change in the original. If it is an original, remove {record_path(path).name}.",
+            cure=f"Make the change in the original. If this is an original, remove {record_path(path).name}.",
         )
     original = _unpacked(record.original, record_path(path))
     if _hash(original) != record.original_sha256:

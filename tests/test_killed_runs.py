@@ -7,6 +7,7 @@ import os
 import shutil
 import stat
 import tempfile
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from tests.jobs.examples import EXAMPLES
 from tests.killing import between, contents, found, killed, killed_copies, leftovers, operations
 
 import truearm
+from truearm.compensation.corrected_targets import LEDGER, LedgerEntry, known_by_ledger, remember
 from truearm.compensation.program_files import program_files, restored, write_programs
 from truearm.errors import InputError
 from truearm.files import read_bytes
@@ -105,7 +107,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def corrections(folder: Path) -> tuple[ProgramCorrection, ProgramCorrection]:
     """A program corrected in two ways."""
     given = EXAMPLES["compensate"](folder) | {"out": None, "accept": ["not-better-here"]}
-    return compensate(**given), truearm.compensate(**given | {"split": None})
+    return compensate(**given), compensate(**given | {"split": None})
 
 
 @pytest.mark.parametrize("earlier", [False, True])
@@ -138,6 +140,35 @@ def test_a_program_is_never_corrected_twice(
         work(copy)
         assert contents(copy) == texts
         assert leftovers(copy) == []
+
+
+def test_a_ledger_knows_every_program_that_a_killed_run_has_written(
+    tmp_path: Path, corrections: tuple[ProgramCorrection, ProgramCorrection]
+) -> None:
+    """Whatever becomes of the record and of the comment."""
+    made, place = corrections[0], tmp_path / "work"
+    place.mkdir()
+    made = replace(made, ledger=place / "robot" / LEDGER)
+    (place / "robot").mkdir()
+    seen = set()
+    for copy in killed_copies(lambda: made.save(place / "out"), place, tmp_path / "kept"):
+        known = known_by_ledger(copy / "robot" / LEDGER)
+        if (copy / "out" / "plate.mod").exists():
+            assert [one.program for one in known] == ["plate.mod"]
+        seen.add((bool(known), (copy / "out" / "plate.mod").exists()))
+    assert seen == {(False, False), (True, False), (True, True)}
+
+
+def test_two_runs_at_once_leave_a_ledger_of_both(tmp_path: Path) -> None:
+    ledger = tmp_path / LEDGER
+    one, other, third = (LedgerEntry(program=name, date="", robot="r", targets=name * 8) for name in ("a", "b", "c"))
+    for number in range(operations(partial(remember, ledger, [one]), tmp_path)):
+        ledger.unlink(missing_ok=True)
+        for earlier in ([], [third]):
+            remember(ledger, earlier)
+            between(partial(remember, ledger, [one]), partial(remember, ledger, [other]), tmp_path, number)
+            assert sorted(found.program for found in known_by_ledger(ledger)) == ["a", "b", *("c" for _ in earlier)]
+            assert leftovers(tmp_path) == []
 
 
 def written_by(correction: ProgramCorrection) -> dict[str, bytes]:

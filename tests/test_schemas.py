@@ -171,6 +171,8 @@ FILES: Final[dict[type[BaseModel], dict[object, object]]] = {
         "corrected_sha256": "0" * 64,
         "applied": {},
         "original": "",
+        "date": "2026-11-27",
+        "targets": "AAAAAAAA",
     },
 }
 

@@ -63,6 +63,25 @@ def test_a_corrected_program_is_refused(tmp_path: Path) -> None:
         program_files([corrected(tmp_path)])
 
 
+@pytest.mark.parametrize(
+    ("comment", "says"),
+    [
+        (b"! corrected by truearm 0.1.0\r\n", "corrected by truearm 0.1.0"),
+        (b"!** corrected by truearm\r\n", "corrected by truearm"),
+        (b"! to be corrected by truearm\r\n", None),
+        (b"! corrected by truearm on Monday, perhaps\r\n", None),
+        (b'TPWrite "corrected by truearm";\r\n', None),
+    ],
+)
+def test_a_comment_that_says_so_is_believed(tmp_path: Path, comment: bytes, says: str | None) -> None:
+    path = write(tmp_path, "m.mod", MODULE.replace(b"ENDMODULE", comment + b"ENDMODULE"))
+    if says is None:
+        assert program_files([path])[0].path == path
+        return
+    with pytest.raises(InputError, match=f"this program was corrected already; got \"the comment '{says}'\""):
+        program_files([path])
+
+
 def test_a_program_changed_since_is_no_longer_what_its_record_says(tmp_path: Path) -> None:
     path = corrected(tmp_path)
     path.write_bytes(path.read_bytes() + b"! taught anew\r\n")

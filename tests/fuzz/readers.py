@@ -11,6 +11,7 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from truearm.compensation.cell import read_frames, read_tools, read_wrenches
+from truearm.compensation.corrected_targets import LEDGER, known_by_ledger
 from truearm.compensation.program_files import program_files, read_programs, restored
 from truearm.errors import InputError
 from truearm.fleets.manifest import read_manifest
@@ -198,6 +199,10 @@ def _record(folder: Path) -> None:
     read_programs(restored([folder / "done.mod"]))
 
 
+def _ledger(folder: Path) -> None:
+    known_by_ledger(folder / LEDGER)
+
+
 READERS: Final[Mapping[str, Reader]] = {
     "canonical": _data_file("data.csv"),
     "fixtures": _data_file("fixtures.csv"),
@@ -304,4 +309,5 @@ READERS: Final[Mapping[str, Reader]] = {
     "val3": _programs("val3/cell", "cell.pjx", "cell.dtx", "start.pgx", "pick.pgx"),
     "val3-points": _programs("val3", "points.dtx"),
     "record": Reader({name: name for name in ("done.mod", "done.mod.truearm.json")}, _record),
+    "ledger": Reader({LEDGER: LEDGER}, _ledger),
 }

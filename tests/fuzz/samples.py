@@ -16,6 +16,7 @@ from tests.measurement.test_fixture_rows import MIXED
 from tests.measurement.test_table import JOINTS, POINTS, SPATIAL
 
 import truearm
+from truearm.compensation.corrected_targets import LEDGER, LedgerEntry, remember
 from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import triangle
 from truearm.measurement.hexapod.poses import poses
@@ -195,6 +196,7 @@ def folder() -> Path:
     truearm.measure(**EXAMPLES["measure"](place))
     _rename(place, {"measured/readings.csv": "log.csv"})
     _rename(place, {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"})
+    remember(place / LEDGER, [LedgerEntry(program="plate.mod", date="2026-11-27", robot="irb120", targets="AAAAAAAA")])
     for name in ("irb120", "kr5"):
         (place / f"{name}.yaml").write_text((files("truearm.library") / f"{name}.yaml").read_text())
     truearm.new_robot(place / "robot.yaml")

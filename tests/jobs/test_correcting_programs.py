@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
+from datetime import date
 from importlib.resources import files
 from pathlib import Path
 
@@ -12,9 +14,13 @@ import pytest
 from tests.answered import compensate
 
 import truearm
-from truearm import InputError, Robot
+from truearm import InputError, Robot, writing
+from truearm.compensation.corrected_targets import LEDGER
+from truearm.compensation.programs.marks import MARK
+from truearm.manifest import hash_of
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.results.program_correction import SimulatedRun
+from truearm.version import __version__
 
 
 def calibrated() -> Robot:
@@ -154,15 +160,113 @@ def test_of_many_skipped_targets_the_first_are_listed(program: Path) -> None:
     assert len(correction.summary()["programs"][0]["skipped"]) == len(file.skipped)
 
 
-def test_a_corrected_program_without_its_record_is_known_by_the_manifest(program: Path) -> None:
+def test_a_corrected_program_without_its_record_is_known_by_its_comment(program: Path) -> None:
     out = program.parent / "out"
-    compensate(calibrated(), [program], out=out)
+    compensate(calibrated(), [program], out=out, notes={"date": "2026-02-03"})
     copy = out / "copy.mod"
     copy.write_bytes((out / "plate.mod").read_bytes())
     (out / "plate.mod.truearm.json").unlink()
     for corrected in (out / "plate.mod", copy):
-        with pytest.raises(
-            InputError, match=r"corrected already; got 'the content of plate.mod, written with its record"
-        ):
+        with pytest.raises(InputError, match=rf"already; got \"the comment 'corrected by truearm {__version__}'\""):
             compensate(calibrated(), [corrected])
     compensate(calibrated(), [program], out=program.parent / "other")
+
+
+@pytest.mark.parametrize(("noted", "day"), [("2026-02-03", "2026-02-03"), ("Tuesday", str(date.today()))])
+def test_the_comment_says_by_what_and_when(program: Path, noted: str, day: str) -> None:
+    robot = program.parent / "calibrated.yaml"
+    robot.write_text(robot_text(calibrated()))
+    compensate(robot, [program], out=program.parent / "out", notes={"date": noted})
+    lines = (program.parent / "out" / "plate.mod").read_text().splitlines()
+    assert lines[:4] == [
+        "MODULE Plate",
+        f"  ! corrected by truearm {__version__}",
+        f"  ! {day}, calibration {hash_of(robot.read_bytes())[:8]}",
+        "  ! for irb120",
+    ]
+    assert json.loads((program.parent / "out" / "plate.mod.truearm.json").read_text())["date"] == day
+
+
+def test_a_program_in_which_nothing_moves_stays_as_it_is_and_is_none_that_was_corrected(program: Path) -> None:
+    text = program.read_text()
+    moves = "".join(f"    MoveL pHole{k},v20,fine,tProbe\\WObj:=wobjPlate;\n" for k in range(1, 5))
+    program.write_text(text[: text.index("  PROC main()")] + f"  PROC main()\n{moves}  ENDPROC\nENDMODULE\n")
+    out = program.parent / "out"
+    compensate(calibrated(), [program], out=out, keep=["p*"])
+    assert (out / "plate.mod").read_bytes() == program.read_bytes()
+    copy = out / "copy.mod"
+    copy.write_bytes((out / "plate.mod").read_bytes())
+    assert compensate(calibrated(), [copy]).files[0].corrected == 17
+
+
+def test_a_ledger_that_cannot_be_written_is_said(program: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = program.parent / "robot" / "calibrated.yaml"
+    robot.parent.mkdir()
+    robot.write_text(robot_text(calibrated()))
+
+    def refused(folder: Path) -> None:
+        if folder == robot.parent:
+            raise PermissionError
+
+    monkeypatch.setattr(writing, "_try_writing", refused)
+    made = compensate(robot, [program], out=program.parent / "out")
+    said = [(one.code, one.level) for one in made.warnings]
+    assert ("ledger-not-written", "note") in said
+    assert [path.name for path in robot.parent.iterdir()] == ["calibrated.yaml"]
+    monkeypatch.undo()
+    made = compensate(robot, [program], out=program.parent / "other")
+    assert "ledger-not-written" not in {one.code for one in made.warnings}
+    assert [path.name for path in sorted(robot.parent.iterdir())] == ["calibrated.yaml", LEDGER]
+    assert "ledger-not-written" not in {one.code for one in compensate(calibrated(), [program]).warnings}
+
+
+def test_a_link_to_a_robot_leads_to_its_ledger(program: Path) -> None:
+    robot = program.parent / "robot" / "calibrated.yaml"
+    robot.parent.mkdir()
+    robot.write_text(robot_text(calibrated()))
+    (program.parent / "link.yaml").symlink_to(robot)
+    compensate(program.parent / "link.yaml", [program], out=program.parent / "out")
+    assert (robot.parent / LEDGER).exists()
+    assert not (program.parent / LEDGER).exists()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", '{"truearm": "truearm-corrections/1", "programs": [{"program": "a"}]}']
+)
+def test_what_has_the_name_of_the_ledger_and_is_none_is_refused(program: Path, text: str) -> None:
+    robot = program.parent / "robot" / "calibrated.yaml"
+    robot.parent.mkdir()
+    robot.write_text(robot_text(calibrated()))
+    (robot.parent / LEDGER).write_text(text)
+    with pytest.raises(InputError, match=f"{LEDGER}: truearm writes a file of this name itself") as refusal:
+        compensate(robot, [program], out=program.parent / "out")
+    assert refusal.value.parameter == "robot"
+    assert (robot.parent / LEDGER).read_text() == text
+    assert not (program.parent / "out").exists()
+    other = program.parent / "other" / "calibrated.yaml"
+    other.parent.mkdir()
+    other.write_bytes(robot.read_bytes())
+    compensate(other, [program], out=program.parent / "out")  # of another folder it is not asked for
+
+
+def test_the_program_of_a_path_is_remembered(tmp_path: Path) -> None:
+    robot = tmp_path / "robot" / "calibrated.yaml"
+    robot.parent.mkdir()
+    robot.write_text(robot_text(calibrated()))
+    file = tmp_path / "path.yaml"
+    file.write_text(
+        "truearm: truearm-path/1\nunits: {length: mm, angle: deg, time: s}\nspeed: 100\nacceleration: 500\nstep: 0.1\n"
+        "orientation: {quaternion: [0, 0, 1, 0]}\nstart: [350, -50, 300]\nsections:\n  - line: [350, 50, 300]\n"
+    )
+    truearm.path(robot, file, programs=["rapid"], targets="poses", out=tmp_path / "out")
+    (written,) = (tmp_path / "out").glob("*.mod")
+    with pytest.raises(InputError, match='corrected already; got "the comment'):
+        compensate(robot, [written])
+    unmarked = tmp_path / "x.mod"
+    unmarked.write_text("\n".join(line for line in written.read_text().splitlines() if MARK not in line))
+    with pytest.raises(
+        InputError, match=r"corrected already; got 'targets of truearm_path\.mod as it was corrected on"
+    ):
+        compensate(robot, [unmarked])
+    (robot.parent / LEDGER).unlink()
+    assert compensate(robot, [unmarked]).files[0].corrected > 3

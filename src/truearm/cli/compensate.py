@@ -109,8 +109,8 @@ def compensate(
 ) -> None:
     """Correct robot programs so that the real robot goes where they say.
 
-    Only the numbers of targets change. Beside each program NAME.truearm.json records what was done, and holds the
-    original; compensation.html shows how far each target was moved.
+    Only the numbers of targets change, and a comment says so. Beside each program NAME.truearm.json records what was
+    done, and holds the original; compensation.html shows how far each target was moved.
     """
     if revert:
         _revert(

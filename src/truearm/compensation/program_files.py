@@ -1,7 +1,8 @@
 """Program files: read, corrected, written beside a record of what was done, and restored from it.
 
 Beside every program that is written stands ``NAME.truearm.json``: hashes of the program before and after, what was
-applied, and the original itself. A program with such a record has been corrected already.
+applied, digests of its targets (:mod:`truearm.compensation.corrected_targets`), and the original itself. A program with
+such a record has been corrected already, and so has one with the comment that corrected programs carry.
 """
 
 from __future__ import annotations
@@ -13,16 +14,18 @@ import json
 import os
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict
 
+from truearm.compensation.corrected_targets import Digests, KnownCorrection, LedgerEntry, remember
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
-from truearm.compensation.programs.new_program import MARK
+from truearm.compensation.programs.marks import comment_of
 from truearm.compensation.programs.program import Edit, Language, Program, Source
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes
@@ -59,6 +62,8 @@ class CorrectionRecord(BaseModel):
     corrected_sha256: Hash
     applied: dict[str, Any]
     original: str
+    date: str = ""
+    targets: Digests = ""
 
 
 @dataclass(frozen=True)
@@ -153,7 +158,17 @@ def read_programs(files: Sequence[ProgramFile]) -> tuple[Program, ...]:
             cure="Correct them one after the other, each with its own robot.",
         )
     language = languages[0]
-    sources = [Source(file.path, file.original.decode("latin-1")) for file in files]
+    return read_sources(language, [Source(file.path, file.original.decode("latin-1")) for file in files])
+
+
+def read_sources(language: Language, sources: Sequence[Source]) -> tuple[Program, ...]:
+    """Find targets and moves in the texts of programs of a language.
+
+    Raises
+    ------
+    InputError
+        If one of them is malformed.
+    """
     # Hundreds of thousands of targets are made that all stay: the collector would look through them again and again.
     collecting = gc.isenabled()
     gc.disable()
@@ -174,8 +189,15 @@ def edited(text: str, edits: Sequence[Edit]) -> str:
     return replaced(text, 0, len(text), [(edit.start, edit.stop, edit.text) for edit in edits])
 
 
-def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mapping[str, Any]) -> str:
-    """Return the text of the record of a corrected program."""
+def recorded(
+    file: ProgramFile,
+    corrected: bytes,
+    language: str,
+    applied: Mapping[str, Any],
+    date: str = "",
+    targets: Digests = "",
+) -> str:
+    """Return the text of the record of a program that was corrected on a day, with the digests of its targets."""
     content = CorrectionRecord(
         truearm=SCHEMA,
         program=Path(file.name).name,
@@ -184,17 +206,34 @@ def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mappin
         corrected_sha256=_hash(corrected),
         applied=dict(applied),
         original=base64.b64encode(zlib.compress(file.original, 9)).decode(),
+        date=date,
+        targets=targets,
     )
     return json.dumps(content.model_dump(), indent=1) + "\n"
 
 
+def known_by_records(folders: Iterable[Path]) -> list[KnownCorrection]:
+    """Return what the records in some folders say of corrected programs, whatever these are called now."""
+    known = []
+    for path in sorted({path for folder in folders for path in folder.glob("*.truearm.json")}):
+        with suppress(InputError):  # of another program: what it says cannot be known
+            record = correction_record(path.with_name(path.name.removesuffix(".truearm.json")))
+            if record is not None:
+                known.append(KnownCorrection(record.program, record.date, record.targets, path))
+    return known
+
+
 def write_programs(
-    folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes], command: str | None = None
+    folder: Path,
+    inputs: Sequence[Path],
+    files: Mapping[str, str | bytes],
+    command: str | None = None,
+    ledger: tuple[Path, Sequence[LedgerEntry]] | None = None,
 ) -> None:
     """Write results into a folder, all of them or none. Records replace earlier ones.
 
-    Records are put in place first: there is never a corrected program whose record is missing, and which could be
-    corrected once more.
+    The ledger is written first, then records are put in place: there is never a corrected program that they do not
+    know, and which could be corrected once more.
 
     Raises
     ------
@@ -226,6 +265,8 @@ def write_programs(
         new = content if isinstance(content, bytes) else content.encode()
         if here != new and (record is None or record.corrected_sha256 != _hash(here)):
             raise _not_written_here(path)
+    if ledger is not None:
+        remember(*ledger)
     order = sorted(files, key=lambda name: not name.endswith(".truearm.json"))
     write_files(folder, {name: files[name] for name in order}, command)
 
@@ -262,14 +303,14 @@ def _original(path: Path, again: bool) -> bytes:
     record = correction_record(path)
     if record is None:
         content = _text_bytes(path)
-        if MARK.encode() in content:
+        comment = comment_of(content.decode("latin-1"))
+        if comment is not None:
             raise InputError(
-                "this program was written corrected",
+                "this program was corrected already",
                 where=str(path),
-                came=f"the comment '{MARK}'",
-                cure="Run it as it is. To correct another path, describe it anew with 'truearm path'.",
+                came=f"the comment '{comment}'",
+                cure="Give the original. A program of 'truearm path' has none: run it as it is.",
             )
-        _refuse_without_record(path, _hash(content))
         return content
     if not again:
         raise InputError(
@@ -281,25 +322,12 @@ def _original(path: Path, again: bool) -> bytes:
     return _unchanged_original(path, record)
 
 
-def _refuse_without_record(path: Path, content: str) -> None:
-    """Refuse what the manifest beside it knows as a corrected program: its record was removed, or it is a copy."""
-    for one in sets_in(path.parent):
-        for name, known in one.files.items():
-            if known == content and record_path(Path(name)).as_posix() in one.files:
-                raise InputError(
-                    "this program was corrected already",
-                    where=str(path),
-                    came=f"the content of {name}, written with its record",
-                    cure="Give the original, or put the record back beside it.",
-                )
-
-
 def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
     if _hash(_text_bytes(path)) != record.corrected_sha256:
         raise InputError(
             "this program was changed after it was corrected, so its record is no longer about it",
             where=str(path),
-            cure=f"To take it as an original, remove {record_path(path).name}.",
+            cure=f"Make the change in the original. If this is an original, remove {record_path(path).name}.",
         )
     original = _unpacked(record.original, record_path(path))
     if _hash(original) != record.original_sha256:

@@ -36,6 +36,7 @@ from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
 from truearm.compensation.program_poses import place
+from truearm.compensation.programs.marks import correction_comment
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.questions import refuse_unanswered
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
@@ -60,6 +61,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     wrench_argument,
 )
+from truearm.jobs.corrected_already import day_of, ledger_of, ledger_to_write, refuse_corrected_already
 from truearm.jobs.proof import (
     NOT_BETTER,
     SKIPPED,
@@ -153,7 +155,8 @@ def compensate(
         How far targets may be moved and turned, such as ``95mm,3deg``, in place of the limit: twice the largest
         deviation of the calibrated from the nominal robot, see :mod:`truearm.compensation.correction_limit`.
     notes
-        What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other.
+        What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other. A date such as
+        ``2026-11-27`` is the one in the comment of the programs too.
     command
         How to do it again, for the report; None writes the call in Python.
     progress
@@ -264,6 +267,8 @@ def compensate(
             weigh_tools=payload is None,
             wrenches=acting,
         )
+    refuse_corrected_already(result, paths, folder, ledger_of(robot))
+    ledger, unremembered = ledger_to_write(ledger_of(robot))
     large = _check_size(result, correction_limit(calibrated), allowed)
     if SKIPPED not in accepted:
         _refuse_skipped(result)
@@ -274,12 +279,16 @@ def compensate(
             split_program(language, correction, between, split)
             for correction, between in zip(result.corrections, result.between, strict=True)
         )
+    day = day_of(notes)
+    comment = correction_comment(day, arm.name, hashes.get("robot", ""))
     corrected = []
     for number, correction in enumerate(result.corrections):
         edits = _edits(correction, splits[number] if splits else None)
         for index, source in enumerate(correction.program.sources):
             file = next(file for file in files if file.path == source.path)
             text = edited(source.text, [edit for edit in edits if edit.source == index])
+            if text != source.text:
+                text = language.comment(text, comment)
             bounded = arm.proof is not None and arm.proof.lower_bound
             corrected.append(FileCorrection(file, correction, index, text.encode("latin-1"), result.relative, bounded))
     corrected.sort(key=lambda one: files.index(one.file))
@@ -297,11 +306,14 @@ def compensate(
             *check_force(result.pushed),
             *large,
             *check_correction(arm, result, splits),
+            *unremembered,
         ),
         command=invocation,
         inputs=files_of(robot, tools, frames, wrench_file, *_kinematics_file(kinematics)),
         hashes=hashes,
         notes=notes,
+        date=day.isoformat(),
+        ledger=ledger,
     )
     if folder is not None:
         with refusals_of("out"):

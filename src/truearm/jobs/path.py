@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from truearm.compensation.controller_model import (
     refuse_proprietary_controller,
 )
 from truearm.compensation.corrected_path import TIP, CorrectedPath, correct_path
+from truearm.compensation.corrected_targets import LedgerEntry, corrected_digests
 from truearm.compensation.correction_limit import CorrectionLimit, check_size, correction_limit
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.path_program import BY_NAME, TargetKind, path_program
@@ -39,6 +41,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     wrench_argument,
 )
+from truearm.jobs.corrected_already import ledger_of, ledger_to_write
 from truearm.jobs.proof import accept_argument, changed_since, refuse_unaccepted, told_of
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
@@ -189,8 +192,19 @@ def path(
         with refusals_of("name" if kind == "joints" else "targets"):
             content = path_program(followed, arm, called, targets=kind, spacing=time)
             texts = _programs(arm, content, chosen, notices)
+    ledger = None
+    if chosen and followed.calibrated:
+        ledger, unremembered = ledger_to_write(ledger_of(robot))
+        notices += unremembered
     made = FollowedPath(
-        arm, followed, texts, call, tuple(dict.fromkeys(notices)), files_of(robot, file, *kinematics), joints_are
+        arm,
+        followed,
+        texts,
+        call,
+        tuple(dict.fromkeys(notices)),
+        files_of(robot, file, *kinematics),
+        joints_are,
+        None if ledger is None else (ledger, _entries(arm, chosen, texts)),
     )
     if folder is not None:
         made.save(folder)
@@ -215,6 +229,18 @@ def _check_size(followed: CorrectedPath, limit: CorrectionLimit, accepted: Corre
         where=lambda row: f"{followed.planned.source}, {trajectory.distance[row] * 1e3:.1f} mm along the path",
         check="Usual causes are a payload or a force that the arm does not carry, and a calibration of another robot.",
         parameter="file",
+    )
+
+
+def _entries(arm: Robot, languages: Sequence[Language], texts: Mapping[str, str]) -> tuple[LedgerEntry, ...]:
+    """Return what is remembered of corrected programs."""
+    sources = [Source(Path(file), text) for file, text in texts.items()]
+    day = date.today().isoformat()
+    return tuple(
+        LedgerEntry(program=str(path), date=day, robot=arm.name, targets=corrected_digests((), targets))
+        for language in languages
+        for program in language.programs([one for one in sources if one.path.suffix.lower() in language.suffixes])
+        for path, targets in program.by_file().items()
     )
 
 

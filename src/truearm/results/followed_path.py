@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.compensation.corrected_path import KNOWLEDGE, CorrectedPath, Knowledge
+from truearm.compensation.corrected_targets import LedgerEntry, remember
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
@@ -57,6 +58,8 @@ class FollowedPath(Record):
         The files that were read: none of them is overwritten.
     joints_are
         Whose joint positions the files hold: the ``model``'s, or those that the ``controller`` shows.
+    ledger
+        Where the targets of corrected programs are remembered, and what; None for nowhere.
     """
 
     robot: Robot
@@ -66,6 +69,7 @@ class FollowedPath(Record):
     warnings: tuple[Notice, ...] = ()
     inputs: tuple[Path, ...] = ()
     joints_are: JointsOf = "model"
+    ledger: tuple[Path, tuple[LedgerEntry, ...]] | None = None
 
     @property
     def joints(self) -> Array:
@@ -168,6 +172,8 @@ class FollowedPath(Record):
         """Write all files into a folder; return them."""
         contents = self.contents()
         out = output_folder(folder, contents, self.inputs, "folder")
+        if self.ledger is not None:
+            remember(*self.ledger)
         write_files(out, contents, self.command)
         return tuple(out / name for name in contents)
 

@@ -14,11 +14,12 @@ import numpy as np
 
 from truearm.compensation.advice import NOTHING_CORRECTED, frame_words
 from truearm.compensation.chosen_targets import Kept
+from truearm.compensation.corrected_targets import LedgerEntry, corrected_digests
 from truearm.compensation.correction import Correction, Shared, shared_motion
 from truearm.compensation.expected_errors import REPEATABILITY
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms
-from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
+from truearm.compensation.program_files import ProgramFile, language_called, read_sources, recorded, write_programs
 from truearm.compensation.programs.program import Program, Skipped, Source
 from truearm.compensation.split import ProgramSplit
 from truearm.modeling.chain import Array
@@ -299,6 +300,10 @@ class ProgramCorrection(Record):
         SHA-256 of these files, by the parameters that named them.
     notes
         What the user noted, by its name.
+    date
+        When they were corrected.
+    ledger
+        Where their targets are remembered beside their records; None for nowhere.
     """
 
     robot: Robot
@@ -311,6 +316,8 @@ class ProgramCorrection(Record):
     inputs: tuple[Path, ...] = ()
     hashes: dict[str, str] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    date: str = ""
+    ledger: Path | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm."""
@@ -411,7 +418,7 @@ class ProgramCorrection(Record):
     def as_written(self) -> tuple[Program, ...]:
         """Return the programs as they are read again from their new texts."""
         language = language_called(self.files[0].language)
-        return language.programs([Source(one.file.path, one.text.decode("latin-1")) for one in self.files])
+        return read_sources(language, [Source(one.file.path, one.text.decode("latin-1")) for one in self.files])
 
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write programs, their records and the report ``compensation.html`` into a folder, all or nothing.
@@ -430,10 +437,19 @@ class ProgramCorrection(Record):
         folder = output_folder(folder)
         progress("drawing the report")
         files: dict[str, str | bytes] = {}
+        entries = []
+        written = {path: targets for program in self.as_written() for path, targets in program.by_file().items()}
         for one in self.files:
+            path = one.file.path
+            targets = corrected_digests(one.correction.program.by_file()[path], written[path])
             files[one.name] = one.text
-            files[f"{one.name}.truearm.json"] = recorded(one.file, one.text, one.language, self.applied())
+            files[f"{one.name}.truearm.json"] = recorded(
+                one.file, one.text, one.language, self.applied(), self.date, targets
+            )
+            entries.append(LedgerEntry(program=one.name, date=self.date, robot=self.robot.name, targets=targets))
         files[REPORT] = program_html(self)
         progress("writing the files")
-        write_programs(folder, [*(one.file.path for one in self.files), *self.inputs], files, self.command)
+        read = [*(one.file.path for one in self.files), *self.inputs]
+        ledger = None if self.ledger is None else (self.ledger, entries)
+        write_programs(folder, read, files, self.command, ledger)
         return tuple(folder / name for name in files)

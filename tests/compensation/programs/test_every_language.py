@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
 from functools import cache
 from pathlib import Path
 
@@ -12,14 +14,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from truearm.compensation.program_files import edited
+from truearm.compensation.program_files import edited, language_called
 from truearm.compensation.program_poses import edits_of, numbers_of, pose_numbers, poses_of
 from truearm.compensation.programs import LANGUAGES
-from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
+from truearm.compensation.programs.marks import MARK, correction_comment
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Edit, Language, Program, ProgramTarget, Source, Split
 from truearm.errors import InputError
 from truearm.modeling.orientations import QUATERNION
+from truearm.version import __version__
 
 SAMPLES = Path(__file__).parent / "samples"
 splitting = pytest.mark.parametrize("language", [one for one in LANGUAGES if one.split], ids=lambda one: one.name)
@@ -83,6 +87,76 @@ def test_a_correction_of_nothing_leaves_every_byte(language: Language) -> None:
         noisy = poses.copy()
         noisy[:, :3, 3] += 1e-10
         assert edits_of(program, pose_numbers(program, poses, noisy, rows)) == []
+
+
+@languages
+def test_a_comment_is_a_few_lines_and_changes_nothing_that_is_read(language: Language) -> None:
+    """Names that end a comment in some language are made harmless."""
+    lines = correction_comment(date(2026, 11, 27), "IRB --> *) ]]>; 'é' \"", "2f3a9c1d" * 8)
+    assert lines[:2] == (f"{MARK} {__version__}", "2026-11-27, calibration 2f3a9c1d")
+    assert all(len(line) <= 32 and line.isascii() for line in lines)
+    for sources in samples(language):
+        new = [Source(source.path, language.comment(source.text, lines)) for source in sources]
+        for source, one in zip(sources, new, strict=True):
+            old_rows, rows = (
+                text.removeprefix(BYTE_ORDER_MARK).splitlines(keepends=True) for text in (source.text, one.text)
+            )
+            assert source.text.startswith(BYTE_ORDER_MARK) == one.text.startswith(BYTE_ORDER_MARK)
+            first = next(number for number, row in enumerate(rows) if lines[0] in row)
+            assert all(said in row for said, row in zip(lines, rows[first:], strict=False))
+            assert {row[len(row.rstrip("\r\n")) :] for row in rows} <= {
+                row[len(row.rstrip("\r\n")) :] for row in old_rows
+            }
+            left = [re.sub(r"(LINE_COUNT\s*= )\d+", r"\g<1>", row) for row in rows[:first] + rows[first + len(lines) :]]
+            assert left == [re.sub(r"(LINE_COUNT\s*= )\d+", r"\g<1>", row) for row in old_rows]
+            assert language.is_one(one.text)
+        before, after = language.read(sources), language.read(new)
+        assert [replace(t, line=0, places=()) for t in after.targets] == [
+            replace(t, line=0, places=()) for t in before.targets
+        ]
+        for target in after.targets:
+            text = new[target.source].text
+            assert tuple(float(text[slice(*span)] or 0) for span in target.places if span) == tuple(
+                value for value, span in zip(target.values, target.places, strict=True) if span
+            )
+        assert [(m.kind, m.target, m.via, m.routine) for m in after.moves] == [
+            (m.kind, m.target, m.via, m.routine) for m in before.moves
+        ]
+        assert len(after.skipped) == len(before.skipped)
+        assert after.unknown == before.unknown
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "commented"),
+    [
+        (
+            "RAPID",
+            "MODULE m (SYSMODULE) CONST num n:=1;\nENDMODULE",
+            "MODULE m (SYSMODULE)\n  ! a\n CONST num n:=1;\nENDMODULE",
+        ),
+        ("RAPID", "%%%\r\nMODULE m ! of\r\nENDMODULE", "%%%\r\nMODULE m ! of\r\n  ! a\r\nENDMODULE"),
+        (
+            "KRL",
+            "&ACCESS RVP\n&REL 1\nDEF m( )\n;FOLD INI\n;ENDFOLD\nEND",
+            "&ACCESS RVP\n&REL 1\nDEF m( )\n; a\n;FOLD INI\n;ENDFOLD\nEND",
+        ),
+        ("INFORM", "/JOB\n//INST\n///DATE 2000\nNOP\nEND", "/JOB\n//INST\n///DATE 2000\nNOP\n'a\nEND"),
+        ("INFORM", "/JOB\n//INST\nMOVJ C1\nEND", "/JOB\n//INST\n'a\nMOVJ C1\nEND"),
+        ("URScript", "def m():\r\nend", "# a\r\ndef m():\r\nend"),
+        ("VAL3", "<?xml version='1.0'?><Database/>", "<?xml version='1.0'?>\n<!-- a -->\n<Database/>"),
+        ("VAL3", "<Code><![CDATA[begin put(1)\nend]]></Code>", "<Code><![CDATA[begin\n  // a\n put(1)\nend]]></Code>"),
+        ("FANUC LS", "/PROG M\n/MN\n/POS\n/END\n", "/PROG M\n/MN\n   1:  !a    ;\n/POS\n/END\n"),
+        (
+            "FANUC LS",
+            "/PROG M\r\nLINE_COUNT = 2;\r\n/MN\r\n   1:  UTOOL_NUM=0 ;\r\n  12:J P[1] 5% FINE ;\r\n/POS\r\n/END\r\n",
+            "/PROG M\r\nLINE_COUNT = 3;\r\n/MN\r\n   1:  UTOOL_NUM=0 ;\r\n  12:J P[1] 5% FINE ;\r\n  13:  !a    ;\r\n"
+            "/POS\r\n/END\r\n",
+        ),
+        ("RAPID", "CONST num n:=1;", "CONST num n:=1;"),
+    ],
+)
+def test_where_a_comment_stands(name: str, text: str, commented: str) -> None:
+    assert language_called(name).comment(text, ["a"]) == commented
 
 
 @languages

@@ -13,7 +13,8 @@ from truearm.compensation.corrected_path import CorrectedPath, correct_path
 from truearm.compensation.path_program import BY_NAME, path_program
 from truearm.compensation.program_correction import commanded
 from truearm.compensation.program_files import program_files
-from truearm.compensation.programs.new_program import MARK, NewProgram
+from truearm.compensation.programs.marks import MARK
+from truearm.compensation.programs.new_program import NewProgram
 from truearm.compensation.programs.program import Program, Source
 from truearm.errors import InputError
 from truearm.library import load_robot
@@ -167,7 +168,7 @@ def test_a_corrected_program_is_not_corrected_again(name: str, paths: dict[str, 
         (tmp_path / Path(file).name).write_text(text)
         marked += [tmp_path / Path(file).name] if MARK in text else []
     assert marked
-    with pytest.raises(InputError, match="was written corrected"):
+    with pytest.raises(InputError, match="corrected already; got \"the comment 'corrected by truearm"):
         program_files(marked)
     plain = language.new(replace(program, corrected=False))
     assert MARK not in "".join(plain.values())

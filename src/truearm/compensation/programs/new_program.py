@@ -7,15 +7,15 @@ motions, or in straight lines.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import date
 from typing import Final
 
+from truearm.compensation.programs.marks import correction_comment
 from truearm.compensation.programs.new_targets import NewTargets, ascii_only
 from truearm.modeling.chain import Array
 
 #: What a program may be called in every language: FANUC's controllers allow the fewest characters.
 NAME: Final = r"[A-Za-z][A-Za-z0-9_]{0,31}"
-#: What stands in a program that was written corrected, in a comment of its own.
-MARK: Final = "corrected by truearm"
 #: Languages that have no words for the time of a joint motion.
 _UNTIMED: Final = ("KRL", "INFORM", "VAL3")
 #: Controllers take no shorter time than this for a move [s], and no lower speed [m/s].
@@ -61,7 +61,7 @@ class NewProgram(NewTargets):
         """What a person should know who opens the program, in ASCII, 32 characters at most."""
         kind = "joint positions" if self.poses is None else "poses of the flange"
         text = [f"Path for {ascii_only(self.robot)[:20]}", f"{len(self)} targets: {kind}"]
-        return (*text, *((MARK, "do not correct it again") if self.corrected else ()))
+        return (*text, *((*correction_comment(date.today()), "do not correct it again") if self.corrected else ()))
 
     def seconds(self, row: int) -> float:
         """Return the time of the move to a target [s]."""

@@ -253,6 +253,13 @@ class Program:
     loads: Mapping[str, Payload] = field(default_factory=dict)
     load_changes: bool = False
 
+    def by_file(self) -> dict[Path, list[ProgramTarget]]:
+        """Return its targets by the files in which they stand."""
+        found: dict[Path, list[ProgramTarget]] = {source.path: [] for source in self.sources}
+        for target in self.targets:
+            found[self.sources[target.source].path].append(target)
+        return found
+
 
 class Edit(NamedTuple):
     """Text to put in the place of other text.
@@ -342,6 +349,9 @@ class Language:
         Whether a text looks like this language.
     read
         Read the files of one program, given together.
+    comment
+        Put lines of comment into a text of the language: ASCII, 32 characters at most. Every other byte stays, but for
+        a count of lines; the text stays as it is where it has no place for them.
     split
         Split moves; None if the language's programs cannot be split.
     new
@@ -364,6 +374,7 @@ class Language:
     makers: tuple[str, ...]
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
+    comment: Callable[[str, Sequence[str]], str]
     split: Callable[[Program, Sequence[Split]], SplitEdits] | None = None
     new: Callable[[NewProgram], Mapping[str, str]] | None = None
     motion: Callable[[MotionProgram], Mapping[str, str]] | None = None

@@ -23,6 +23,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 from truearm.compensation.programs.fanuc_ls.configuration import configuration
@@ -31,7 +32,9 @@ from truearm.compensation.programs.fanuc_ls.instructions import Instructions
 from truearm.compensation.programs.fanuc_ls.measuring import motion_program
 from truearm.compensation.programs.fanuc_ls.new import new_program
 from truearm.compensation.programs.fanuc_ls.split import split_moves
-from truearm.compensation.programs.fanuc_ls.text import LsFile, Position, is_one
+from truearm.compensation.programs.fanuc_ls.text import LINE_COUNT, LsFile, Position, is_one
+from truearm.compensation.programs.lines import replaced
+from truearm.compensation.programs.marks import with_lines_behind
 from truearm.compensation.programs.numbers import LARGEST
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
@@ -166,12 +169,30 @@ def read(sources: Sequence[Source]) -> Program:
     return Program(_NAME, tuple(sources), tuple(targets), tuple(moves), skipped=tuple(skipped), unknown=dict(unknown))
 
 
+def commented(text: str, lines: Sequence[str]) -> str:
+    """Return a program with remarks behind its last instruction, where no line is numbered anew."""
+    file = LsFile(Source(Path(), text))
+    place, number, head = file.instructions[0], 0, (0, 4)
+    for statement in file.statements():
+        place = statement.stop
+        digits = text[slice(*statement.number)]
+        if digits:
+            number, head = int(digits), (file.text.rfind("\n", 0, statement.number[0]) + 1, statement.number[1])
+    rows = [f"{number + row:{head[1] - head[0]}}:  !{line}    ;" for row, line in enumerate(lines, 1)]
+    remarked = with_lines_behind(text, place, rows, None)
+    count = LINE_COUNT.search(text, 0, file.instructions[0])
+    if count is None:
+        return remarked
+    return replaced(remarked, 0, len(remarked), [(*count.span(1), str(int(count[1]) + len(lines)))])
+
+
 FANUC_LS: Final = Language(
     _NAME,
     (".ls",),
     ("FANUC",),
     is_one,
     read,
+    commented,
     split_moves,
     new_program,
     motion_program,

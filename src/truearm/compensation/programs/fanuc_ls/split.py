@@ -15,7 +15,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from truearm.compensation.programs.fanuc_ls.text import LsFile, Position
+from truearm.compensation.programs.fanuc_ls.text import LINE_COUNT, LsFile, Position
 from truearm.compensation.programs.lines import line_end, replaced
 from truearm.compensation.programs.numbers import rewritten
 from truearm.compensation.programs.program import Edit, Move, Program, ProgramTarget, Split, SplitEdits
@@ -29,7 +29,6 @@ _REST: Final = re.compile(
 )
 _SECONDS: Final = re.compile(r"(?<!/)sec$", re.IGNORECASE)
 _BETWEEN: Final = re.compile(r"[\s:@]*+")
-_LINE_COUNT: Final = re.compile(r"\bLINE_COUNT[ \t]*+=[ \t]*+(\d{1,9})", re.IGNORECASE)
 _REFERRED: Final = re.compile(r"\bP\[[ \t]*+(\d{1,9})", re.IGNORECASE)
 #: The end of instructions that a move carries along, which are numbered from 1.
 _CARRIED_END: Final = re.compile(r"^[ \t]*+-{4,}[ \t]*+;", re.MULTILINE)
@@ -147,7 +146,7 @@ class _SplitFile:
             lines = [head + gap + line + self._line_end for head, line in zip(heads, words, strict=False)]
             edits.append(Edit(self._source, start, stop, "".join(lines) + heads[-1]))
             shift += len(words)
-        count = _LINE_COUNT.search(text, 0, self._file.instructions[0])
+        count = LINE_COUNT.search(text, 0, self._file.instructions[0])
         if shift and count:
             edits.append(Edit(self._source, *count.span(1), str(int(count[1]) + shift)))
         return edits

@@ -11,6 +11,7 @@ from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
 _FIRST: Final = re.compile(rf"(?:{BYTE_ORDER_MARK})?\s*+/PROG\b", re.IGNORECASE)
+LINE_COUNT: Final = re.compile(r"\bLINE_COUNT[ \t]*+=[ \t]*+(\d{1,9})", re.IGNORECASE)
 _SECTION: Final = re.compile(r"\n/(MN|POS|END)\b", re.IGNORECASE)
 _LINE: Final = re.compile(r"^[ \t]*+(?:(\d{0,9})[ \t]*+:)?(.*)$", re.MULTILINE)
 _NUMBER: Final = r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))"

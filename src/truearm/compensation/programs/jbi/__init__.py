@@ -14,6 +14,7 @@ says where they are. Positions of base and of station axes (BC, EC, BP, EX) stay
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from functools import cache
@@ -27,6 +28,7 @@ from truearm.compensation.programs.jbi.new import new_program
 from truearm.compensation.programs.jbi.split import split_moves
 from truearm.compensation.programs.jbi.steps import KINDS, NOWHERE, Step, Steps, arcs_of, steps_of
 from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.marks import with_lines_behind
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
     Configuration,
@@ -44,6 +46,11 @@ _AXES: Final = 6
 
 #: Openings of the intervals that the manual leaves open below and closes above [rad].
 _OPEN: Final = 1e-8
+
+#: Where the instructions begin: what is said of the job, and NOP, stand before them.
+_BEGINNING: Final = re.compile(
+    r"[\r\n][ \t]*+//INST[ \t]*+(?:[\r\n]++[ \t]*+///[^\r\n]*+)*+(?:[\r\n]++[ \t]*+NOP[ \t]*+(?=[\r\n]|\Z))?"
+)
 
 
 def is_one(text: str) -> bool:
@@ -201,12 +208,18 @@ def _interval(joint: int, degrees: float) -> tuple[int, float, float]:
     return joint, _OPEN - radians(degrees), _OPEN + radians(degrees)
 
 
+def _commented(text: str, lines: Sequence[str]) -> str:
+    head = _BEGINNING.search(text)
+    return text if head is None else with_lines_behind(text, head.end(), [f"'{line}" for line in lines], "'")
+
+
 JBI: Final = Language(
     "INFORM",
     (".jbi",),
     ("Yaskawa", "Motoman"),
     is_one,
     read,
+    _commented,
     split_moves,
     new_program,
     motion_program,

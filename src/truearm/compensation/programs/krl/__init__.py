@@ -32,6 +32,7 @@ What the language leaves open is decided so:
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Final
 
 from truearm.compensation.programs.krl.measuring import motion_program
@@ -39,11 +40,18 @@ from truearm.compensation.programs.krl.new import new_program
 from truearm.compensation.programs.krl.reading import read
 from truearm.compensation.programs.krl.split import split_moves
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
+from truearm.compensation.programs.marks import with_lines_behind
 from truearm.compensation.programs.program import Language, MakersCalibration
 
 _HEADER: Final = re.compile(
     rf"(?:{BYTE_ORDER_MARK})?\s*+(?:&ACCESS\b|(?:[;&][^\r\n]*+\s*+)*+"
     r"(?:DEFDAT\s+\$?\w|DEFFCT\s+\w|(?:GLOBAL\s+)?DEF\s+\w+\s*\([^()\r\n]*+\)[ \t]*+(?:[;\r\n]|\Z)))",
+    re.ASCII | re.IGNORECASE,
+)
+
+#: The line that begins a routine or a data list: headers of the file stand before it.
+_BEGINNING: Final = re.compile(
+    rf"(?:\A(?:{BYTE_ORDER_MARK})?|[\r\n])[ \t]*+(?:GLOBAL[ \t]++)?(?:DEF|DEFFCT|DEFDAT)[ \t][^;\r\n]*+",
     re.ASCII | re.IGNORECASE,
 )
 
@@ -53,12 +61,18 @@ def is_one(text: str) -> bool:
     return _HEADER.match(text) is not None
 
 
+def _commented(text: str, lines: Sequence[str]) -> str:
+    head = _BEGINNING.search(text)
+    return text if head is None else with_lines_behind(text, head.end(), [f"; {line}" for line in lines], ";")
+
+
 KRL: Final = Language(
     name="KRL",
     suffixes=(".src", ".dat", ".sub"),
     makers=("KUKA",),
     is_one=is_one,
     read=read,
+    comment=_commented,
     split=split_moves,
     new=new_program,
     motion=motion_program,

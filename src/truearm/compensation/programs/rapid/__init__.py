@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
+from truearm.compensation.programs.marks import with_lines_behind
 from truearm.compensation.programs.program import Language, MakersCalibration, Program, Source
 from truearm.compensation.programs.rapid.measuring import motion_program
 from truearm.compensation.programs.rapid.monitoring import with_postures_left_free
@@ -30,7 +31,9 @@ from truearm.compensation.programs.rapid.split import split_moves
 from truearm.compensation.programs.rapid.syntax import listing_of
 from truearm.compensation.programs.rapid.targets import Finder
 
-_MODULE: Final = re.compile(rf"(?:\A(?:{BYTE_ORDER_MARK})?|[\r\n])[ \t]*+MODULE[ \t]++[^\W\d]", re.I)
+_MODULE: Final = re.compile(
+    rf"(?:\A(?:{BYTE_ORDER_MARK})?|[\r\n])[ \t]*+MODULE[ \t]++[^\W\d]\w*+(?:\s*+\([^()]*+\))?", re.I
+)
 
 
 def _is_one(text: str) -> bool:
@@ -42,12 +45,18 @@ def _read(sources: Sequence[Source]) -> Program:
     return with_postures_left_free(Finder(listing).program(RAPID.name))
 
 
+def _commented(text: str, lines: Sequence[str]) -> str:
+    head = _MODULE.search(text)
+    return text if head is None else with_lines_behind(text, head.end(), [f"  ! {line}" for line in lines], "!")
+
+
 RAPID: Final = Language(
     name="RAPID",
     suffixes=(".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"),
     makers=("ABB",),
     is_one=_is_one,
     read=_read,
+    comment=_commented,
     split=split_moves,
     new=new_program,
     motion=motion_program,

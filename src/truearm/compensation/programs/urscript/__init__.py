@@ -30,7 +30,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from truearm.compensation.programs.lines import BYTE_ORDER_MARK
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK, line_end
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Language, MakersCalibration, MoveKind, Program, Source
 from truearm.compensation.programs.urscript.measuring import motion_program
@@ -89,6 +89,11 @@ def _read(sources: Sequence[Source]) -> Program:
     program = made_program("URScript", tuple(sources), parts, tools, frames, unknown)
     load = _load_of([one.script for one in files])
     return program if load is None else replace(program, loads={target.tool: load for target in program.targets})
+
+
+def _commented(text: str, lines: Sequence[str]) -> str:
+    mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
+    return mark + "".join(f"# {line}{line_end(text)}" for line in lines) + text.removeprefix(mark)
 
 
 def _load_of(scripts: Sequence[Script]) -> Payload | None:
@@ -195,6 +200,7 @@ URSCRIPT: Final = Language(
     ("Universal Robots", "UR"),
     _is_one,
     _read,
+    _commented,
     split_moves,
     new_program,
     motion_program,

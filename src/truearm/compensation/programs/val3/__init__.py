@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
+from truearm.compensation.programs.marks import with_lines_behind
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
     Configuration,
@@ -46,6 +47,8 @@ _ROOT: Final = re.compile(
     r"[^<>]*(?:VAL3|NameSpace)",
     re.DOTALL,
 )
+_BEGIN: Final = re.compile(r"<(?:\w+:)?Code>\s*+(?:<!\[CDATA\[)?\s*+begin\b", re.I)
+_HEAD: Final = re.compile(rf"(?:{BYTE_ORDER_MARK})?\s*+(?:<\?xml\b.*?\?>)?", re.DOTALL)
 _MILLIMETRES: Final = re.compile(r"\bmillimeterUnit\s*=\s*[\"'](\w+)[\"']")
 _POINTS: Final = ("pointRx", "pointRs")
 _JOINTS: Final = ("jointRx", "jointRs")
@@ -68,6 +71,15 @@ Tools = set[str | None]
 def is_one(text: str) -> bool:
     """Tell whether a text is a file of a VAL3 application."""
     return _ROOT.match(text) is not None
+
+
+def commented(text: str, lines: Sequence[str]) -> str:
+    """Return a file with a comment: a program's in its code, any other's behind the XML declaration."""
+    begin = _BEGIN.search(text)
+    if begin is not None:
+        return with_lines_behind(text, begin.end(), [f"  // {line}" for line in lines], "//")
+    head = _HEAD.match(text)
+    return with_lines_behind(text, head.end() if head else 0, [f"<!-- {line} -->" for line in lines], None)
 
 
 def read(sources: Sequence[Source]) -> Program:
@@ -342,6 +354,7 @@ VAL3: Final = Language(
     ("Stäubli",),
     is_one,
     read,
+    commented,
     new=new_program,
     motion=motion_program,
     together=True,

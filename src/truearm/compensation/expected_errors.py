@@ -185,6 +185,8 @@ def expected_errors(
     proof: Proof,
     programs: Sequence[TargetsReached],
     frames: Provenance,
+    *,
+    taught_tools: bool = False,
 ) -> tuple[ExpectedErrors, ...]:
     """Return what is expected of the targets of programs that are corrected together.
 
@@ -200,8 +202,10 @@ def expected_errors(
         Whether the places of frames were given, or assumed. Those that were given are taken as exact in the world of
         the calibration. A tool whose tip is a target of the calibration is known as well as that; any other only as
         well as the real flange on the identified one (:func:`truearm.compensation.gauge.flange_spread`).
+    taught_tools
+        Whether the tools were found with this robot before its calibration.
     """
-    model = _ModelErrors(robot, proof, frames == "assumed")
+    model = _ModelErrors(robot, proof, frames == "assumed", taught_tools)
     if frames == "assumed":
         model = replace(model, shared=model.shared_by(programs))
     return tuple(_expected(model, one) for one in programs)
@@ -276,6 +280,8 @@ class _ModelErrors:
     ----------
     assumed_frames
         Whether the places of frames are assumed, and so take part of the errors up.
+    taught_tools
+        Whether tools were found with this robot.
     shared
         What each frame takes up, by its number; nothing where there is none.
     """
@@ -283,13 +289,14 @@ class _ModelErrors:
     robot: Robot
     proof: Proof
     assumed_frames: bool
+    taught_tools: bool
     shared: Mapping[int, CommonMotion] = field(default_factory=dict)
 
     @cached_property
     def _flange(self) -> Array:
         """How the real flange moves on the identified one, ``(6, numbers)``."""
         of_arm = flange_rates(self.robot, self.proof.names) @ self.proof.root
-        return np.concatenate([-of_arm, flange_spread(self.robot)], axis=1)
+        return np.concatenate([-of_arm, flange_spread(self.robot, taught=self.taught_tools)], axis=1)
 
     @property
     def numbers(self) -> int:

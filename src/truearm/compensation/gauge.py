@@ -166,7 +166,7 @@ def flange_rates(robot: Robot, names: Sequence[str]) -> Array:
     return np.asarray(freedom @ explained[6 * base_moves :])
 
 
-def flange_spread(robot: Robot) -> Array:
+def flange_spread(robot: Robot, *, taught: bool = False) -> Array:
     """Return how far the real flange may be from where it is taken to be, which no reading tells.
 
     It is made as accurately as the links are. So each of its six motions has the prior of a length, an angle or a joint
@@ -178,6 +178,9 @@ def flange_spread(robot: Robot) -> Array:
     ----------
     robot
         Calibrated.
+    taught
+        Whether the tool was found with this robot before its calibration: what the robot missed then is as large, and
+        no target that was held says it.
 
     Returns
     -------
@@ -190,7 +193,7 @@ def flange_spread(robot: Robot) -> Array:
         for group, unit in (("geometry", "m"), ("geometry", "rad"), ("joint zero", "rad"))
     )
     size = np.array([length, length, 2.0 * length, angle, angle, 2.0 * zero]) / math.sqrt(2.0)
-    freedom = _flange_freedom(robot)
+    freedom = np.eye(6) if taught else _flange_freedom(robot)
     within = (freedom / size[:, None] ** 2).T
     return np.asarray(freedom @ np.linalg.solve(within @ freedom, within) * size)
 

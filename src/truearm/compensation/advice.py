@@ -338,7 +338,7 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
             f"the workspace, {size(frames.flange)} from the identified one."
         )
         if any(one.expected is not None for one in result.corrections):
-            said[-1] += " No reading tells where it really is: the errors to expect contain that. Give `tools` if you can."
+            said[-1] += " No reading tells where it really is; the errors to expect contain that."
     return said
 
 

@@ -6,7 +6,8 @@ arrival. With the predicted correction ``d`` of a target, and the error ``e`` of
 with the probability ``Phi(-|d| / (2 s))`` where ``s`` is the deviation of ``e`` along ``d``.
 
 Where the program's frame is free, what all targets share is left out of ``e`` as it is left out of ``d``, by the same
-rules (:mod:`truearm.compensation.gauge`): an uncertain place of the base, or of the flange, makes no target worse then.
+rules (:mod:`truearm.compensation.gauge`): an uncertain place of the base makes no target worse then. An uncertain place
+of the real flange, on which a tool sits that was not measured, moves targets differently that differ in orientation.
 """
 
 from __future__ import annotations

@@ -7,6 +7,9 @@ is taken to be where it agrees best with the nominal one all over the workspace,
 corrections of the program have no part that a motion of all targets together would make. A work object that was
 located by points with the uncorrected robot is in its place then.
 
+How far the real flange may be from there is part of what is expected of targets: no reading tells it, but the other
+links tell how accurately the arm is made.
+
 A calibration that held the base, or targets on the flange, knows them: then the identified base is the real one, and a
 held target stays where it is on the flange.
 """

@@ -203,7 +203,7 @@ def in_the_cell(twin: Twin, robot: Robot, path: Path, rng: np.random.Generator) 
 def missed(twin: Twin, robot: Robot, program: Program, meant: Array, rows: Array, measured: bool) -> Array:
     """Return how far the tip of the twin is from its targets [m]; where nothing was measured, after the best fit.
 
-    Then the tool is the nominal one, on the flange that agrees best with the nominal robot's.
+    Then the tool is the nominal one, on the twin's own flange.
     """
     frames = twin.frames(commanded(robot, program)[rows])[twin.robot.targets[0].name]
     if measured:
@@ -212,7 +212,7 @@ def missed(twin: Twin, robot: Robot, program: Program, meant: Array, rows: Array
     flange = frames.copy()
     flange[:, :3, 3] -= frames[:, :3, :3] @ target
     tool = twin.robot.controller.flange.matrix @ program.tools["tProbe"].matrix
-    tips = (flange @ best_agreement(twin.robot)[1] @ tool)[:, :3, 3]
+    tips = (flange @ tool)[:, :3, 3]
     a, b = tips - tips.mean(axis=0), meant[rows, :3, 3] - meant[rows, :3, 3].mean(axis=0)
     u, _, vt = np.linalg.svd(a.T @ b)
     return np.asarray(np.linalg.norm(a @ (u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt) - b, axis=1))

@@ -147,7 +147,8 @@ def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     words += (
         f"They need {beyond} outside of what was measured: measure there."
         if beyond
-        else "The corrections are small beside what is known of them: measure more configurations near the program."
+        else "The corrections are small beside what is known of them: "
+        f"{'give `tools`, or ' * (result.frames.tools == 'assumed')}measure more configurations near the program."
     )
     return [Notice("not-better-here", words)]
 
@@ -320,6 +321,8 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
             f"{given}. The program's tools are taken to sit on a flange that agrees best with the nominal one all over "
             f"the workspace, {size(frames.flange)} from the identified one."
         )
+        if any(one.expected is not None for one in result.corrections):
+            said[-1] += " No reading tells where it really is; the errors to expect contain that."
     return said
 
 

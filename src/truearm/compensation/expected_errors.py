@@ -6,7 +6,8 @@ arrival. With the predicted correction ``d`` of a target, and the error ``e`` of
 with the probability ``Phi(-|d| / (2 s))`` where ``s`` is the deviation of ``e`` along ``d``.
 
 Where the program's frame is free, what all targets share is left out of ``e`` as it is left out of ``d``, by the same
-rules (:mod:`truearm.compensation.gauge`): an uncertain place of the base, or of the flange, makes no target worse then.
+rules (:mod:`truearm.compensation.gauge`): an uncertain place of the base makes no target worse then. An uncertain place
+of the real flange, on which a tool sits that was not measured, moves targets differently that differ in orientation.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.gauge import CommonMotion, common_motion, flange_rates
+from truearm.compensation.gauge import CommonMotion, common_motion, flange_draws, flange_rates, flange_spread
 from truearm.compensation.program_places import Provenance
 from truearm.modeling.chain import Array
 from truearm.modeling.proof import Proof
@@ -194,8 +195,9 @@ def expected_errors(
     robot: Robot,
     proof: Proof,
     programs: Sequence[TargetsReached],
-    tools: Provenance,
     frames: Provenance,
+    *,
+    taught_tools: bool = False,
 ) -> tuple[ExpectedErrors, ...]:
     """Return what is expected of the targets of programs that are corrected together.
 
@@ -207,16 +209,18 @@ def expected_errors(
         What is known of its parameters.
     programs
         Their targets.
-    tools, frames
-        Whether the places of tools and frames were given, or assumed. Frames that were given are taken as exact in the
-        world of the calibration. A tool whose tip is a target of the calibration is known as well as that; any other
-        only as well as the flange, which a shift of the tool against the last joint leaves to the priors.
+    frames
+        Whether the places of frames were given, or assumed. Those that were given are taken as exact in the world of
+        the calibration. A tool whose tip is a target of the calibration is known as well as that; any other only as
+        well as the real flange on the identified one (:func:`truearm.compensation.gauge.flange_spread`).
+    taught_tools
+        Whether the tools were found with this robot before its calibration.
 
     Notes
     -----
     No distance is below :data:`REPEATABILITY`.
     """
-    model = _ModelErrors(robot, proof, tools == "assumed", frames == "assumed")
+    model = _ModelErrors(robot, proof, frames == "assumed", taught_tools)
     if frames == "assumed":
         model = replace(model, shared=model.shared_by(programs))
     return tuple(_expected(model, one).at_least(REPEATABILITY) for one in programs)
@@ -227,7 +231,7 @@ def _expected(model: _ModelErrors, targets: TargetsReached) -> ExpectedErrors:
     shift = targets.shifts @ model.robot.base.rotation.T
     length2 = np.sum(shift**2, axis=1)
     along, mean2, spread2 = np.zeros(count), np.zeros(count), np.zeros(count)
-    together, alone = np.zeros((groups, len(model.proof.names))), np.zeros(groups)
+    together, alone = np.zeros((groups, model.numbers)), np.zeros(groups)
     for part, errors, by_joints in model.errors(targets):
         d = shift[part]
         by_model = np.einsum("nip,ni->np", errors, d)
@@ -256,7 +260,7 @@ def _drawn(model: _ModelErrors, targets: TargetsReached) -> DrawnErrors:
     shift = targets.shifts[some] @ model.robot.base.rotation.T
     before, after = np.zeros((2, len(some), _DRAWS))
     rng = np.random.default_rng(0)
-    drawn = rng.standard_normal((len(model.proof.names), _DRAWS))
+    drawn = np.concatenate([rng.standard_normal((len(model.proof.names), _DRAWS)), flange_draws(_DRAWS)])
     scale = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, _DRAWS))
     common: Array | None = None
     in_common = 0.0 if model.assumed_frames else _IN_COMMON  # a frame takes it up
@@ -289,31 +293,40 @@ class _ModelErrors:
 
     Attributes
     ----------
-    assumed_tools, assumed_frames
-        Whether the places of tools and frames are assumed, and so take part of the errors up.
+    assumed_frames
+        Whether the places of frames are assumed, and so take part of the errors up.
+    taught_tools
+        Whether tools were found with this robot.
     shared
         What each frame takes up, by its number; nothing where there is none.
     """
 
     robot: Robot
     proof: Proof
-    assumed_tools: bool
     assumed_frames: bool
+    taught_tools: bool
     shared: Mapping[int, CommonMotion] = field(default_factory=dict)
 
     @cached_property
     def _flange(self) -> Array:
-        return flange_rates(self.robot, self.proof.names) @ self.proof.root
+        """How the real flange moves on the identified one, ``(6, numbers)``."""
+        of_arm = flange_rates(self.robot, self.proof.names) @ self.proof.root
+        return np.concatenate([-of_arm, flange_spread(self.robot, taught=self.taught_tools)], axis=1)
+
+    @property
+    def numbers(self) -> int:
+        """How many independent numbers there are: one a parameter, and behind them six of the flange."""
+        return len(self.proof.names) + len(self._flange)
 
     @cached_property
     def _root(self) -> Array:
-        root = self.proof.root
+        root = np.pad(self.proof.root, ((0, 0), (0, len(self._flange))))
         if self.assumed_frames:
             root[[self.robot.parameters[name].group == "base" for name in self.proof.names]] = 0.0
         return root
 
     def errors(self, targets: TargetsReached) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
-        """Yield for parts of the targets the errors by the parameters ``(m, 3, parameters)``, and by the joints.
+        """Yield for parts of the targets the errors by the model ``(m, 3, numbers)``, and by the joints.
 
         Those by the joints are ``(m, 3, joints)``; both in the axes of the world [m].
         """
@@ -348,22 +361,23 @@ class _ModelErrors:
                     yield tips, moved, turned
 
     def _motions(self, robot: Robot, q: Array, tip: Array) -> tuple[Array, Array, Array]:
-        """Return motions and turns of tips ``(m, 3, parameters)``, and the tips ``(m, 3)``, in the world."""
+        """Return motions and turns of tips ``(m, 3, numbers)``, and the tips ``(m, 3)``, in the world."""
         names = self.proof.names
         kinematics = robot.forward_kinematics(q)
         R = kinematics.matrix()
         moved, turned = (np.moveaxis(rate, 2, 0).swapaxes(1, 2) for rate in robot.jacobians(kinematics, q, names))
         arm = (R @ tip[:, :, None])[:, :, 0]
         moved, turned = moved @ self._root, turned @ self._root
-        if self.assumed_tools and self.assumed_frames:
-            moved = moved - R @ self._flange[:3]
-            turned = turned - R @ self._flange[3:]
-        else:
-            moved = moved + R @ self._tip_on_flange(tip)
+        on_flange, is_target = self._tips_on_flange(tip)
+        moved = moved + R @ np.where(is_target, on_flange, self._flange[:3])
+        turned = turned + R @ np.where(is_target, 0.0, self._flange[3:])
         return moved + np.cross(turned, arm[:, :, None], axis=-2), turned, kinematics.position.T + arm
 
-    def _tip_on_flange(self, tips: Array) -> Array:
-        """Return by what the target at each tip is uncertain on the flange, ``(m, 3, parameters)``; 0 without one."""
+    def _tips_on_flange(self, tips: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return by what targets of the calibration at tips are uncertain on the identified flange, and which are such.
+
+        Those are ``(m, 3, numbers)`` and ``(m, 1, 1)``.
+        """
         robot, names, root = self.robot, list(self.proof.names), self._root
         rates = np.zeros((len(robot.targets) + 1, 3, root.shape[1]))
         places = np.full((len(rates), 3), np.inf)
@@ -375,7 +389,8 @@ class _ModelErrors:
                     rates[number, axis] = root[names.index(name)]
         away = np.linalg.norm(tips[:, None] - places, axis=2)
         away[:, -1] = _AT_TARGET
-        return np.asarray(rates[np.argmin(away, axis=1)])
+        nearest = np.argmin(away, axis=1)
+        return np.asarray(rates[nearest]), np.asarray(nearest < len(robot.targets))[:, None, None]
 
     def _by_joints(self, robot: Robot, q: Array, tip: Array) -> Array:
         """Return the errors of tips by the errors of the joints at an arrival, ``(m, 3, joints)``."""

@@ -7,12 +7,16 @@ is taken to be where it agrees best with the nominal one all over the workspace,
 corrections of the program have no part that a motion of all targets together would make. A work object that was
 located by points with the uncorrected robot is in its place then.
 
+How far the real flange may be from there is part of what is expected of targets: no reading tells it, but the other
+links tell how accurately the arm is made.
+
 A calibration that held the base, or targets on the flange, knows them: then the identified base is the real one, and a
 held target stays where it is on the flange.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -23,6 +27,7 @@ from truearm.compensation.fake_targets import matrices, nominal_robot
 from truearm.identification.solving.fit import Fit
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.kinematics import reach
+from truearm.modeling.parameters import PRIOR, Group, Unit
 from truearm.modeling.proof import BASE, FLANGE
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_from_vector, rotation_vector
@@ -37,6 +42,10 @@ _ZERO: Final = 1e-10
 #: What a turn of a tool counts as beside a shift of its tip [m]. Work objects are located by points: orientations tell
 #: only how targets are turned together that are all in one place or on one line.
 _TOOL: Final = 1e-3
+#: Share of its prior variance up to which a combination of parameters was told by a calibration; so many of them say
+#: how accurate an arm is.
+_MOST_LEFT: Final = 0.1
+_LEAST_TOLD: Final = 4
 
 
 def best_agreement(robot: Robot) -> tuple[Array, Array]:
@@ -158,6 +167,64 @@ def flange_rates(robot: Robot, names: Sequence[str]) -> Array:
     right = (np.moveaxis(moved, 2, 0) * weight).swapaxes(1, 2).reshape(-1, len(names))
     explained, *_ = np.linalg.lstsq((rows * weight[:, None]).reshape(-1, rows.shape[2]), right, rcond=None)
     return np.asarray(freedom @ explained[6 * base_moves :])
+
+
+def flange_spread(robot: Robot, *, taught: bool = False) -> Array:
+    """Return how far the real flange may be from where it is taken to be, which no reading tells.
+
+    It is made as accurately as the links are. So each of its six motions has the prior of a length, an angle or a joint
+    zero, times what the calibration found of how far these are from nominal in units of their priors. Along and about
+    the last axis the errors of two links add. Beside it, a flange that is turned on its bearings is where it should be:
+    half of them are taken for such. Targets that were held on the flange leave what they do not determine.
+
+    Parameters
+    ----------
+    robot
+        Calibrated.
+    taught
+        Whether the tool was found with this robot before its calibration: what the robot missed then is as large, and
+        no target that was held says it.
+
+    Returns
+    -------
+    spread
+        ``(6, 6)``: translation and rotation vector of the flange in its own axes [m, rad], by independent numbers of
+        deviation 1, one for each; see :func:`flange_draws`.
+    """
+    length, angle = _found_accuracy(robot, "geometry", "m"), _found_accuracy(robot, "geometry", "rad")
+    zero = _found_accuracy(robot, "joint zero", "rad")
+    size = np.array([length, length, 2.0 * length, angle, angle, 2.0 * zero]) / math.sqrt(2.0)
+    freedom = np.eye(6) if taught else _flange_freedom(robot)
+    within = (freedom / size[:, None] ** 2).T
+    return np.asarray(freedom @ np.linalg.solve(within @ freedom, within) * size)
+
+
+def flange_draws(count: int) -> Array:
+    """Return draws of the numbers of :func:`flange_spread`, ``(6, count)``: in half of them it is on the last axis."""
+    rng = np.random.default_rng(1)
+    drawn = rng.standard_normal((6, count))
+    drawn[[0, 1, 3, 4]] *= math.sqrt(2.0) * rng.integers(0, 2, count)
+    return drawn
+
+
+def _found_accuracy(robot: Robot, group: Group, unit: Unit) -> float:
+    """Return the deviation from nominal of the parameters of a kind, as far as a calibration told them [m or rad].
+
+    It is their prior where the calibration told less than four of them, or nothing is known of how well it did.
+    """
+    prior = robot.priors.get(unit, PRIOR[group, unit])
+    nominal = nominal_robot(robot).parameters
+    names = [] if robot.proof is None else [n for n in robot.proof.names if n in nominal]
+    names = [n for n in names if (nominal[n].group, nominal[n].unit) == (group, unit)]
+    if robot.proof is None or len(names) < _LEAST_TOLD:
+        return prior
+    rows = [robot.proof.names.index(name) for name in names]
+    moved = np.array([robot.values[name] - nominal[name].value for name in names]) / prior
+    left, axes = np.linalg.eigh(robot.proof.covariance[np.ix_(rows, rows)] / prior**2)
+    told = left < _MOST_LEFT
+    if told.sum() < _LEAST_TOLD:
+        return prior
+    return prior * max(float(np.sqrt(np.mean((axes[:, told].T @ moved) ** 2))), _RANK)
 
 
 def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:

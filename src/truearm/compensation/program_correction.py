@@ -196,7 +196,8 @@ def corrected_programs(
         progress("judging the targets")
         shared = names if choice.was_taught("frames") else ()
         reached = [one.reached(made, flange, shared) for one, made in zip(resolved, corrections, strict=True)]
-        expected = expected_errors(robot, robot.proof, reached, tools, frames)
+        taught = choice.was_taught("tools")
+        expected = expected_errors(robot, robot.proof, reached, frames, taught_tools=taught)
         corrections = [
             one.judged(made, of_targets, every=choice.every)
             for one, made, of_targets in zip(resolved, corrections, expected, strict=True)

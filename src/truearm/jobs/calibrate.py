@@ -18,12 +18,14 @@ from truearm.identification.choosing.candidates import compared_with
 from truearm.identification.choosing.choice import AUTO
 from truearm.identification.choosing.chosen_fit import check_choice, check_part, identify_chosen
 from truearm.identification.choosing.selection import select
+from truearm.identification.held import Held
+from truearm.identification.judging.gain import check_gain
 from truearm.identification.judging.held_places import check_held
-from truearm.identification.judging.judgement import judge
+from truearm.identification.judging.judgement import PULLED, judge
 from truearm.identification.judging.simulated_calibrations import refuse_too_many
 from truearm.identification.solving.bootstrap import LEAST_FITS
 from truearm.identification.solving.bounds import Bounds, read_bounds
-from truearm.identification.solving.fit import identify, place
+from truearm.identification.solving.fit import Fit, identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
 from truearm.identification.solving.models import FRAMES, MODELS, Model, named_model
 from truearm.identification.solving.rounds import Redundant
@@ -52,10 +54,10 @@ from truearm.jobs.holding import held_argument
 from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
 from truearm.jobs.split import (
     check_copies,
-    check_proof,
     check_split,
     check_trained_before,
     left_out,
+    nothing_held_out,
     train_count,
     without_words,
 )
@@ -326,7 +328,7 @@ def calibrate(
     train_errors = errors_of(fit.robot, first)
     of_split = (
         *contradicted,
-        *check_proof(before, validation),
+        *_beside_nominal(placed, fit, first, second, noticed, held),
         *check_excluded(
             excluded, fit.robot, None if base_changes else left_out(as_read, without), held_out, validation
         ),
@@ -387,6 +389,29 @@ def calibrate(
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
+
+
+def _beside_nominal(
+    placed: Robot, fit: Fit, training: Dataset, held_out: Dataset | None, noticed: Sequence[Notice], held: Held
+) -> list[Notice]:
+    """Say what the held-out part tells of the calibrated robot beside the nominal one.
+
+    Where single readings are doubted, they pull base and targets of the nominal robot too, unless the loss is robust.
+
+    Parameters
+    ----------
+    placed
+        The nominal robot, base and targets found as the fit finds them.
+    noticed
+        What was said of the data.
+    """
+    if held_out is None:
+        return [nothing_held_out()]
+    if fit.model is FRAMES:  # the robot is the nominal one
+        return []
+    doubted = fit.loss in PULLED and any(notice.at for notice in noticed)
+    nominal = place(fit.start, training, "cauchy", held) if doubted else placed
+    return check_gain(errors_of(nominal, held_out), errors_of(fit.robot, held_out), held_out, doubted=doubted)
 
 
 def _fits_argument(bootstrap: object) -> int:

@@ -35,6 +35,7 @@ from truearm.jobs.arguments import (
     command_argument,
     count_argument,
     files_of,
+    flag_argument,
     folder_for,
     gravity_argument,
     names_argument,
@@ -108,6 +109,7 @@ def calibrate(
     monte_carlo: int | None = None,
     zones: int | str | Path | None = None,
     notes: Mapping[str, str] | None = None,
+    replace: bool = False,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
@@ -173,6 +175,9 @@ def calibrate(
     notes
         What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
         ``instrument``, or any other.
+    replace
+        Whether a sound result in `out` is replaced by one that is not: by one that is worse than the nominal robot or
+        has no gain over it, or that ended in another bad status or with an error.
     command
         How to run it again, for the report; None writes the call in Python.
     progress
@@ -181,7 +186,8 @@ def calibrate(
     Raises
     ------
     InputError
-        For anything that cannot be used, with a message that says what to do.
+        For anything that cannot be used, with a message that says what to do. Where a sound result stays, it is a
+        :class:`truearm.results.standing.ResultKeptError`, which has the new one as its attribute ``calibration``.
     """
     progress_argument(progress)
     named = choice_argument(model, "model", _MODELS)
@@ -195,7 +201,7 @@ def calibrate(
         )
     base_changes = names_argument(base_changes, "base_changes")
     without = names_argument(without, "without")
-    notes = notes_argument(notes)
+    notes, replace = notes_argument(notes), flag_argument(replace, "replace")
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
@@ -387,7 +393,7 @@ def calibrate(
         zones=chosen_zones,
     )
     if folder is not None:
-        calibration.save(folder, progress)
+        calibration.save(folder, progress, replace=replace)
     return calibration
 
 

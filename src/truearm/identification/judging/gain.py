@@ -61,8 +61,8 @@ def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = 
             )
         ]
     figures = (
-        f"Half of {postures} that the fit has not seen are off by more than {millimetres(float(np.median(new)))} mm "
-        f"with the calibrated robot, and by more than {millimetres(float(np.median(old)))} mm with the nominal one"
+        f"On {postures} that the fit has not seen the median error is {millimetres(float(np.median(new)))} mm with the "
+        f"calibrated robot and {millimetres(float(np.median(old)))} mm with the nominal one"
         f"{', whose base and targets were found with `loss=cauchy` because readings are doubted' if doubted else ''}."
     )
     if signed_rank_probability(new - _FACTOR * old) <= _LEVEL:
@@ -116,7 +116,7 @@ def signed_rank_probability(differences: Array) -> float:
 
 
 def _by_posture(errors: Errors, data: Dataset) -> Array:
-    """Return the mean error of the positions, else of the lengths, at each posture that has one [m], ``(postures,)``."""
+    """Return the mean error of the positions, else of the lengths, at each posture [m], ``(postures,)``."""
     off = np.linalg.norm(errors.position_errors, axis=1)
     if errors.length_errors is not None and not np.isfinite(off).any():
         off = np.abs(errors.length_errors)

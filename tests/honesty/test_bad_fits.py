@@ -210,7 +210,7 @@ def test_it_does_where_that_is_asked_for_and_then_anything_replaces_it(truearm: 
 def test_the_robot_file_alone_says_that_a_result_is_sound(sound: Path, tmp_path: Path) -> None:
     shutil.copytree(sound, tmp_path / "out")
     (tmp_path / "out" / "result.json").unlink()
-    with pytest.raises(ResultKeptError, match="in the folder: converged[.]"):
+    with pytest.raises(ResultKeptError, match=r"in the folder: converged[.]"):
         package.calibrate("irb120", bad("six"), out=tmp_path / "out")
 
 

@@ -21,7 +21,7 @@ from truearm.identification.choosing.selection import select
 from truearm.identification.held import Held
 from truearm.identification.judging.gain import check_gain
 from truearm.identification.judging.held_places import check_held
-from truearm.identification.judging.judgement import PULLED, judge
+from truearm.identification.judging.judgement import DOUBTED, PULLED, judge
 from truearm.identification.judging.simulated_calibrations import refuse_too_many
 from truearm.identification.solving.bootstrap import LEAST_FITS
 from truearm.identification.solving.bounds import Bounds, read_bounds
@@ -415,7 +415,7 @@ def _beside_nominal(
         return [nothing_held_out()]
     if fit.model is FRAMES:  # the robot is the nominal one
         return []
-    doubted = fit.loss in PULLED and any(notice.at for notice in noticed)
+    doubted = fit.loss in PULLED and any(notice.code in DOUBTED for notice in noticed)
     nominal = place(fit.start, training, "cauchy", held) if doubted else placed
     return check_gain(errors_of(nominal, held_out), errors_of(fit.robot, held_out), held_out, doubted=doubted)
 

@@ -35,12 +35,14 @@ from truearm.measurement.statistics import Errors
 from truearm.notices import Notice, has_error
 from truearm.shown import counted
 
-#: Codes of wrong readings that pull a fit away, and losses that let them.
+#: Codes of wrong readings that pull a fit away.
 _PULLING: Final = frozenset({ORIENTATION_OUTLIERS, *ORIENTATION_SLIPS, "joints-mistaken", "unit-angle"})
 #: The same, and single readings that are far off: what is left is not the robot's.
 _DOUBTING: Final = _PULLING | {"outliers"}
 #: Readings under the name of another point. A fit that they pull must not be used, and their names can be put right.
 _MISNAMED: Final = frozenset({"targets-swapped", "target-mistaken"})
+#: Readings that pull a fit, whatever is wrong with them.
+DOUBTED: Final = _DOUBTING | _MISNAMED | {"joints-repeated"}
 #: Losses with which a fit is pulled.
 PULLED: Final = frozenset({"linear", "huber"})
 

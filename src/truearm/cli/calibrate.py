@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from truearm.cli.loading import GravityText, NoteTexts, PayloadText, read_gravity, read_notes
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
+
+if TYPE_CHECKING:
+    from truearm.results.calibration import Calibration
 
 
 def calibrate(
@@ -100,6 +103,12 @@ def calibrate(
         ),
     ] = None,
     notes: NoteTexts = None,
+    replace: Annotated[
+        bool,
+        typer.Option(
+            "--replace", help="Replace a sound result in DIR even by one that is worse than nominal, or otherwise bad."
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Identify the real robot from measurements and judge it on configurations it has not seen.
@@ -107,40 +116,51 @@ def calibrate(
     Writes calibrated.yaml, result.json, report.html and calibrated.urdf into DIR.
     """
     from truearm.jobs.calibrate import calibrate as run
+    from truearm.results.standing import ResultKeptError
 
-    with progress() as say:
-        calibration = run(
-            robot,
-            data,
-            out=out,
-            model=model,
-            train=read_train(train),
-            seed=seed,
-            loss=loss,  # type: ignore[arg-type]
-            redundancy=redundancy,  # type: ignore[arg-type]
-            bounds=bounds,
-            hold=[name.strip() for text in hold or () for name in text.split(",")],
-            frames=frames,
-            bootstrap=bootstrap,
-            effects=effects or (),
-            payload=payload,
-            gravity=read_gravity(gravity),
-            base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
-            without=[name.strip() for text in without or () for name in text.split(",")],
-            exclude=exclude,
-            monte_carlo=monte_carlo,
-            zones=_number_or(zones),
-            notes=read_notes(notes),
-            command=command_line(),
-            progress=say,
-        )
+    try:
+        with progress() as say:
+            calibration = run(
+                robot,
+                data,
+                out=out,
+                model=model,
+                train=read_train(train),
+                seed=seed,
+                loss=loss,  # type: ignore[arg-type]
+                redundancy=redundancy,  # type: ignore[arg-type]
+                bounds=bounds,
+                hold=[name.strip() for text in hold or () for name in text.split(",")],
+                frames=frames,
+                bootstrap=bootstrap,
+                effects=effects or (),
+                payload=payload,
+                gravity=read_gravity(gravity),
+                base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
+                without=[name.strip() for text in without or () for name in text.split(",")],
+                exclude=exclude,
+                monte_carlo=monte_carlo,
+                zones=_number_or(zones),
+                notes=read_notes(notes),
+                replace=replace,
+                command=command_line(),
+                progress=say,
+            )
+    except ResultKeptError as kept:
+        _print(kept.calibration, json=json)
+        raise
+    _print(calibration, json=json)
+    if not json:
+        print_line(f"Written to {out}: {', '.join(calibration.files)}")
+    if not calibration.finished:
+        raise typer.Exit(3)
+
+
+def _print(calibration: Calibration, *, json: bool) -> None:
     if json:
         print_json(calibration.summary())
     else:
         print_record(calibration)
-        print_line(f"Written to {out}: {', '.join(calibration.files)}")
-    if not calibration.finished:
-        raise typer.Exit(3)
 
 
 def _number_or(text: str | None) -> Any:

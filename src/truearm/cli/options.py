@@ -19,7 +19,7 @@ C = TypeVar("C", bound=Callable[..., Any])
 _running: ContextVar[typer.Context | None] = ContextVar("_running", default=None)
 
 #: Parameters that say where results go or how they are printed: running again elsewhere is the same run.
-_OUTPUT = ("out", "json", "token")
+_OUTPUT = ("out", "replace", "json", "token")
 
 
 class CommandError(Exception):

@@ -18,12 +18,14 @@ from truearm.identification.choosing.candidates import compared_with
 from truearm.identification.choosing.choice import AUTO
 from truearm.identification.choosing.chosen_fit import check_choice, check_part, identify_chosen
 from truearm.identification.choosing.selection import select
+from truearm.identification.held import Held
+from truearm.identification.judging.gain import check_gain
 from truearm.identification.judging.held_places import check_held
-from truearm.identification.judging.judgement import judge
+from truearm.identification.judging.judgement import DOUBTED, PULLED, judge
 from truearm.identification.judging.simulated_calibrations import refuse_too_many
 from truearm.identification.solving.bootstrap import LEAST_FITS
 from truearm.identification.solving.bounds import Bounds, read_bounds
-from truearm.identification.solving.fit import identify, place
+from truearm.identification.solving.fit import Fit, identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
 from truearm.identification.solving.models import FRAMES, MODELS, Model, named_model
 from truearm.identification.solving.rounds import Redundant
@@ -33,6 +35,7 @@ from truearm.jobs.arguments import (
     command_argument,
     count_argument,
     files_of,
+    flag_argument,
     folder_for,
     gravity_argument,
     names_argument,
@@ -52,10 +55,10 @@ from truearm.jobs.holding import held_argument
 from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
 from truearm.jobs.split import (
     check_copies,
-    check_proof,
     check_split,
     check_trained_before,
     left_out,
+    nothing_held_out,
     train_count,
     without_words,
 )
@@ -106,6 +109,7 @@ def calibrate(
     monte_carlo: int | None = None,
     zones: int | str | Path | None = None,
     notes: Mapping[str, str] | None = None,
+    replace: bool = False,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
@@ -171,6 +175,9 @@ def calibrate(
     notes
         What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
         ``instrument``, or any other.
+    replace
+        Whether a sound result in `out` is replaced by one that is not: by one that is worse than the nominal robot or
+        has no gain over it, or that ended in another bad status or with an error.
     command
         How to run it again, for the report; None writes the call in Python.
     progress
@@ -179,7 +186,8 @@ def calibrate(
     Raises
     ------
     InputError
-        For anything that cannot be used, with a message that says what to do.
+        For anything that cannot be used, with a message that says what to do. Where a sound result stays, it is a
+        :class:`truearm.results.standing.ResultKeptError`, which has the new one as its attribute ``calibration``.
     """
     progress_argument(progress)
     named = choice_argument(model, "model", _MODELS)
@@ -193,7 +201,7 @@ def calibrate(
         )
     base_changes = names_argument(base_changes, "base_changes")
     without = names_argument(without, "without")
-    notes = notes_argument(notes)
+    notes, replace = notes_argument(notes), flag_argument(replace, "replace")
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
@@ -326,7 +334,7 @@ def calibrate(
     train_errors = errors_of(fit.robot, first)
     of_split = (
         *contradicted,
-        *check_proof(before, validation),
+        *_beside_nominal(placed, fit, first, second, noticed, held),
         *check_excluded(
             excluded, fit.robot, None if base_changes else left_out(as_read, without), held_out, validation
         ),
@@ -385,8 +393,31 @@ def calibrate(
         zones=chosen_zones,
     )
     if folder is not None:
-        calibration.save(folder, progress)
+        calibration.save(folder, progress, replace=replace)
     return calibration
+
+
+def _beside_nominal(
+    placed: Robot, fit: Fit, training: Dataset, held_out: Dataset | None, noticed: Sequence[Notice], held: Held
+) -> list[Notice]:
+    """Say what the held-out part tells of the calibrated robot beside the nominal one.
+
+    Where single readings are doubted, they pull base and targets of the nominal robot too, unless the loss is robust.
+
+    Parameters
+    ----------
+    placed
+        The nominal robot, base and targets found as the fit finds them.
+    noticed
+        What was said of the data.
+    """
+    if held_out is None:
+        return [nothing_held_out()]
+    if fit.model is FRAMES:  # the robot is the nominal one
+        return []
+    doubted = fit.loss in PULLED and any(notice.code in DOUBTED for notice in noticed)
+    nominal = place(fit.start, training, "cauchy", held) if doubted else placed
+    return check_gain(errors_of(nominal, held_out), errors_of(fit.robot, held_out), held_out, doubted=doubted)
 
 
 def _fits_argument(bootstrap: object) -> int:

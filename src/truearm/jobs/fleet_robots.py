@@ -87,7 +87,9 @@ def calibrated_robot(entry: RobotEntry, folder: Path | None = None) -> Done:
         return Done(row, changed=changed is not None)
     written = []
     if folder is not None:  # a folder that cannot be written to is no fault of the robot
-        written = [path.relative_to(folder).as_posix() for path in made.save(folder / ROBOTS / entry.name)]
+        written = [
+            path.relative_to(folder).as_posix() for path in made.save(folder / ROBOTS / entry.name, replace=True)
+        ]
     return Done(found, tuple(written))
 
 

@@ -19,6 +19,7 @@ from truearm.identification.choosing.zones import ZoneVerdict
 from truearm.identification.judging.error_budget import ErrorBudget, error_budget
 from truearm.identification.judging.expected_error import ExpectedError, expected_error
 from truearm.identification.judging.found_curves import FoundCurve, found_curves
+from truearm.identification.judging.gain import NO_GAIN
 from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.repeatability import Repeatability, repeatability
 from truearm.identification.judging.simulated_calibrations import SimulatedCalibrations
@@ -37,6 +38,7 @@ from truearm.results.excluded import Excluded, excluded_line
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.simulated import simulated_lines, simulated_summary
+from truearm.results.standing import SOUND, ResultKeptError, sound_result
 from truearm.results.summaries import (
     error_line,
     errors_summary,
@@ -161,7 +163,14 @@ class Calibration(Record):
     @property
     def finished(self) -> bool:
         """Whether its figures can be believed: it converged or has a value at a bound, and no notice is an error."""
-        return self.status in (Status.CONVERGED, Status.AT_BOUND) and not has_error(self.warnings)
+        return self.status.value in SOUND and not has_error(self.warnings)
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What keeps it from replacing a sound result: a bad status, errors and ``no-gain``, by their codes."""
+        told = [self.status.value] if self.status.value not in SOUND else []
+        told += [notice.code for notice in self.warnings if notice.level == "error" or notice.code == NO_GAIN]
+        return tuple(dict.fromkeys(told))
 
     @property
     def advice(self) -> str:
@@ -327,22 +336,38 @@ class Calibration(Record):
         line = f"{self.history}, zone {verdict.box.name}"
         return sealed(replace(fit.robot, history=(*fit.robot.history, line), tools={}, truths={}), proof)
 
-    def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
+    def save(
+        self, folder: str | Path, progress: Callable[[str], None] = lambda _: None, *, replace: bool = False
+    ) -> tuple[Path, ...]:
         """Write ``calibrated.yaml``, ``result.json``, ``report.html`` and ``calibrated.urdf`` into a folder.
 
         Zones that are kept add ``zones.yaml`` and ``zone-NAME.yaml`` of each.
 
         An earlier result stays until the new files are complete on disk; only then are they put in its place.
 
+        Parameters
+        ----------
+        replace
+            Whether a sound result in the folder is replaced by this one even if this one has :attr:`faults`.
+
         Returns
         -------
         The files written.
+
+        Raises
+        ------
+        InputError
+            If they cannot be written there; a :class:`truearm.results.standing.ResultKeptError` if a sound result would
+            be lost.
         """
         from truearm.modeling.formats.urdf import calibrated_urdf
         from truearm.modeling.formats.urdf_writing import urdf_text
         from truearm.reporting.report import report_html
 
         folder = output_folder(folder, self.files, self.inputs, ours=True)
+        standing = sound_result(folder) if self.faults and not replace else None
+        if standing is not None:
+            raise ResultKeptError(self, standing, folder)
         progress("drawing the report")
         urdf = calibrated_urdf(self.urdf, self.robot)[0] if self.urdf else urdf_text(self.robot)[0]
         files: dict[str, str | bytes] = {

@@ -17,10 +17,10 @@ from truearm.modeling.postures import Postures
 from truearm.modeling.proof import HELD, Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+from truearm.results.standing import SOUND
 
 #: A note of the calibration that concerns every program: its controller may not have the nominal values of the file.
 _REPEATED: Final = "far-from-nominal"
-_SOUND: Final = (Status.CONVERGED.value, Status.AT_BOUND.value)
 
 
 def proof_of(
@@ -63,7 +63,7 @@ def proof_of(
         arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
         kept = [i for i, name in enumerate(before.names) if name in arm and name not in names]
         if kept or not any(name in arm for name in names):
-            ended = before.status if ended in _SOUND else ended
+            ended = before.status if ended in SOUND else ended
             errors += [error for error in before.errors if error.code not in [e.code for e in errors]]
             repeated += [warning for warning in before.warnings if not repeated]
             parameters += [arm[before.names[i]] for i in kept]

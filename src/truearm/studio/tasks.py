@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from truearm.errors import InputError
 from truearm.files import confined_reads
 from truearm.notices import Notice
 from truearm.studio.corrected import CellPart
@@ -20,6 +21,8 @@ from truearm.studio.corrected import CellPart
 Progress = Callable[[str], None]
 #: Options of `compensate` that have other names than the parameters.
 _PLACES: Final = {"tools": "tool", "frames": "frame"}
+#: What to do where a sound result stays, as the page Calibrate has it.
+_KEPT: Final = "To replace the sound result all the same, tick 'Replace a sound result' and calibrate again."
 
 
 @dataclass(frozen=True)
@@ -36,29 +39,42 @@ class Outcome:
         What it wrote, by their names in the project.
     finished
         Whether its figures can be believed.
+    refused
+        Why nothing was written although there is a result; None where it was.
     """
 
     lines: tuple[str, ...]
     notices: tuple[Notice, ...] = ()
     files: tuple[str, ...] = ()
     finished: bool = True
+    refused: InputError | None = None
 
 
-def calibrate(folder: Path, robot: str, data: str, out: str, progress: Progress, **options: Any) -> Outcome:
+def calibrate(
+    folder: Path, robot: str, data: str, out: str, progress: Progress, *, replace: bool = False, **options: Any
+) -> Outcome:
     """Calibrate and write the result: :func:`truearm.calibrate`.
 
     Parameters
     ----------
+    replace
+        Whether a sound result is replaced by one that is not; it is no part of the command that the report shows.
     options
         Of the job, by its names of parameters; None where nothing is said.
     """
     from truearm.jobs.calibrate import calibrate as job
+    from truearm.results.standing import ResultKeptError
 
     os.chdir(folder)
     given = {name: value for name, value in options.items() if value is not None}
     command = calibrate_command(robot, data, given)
     with confined_reads(folder):
-        found = job(robot, data, out=out, command=command, progress=progress, **given)
+        try:
+            found = job(robot, data, out=out, replace=replace, command=command, progress=progress, **given)
+        except ResultKeptError as kept:
+            found = kept.calibration
+            refused = InputError(kept.what, where=out, came=kept.came, cure=_KEPT)
+            return Outcome(tuple(found.lines()), found.warnings, finished=False, refused=refused)
     return Outcome(tuple(found.lines()), found.warnings, found.files, found.finished)
 
 

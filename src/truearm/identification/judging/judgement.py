@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from truearm.identification.judging.advice import check_fit
@@ -35,11 +35,16 @@ from truearm.measurement.statistics import Errors
 from truearm.notices import Notice, has_error
 from truearm.shown import counted
 
-#: Codes of wrong readings that pull a fit away, and losses that let them.
+#: Codes of wrong readings that pull a fit away.
 _PULLING: Final = frozenset({ORIENTATION_OUTLIERS, *ORIENTATION_SLIPS, "joints-mistaken", "unit-angle"})
 #: The same, and single readings that are far off: what is left is not the robot's.
 _DOUBTING: Final = _PULLING | {"outliers"}
-_PULLED: Final = frozenset({"linear", "huber"})
+#: Readings under the name of another point. A fit that they pull must not be used, and their names can be put right.
+_MISNAMED: Final = frozenset({"targets-swapped", "target-mistaken"})
+#: Readings that pull a fit, whatever is wrong with them.
+DOUBTED: Final = _DOUBTING | _MISNAMED | {"joints-repeated"}
+#: Losses with which a fit is pulled.
+PULLED: Final = frozenset({"linear", "huber"})
 
 
 @dataclass(frozen=True)
@@ -95,10 +100,14 @@ def judge(
     moved_then = what_moved(left_over, off)
     changes = [] if moved_then is None else notices_of_change(*moved_then)
     told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
-    noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
+    noticed = tuple(
+        replace(notice, level="error") if notice.code in _MISNAMED and loss in PULLED else notice
+        for notice in noticed
+        if notice.code != WRONG_ROBOT
+    )
     # A fit that these pull away leaves much and expects much, whatever the model and wherever was measured. Of its
     # lengths the robust fit of the check knows more.
-    bent = loss in _PULLED and any(notice.code in _PULLING for notice in noticed)
+    bent = loss in PULLED and any(notice.code in _PULLING for notice in noticed)
     wrong_robot = check_robot(fit, training) if judges_lengths(fit) and not bent else told
     if has_error([*noticed, *changes]):  # what is wrong with the data bends the robot too
         wrong_robot = []

@@ -18,6 +18,7 @@ from truearm.identification.judging.changes import LEAST_ARRIVALS, Change, find_
 from truearm.identification.judging.curve_range import about_curves, has_curves
 from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.judging.few_readings import CURE, FEW_READINGS
+from truearm.identification.judging.gain import NO_GAIN, WORSE
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import (
     expected_where_measured,
@@ -64,7 +65,7 @@ _NAMED: Final = 3
 _OWN_STEP: Final = frozenset(
     {
         *("instrument-moved", "target-moved", "joint-zero-jumped"),
-        *("narrow-data", "rank-loss", "not-converged", FEW_READINGS),
+        *("narrow-data", "rank-loss", "not-converged", FEW_READINGS, WORSE),
     }
 )
 #: Warnings whose cure comes before more configurations.
@@ -84,13 +85,14 @@ _CURED_FIRST: Final = (
     "sigma-too-large",
     "transmission-error",
     "large-remainder",
-    "not-better",
+    WORSE,
+    NO_GAIN,
 )
 #: Those that any other step may explain.
-_EXPLAINED: Final = frozenset({"not-better", "large-remainder"})
+_EXPLAINED: Final = frozenset({WORSE, NO_GAIN, "large-remainder"})
 #: Those that configurations which are off explain.
 _OF_CONFIGURATIONS: Final = frozenset(
-    {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", "not-better"}
+    {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", WORSE, NO_GAIN}
 )
 
 

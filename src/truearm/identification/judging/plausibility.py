@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.judging.exchanged_names import exchanged_names
 from truearm.identification.judging.far_off import allowed_off, far_off, often_off
 from truearm.identification.judging.few_readings import check_few_to_doubt
 from truearm.identification.judging.implausible import check_plausible
@@ -108,8 +109,9 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
             return Comparison([*(other_robot(robot, data) or slips), *found])
     wrong = check_robot(fit, data)
     unlike_robot = check_plausible(fit, data, wrong)
+    exchanged = exchanged_names(fit, data)
     if unlike_robot:
-        return Comparison([*unlike_robot, *wrong, *found])
+        return Comparison([*unlike_robot, *wrong, *found], exchanged)
     doubted = check_few_to_doubt(fit)
     suspects: list[Suspect] = []
     turned = np.zeros(len(off), dtype=bool)
@@ -117,6 +119,7 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
         turned = orientations_off(errors)
         alone = turned & ~(np.nan_to_num(off) > allowed_off(off))
         mistaken, suspects = far_off(fit, data, off, turned)
+        suspects += exchanged
         doubted = [*mistaken, *check_orientations(fit, data, errors, alone), *often_off(data, off)]
         turned = alone
     return Comparison(

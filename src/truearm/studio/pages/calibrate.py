@@ -44,6 +44,7 @@ class CalibratePage:
         self._train: Any = gui.add_text("Train on", "", hint="configurations, or all; empty for 70 %")
         self._seed: Any = gui.add_text("Seed", str(settings.seed), hint="of the split, a whole number from 0 on")
         self._loss = gui.add_dropdown("Loss", tuple(LOSSES))
+        self._replace: Any = gui.add_checkbox("Replace a sound result", False, hint="even by one that is not sound")
         self._run = gui.add_button("Calibrate")
         self._steps: list[FitStep] = []
         self._drawn = 0.0
@@ -88,7 +89,8 @@ class CalibratePage:
     def _calibrate(self) -> None:
         window, settings = self._window, self._window.project.settings
         self._steps, self._shown = [], (0, False)
-        asked = self._asked()
+        asked, replace = self._asked(), self._replace.value
+        self._replace.value = False
         window.start(
             "Calibrate",
             calibrate,
@@ -104,6 +106,7 @@ class CalibratePage:
             loss=None if settings.loss == "linear" else settings.loss,
             payload=settings.payload,
             exclude=settings.exclude,
+            replace=replace,
         )
 
     def _told(self, text: str) -> None:
@@ -123,7 +126,11 @@ class CalibratePage:
     def _done(self, outcome: Outcome, asked: tuple[object, ...]) -> None:
         self._draw()
         written = f"Written to {self._window.project.settings.result}: {', '.join(outcome.files)}"
+        if outcome.refused is not None:
+            written = "Not written."
         self._lines, self._made = words.lines([*outcome.lines, written]), asked
+        if outcome.refused is not None:
+            raise outcome.refused
 
 
 def _train(text: str) -> int | str | None:

@@ -1,7 +1,8 @@
 """Holds the error to expect over the workspace against the true one of simulated robots.
 
 An IRB 120 is measured within a few degrees of one posture, calibrated, and judged at 300 configurations of its full
-range. Others are measured over their full range, with joints that repeat to so many degrees. Arguments: robots for each
+range. Others are measured over their full range, with joints that repeat to so many degrees, or by devices that do not
+locate the robot: then the true error is that behind the best rigid motion. Arguments: robots for each
 case (40, three times as many where the truth is drawn from the priors as they are) and full-range campaigns (100).
 Writes benchmarks/expected_error.json.
 """
@@ -11,12 +12,14 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from truearm.errors import InputError
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.narrow_data import check_narrow_data
 from truearm.identification.solving.fit import Status, identify
@@ -25,6 +28,8 @@ from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rigid_motion
+from truearm.simulation.devices import in_view_of, measured_with, named_device, seen_by
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 
@@ -35,6 +40,17 @@ REPEATABILITIES = (0.005, 0.02)
 POSES, NOISE, JUDGED = 60, 0.02e-3, 300
 #: Configurations of a campaign of few, with repeatability.
 FEW = 14
+#: Devices, with configurations of their campaigns.
+LOOPS = (
+    ("point", 60),
+    ("point", 100),
+    ("point", 300),
+    ("plane", 60),
+    ("two-sockets", 60),
+    ("two-sockets", 100),
+    ("ballbar", 60),
+    ("strings", 60),
+)
 GEOMETRIC = named_model("geometric")
 nominal = load_robot("irb120")
 
@@ -97,6 +113,48 @@ def judged(
     return [*(1e3 * length for length in (true, of.mean, *of.interval_90, known)), noticed, converged]
 
 
+def in_a_loop(rng: np.random.Generator, device: str, scale: float, poses: int) -> list[float]:
+    """Calibrate one robot by a device on all its readings; return true, expected, lowest and highest error [mm]."""
+    drawn = [p for p in nominal.parameters.values() if p.group in ("geometry", "joint zero")]
+    twin = truth_twin(nominal.with_parameters(replace(p, prior=scale * p.prior) for p in drawn), "random", rng)
+    instrument = named_device(device)
+    twin = replace(twin, robot=in_view_of(instrument, twin.robot))
+    data = measured_with(instrument, nominal, twin, poses, rng)
+    fit = identify(nominal, data, GEOMETRIC)
+    of = expected_error(as_residuals_allow(fit, data)).overall
+    q = nominal.random_configurations(JUDGED, rng)
+    frames = seen_by(instrument, nominal, twin)[0].frames(q)
+    found = np.concatenate([fit.robot.world_poses(q, t.name)[0] for t in fit.robot.targets])
+    there = np.concatenate([frames[t.name][:, :3, 3] for t in fit.robot.targets])
+    if fit.gauge_freedoms:
+        R, t = rigid_motion(found, there)
+        found = found @ R.T + t
+    true = float(np.linalg.norm(found - there, axis=1).mean())
+    return [1e3 * length for length in (true, of.mean, *of.interval_90)]
+
+
+def loops(robots: int) -> Iterator[dict[str, Any]]:
+    """Go through devices and scales, with new robots for each."""
+    for k, (scale, (device, poses)) in enumerate((s, loop) for s in SCALES[:2] for loop in LOOPS):
+        rows = []
+        for seed in range(3 * robots):
+            with suppress(InputError):  # few of the robots are not jogged to all places
+                rows.append(in_a_loop(np.random.default_rng((200 + k, seed)), device, scale, poses))
+        true, mean, low, high = np.array(rows).T
+        yield {
+            "device": device,
+            "poses": poses,
+            "scale": scale,
+            "robots": len(rows),
+            "inside": float(np.mean((low <= true) & (true <= high))),
+            "below_the_end": float(np.mean(true <= high)),
+            "ratio_median": float(np.median(true / mean)),
+            "ratio_most": float(np.max(true / mean)),
+            "true_mm": float(np.median(true)),
+            "expected_mm": float(np.median(mean)),
+        }
+
+
 def cases(robots: int) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
     """Go through scales, targets and widths, with new robots for each."""
     for k, (scale, targets, width) in enumerate((s, t, w) for s in SCALES for t in (1, 3) for w in WIDTHS):
@@ -142,6 +200,10 @@ def main() -> None:
     for case, rows in cases(robots):
         record["cases"].append({**case, **figures(rows)})
         print(json.dumps(record["cases"][-1]), flush=True)  # noqa: T201
+    record["closed_loops"] = []
+    for loop in loops(robots):
+        record["closed_loops"].append(loop)
+        print(json.dumps(loop), flush=True)  # noqa: T201
     full = [judged(np.random.default_rng((99, seed)), None, 3 if seed % 2 else 1, 1.0) for seed in range(campaigns)]
     record["full_range"] = {"campaigns": campaigns, **figures(np.array(full))}
     print(json.dumps(record["full_range"]))  # noqa: T201

@@ -69,14 +69,18 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
             )
         )
     if fit.gauge_freedoms:
-        words, unknown = "No reading locates the robot, so its base frame is the world frame.", "base pose"
-        if "size" in fit.gauge_freedoms:
-            words += " No length was measured either, so the scale of the result is that of the nominal lengths."
-            unknown += " and scale"
-        words += (
-            " The held-out error is one of readings. Predicted positions are accurate to about "
-            f"{expected.overall.mean * 1e3:.2g} mm on average, up to the unknown {unknown}."
+        words = (
+            "No reading locates the robot, so its base frame is the world frame. The held-out error is one of "
+            f"readings. Predicted positions are accurate to about {expected.overall.mean * 1e3:.2g} mm on average, up "
+            "to the unknown base pose."
         )
+        if "size" in fit.gauge_freedoms:
+            words += (
+                " No length was measured either, so the scale of the result is that of the nominal lengths, as "
+                "uncertain as their priors say. Without errors of the scale it would be "
+                f"{expected.without_scale.mean * 1e3:.2g} mm. One known length determines the scale: the distance of "
+                "two points, or a ballbar."
+            )
         if fit.unobservable_combinations:
             held = "; ".join(fit.unobservable_combinations)
             words += f" Unobservable combinations of parameters, held at nominal values: {held}."

@@ -6,6 +6,9 @@ the parameters are drawn from it, and each draw moves the targets at configurati
 limits. A real robot is one such draw. A few directions dominate where the data are narrow, so the mean error over the
 workspace is itself uncertain: the interval is that of the draws' means (a predictive interval, Gelman et al. 2013,
 section 1.3), not one of an average over robots.
+
+Where no reading locates the robot, its base pose does not count: whoever uses the robot locates it. Its scale does
+count. Nobody sets it right afterwards, so where no length was measured it is as uncertain as the nominal lengths.
 """
 
 from __future__ import annotations
@@ -44,6 +47,8 @@ _REMAINDER: Final = 0.1
 _LEAST_LEFT: Final = 0.1
 #: Configurations of a map, however many targets there are.
 _LEAST_MAPPED: Final = 20
+#: Motions of everything that never count where no reading locates the robot.
+_BASE: Final = ("base",)
 #: So that the variance of what is drawn exists.
 _LEAST_FREEDOM: Final = 3.0
 _INTERVAL: Final = (5.0, 95.0)
@@ -76,6 +81,8 @@ class ExpectedError:
     ----------
     overall
         Of all targets together.
+    without_scale
+        The same without errors of the scale, where no length was measured: what more configurations can lower.
     targets
         Of each, by its name.
     joint_error
@@ -85,18 +92,19 @@ class ExpectedError:
         Root mean square of what that does to the targets.
     payload
         What the robot carries there.
-    gauge_freedoms
-        Motions of everything that do not count: see :attr:`truearm.identification.solving.fit.Fit.gauge_freedoms`.
+    located
+        Whether a reading locates the robot; otherwise its base pose does not count.
     omissions
         What the figures cannot contain, in words; they are lower bounds if there is any.
     """
 
     overall: Expectation
+    without_scale: Expectation
     targets: dict[str, Expectation]
     joint_error: Array
     remainder: float
     payload: Payload
-    gauge_freedoms: tuple[str, ...]
+    located: bool
     omissions: tuple[str, ...]
 
     @property
@@ -107,9 +115,7 @@ class ExpectedError:
     @property
     def frame(self) -> str:
         """What the positions are in, in words."""
-        if not self.gauge_freedoms:
-            return "the instrument's frame"
-        return f"the robot's base frame, up to its pose{' and scale' if 'size' in self.gauge_freedoms else ''}"
+        return "the instrument's frame" if self.located else "the robot's base frame, up to its pose"
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +130,14 @@ class PositionErrors:
         How many.
     seed
         Of the draws.
+    scale_counts
+        Whether errors of the scale count where no length was measured.
     """
 
     fit: Fit
     draws: int
     seed: int = 0
+    scale_counts: bool = True
 
     @cached_property
     def _errors(self) -> dict[str, Array]:
@@ -197,7 +206,7 @@ class PositionErrors:
         shared = None if normal is None else normal * fit.joint_error * self._joint_scale[:, None]
         moves: Iterable[Array] = _moves(fit, at, self._errors, shared, exact=self._bent)
         if fit.gauge_freedoms:
-            moves = _without_gauge(fit, at, np.stack([*moves]))
+            moves = _without(_BASE if self.scale_counts else fit.gauge_freedoms, fit, at, np.stack([*moves]))
         return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
 
 
@@ -216,7 +225,7 @@ def moved_lengths(fit: Fit, joints: Array, errors: Mapping[str, Array]) -> Array
     at = fit.robot.loaded(joints)
     moves: Iterable[Array] = _moves(fit, at, errors, exact=True)
     if fit.gauge_freedoms:
-        moves = _without_gauge(fit, at, np.stack([*moves]))
+        moves = _without(_BASE, fit, at, np.stack([*moves]))
     return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
 
 
@@ -243,15 +252,18 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True, doubted: 
     draws = min(many, max(few, _LENGTHS // (count * max(len(robot.targets), 1))))
     joints = _all_over(robot, count, np.random.default_rng(seed))
     lengths = PositionErrors(fit, draws, seed).at(joints)
-    overall = _expectation(lengths.reshape(draws, -1))
+    overall = without_scale = _expectation(lengths.reshape(draws, -1))
+    if "size" in fit.gauge_freedoms:
+        without_scale = _expectation(PositionErrors(fit, draws, seed, scale_counts=False).at(joints).reshape(draws, -1))
     remainder = _remainder(fit, joints)
     return ExpectedError(
         overall=overall,
+        without_scale=without_scale,
         targets={t.name: _expectation(lengths[:, k]) for k, t in enumerate(robot.targets)},
         joint_error=fit.joint_error,
         remainder=remainder,
         payload=robot.payload,
-        gauge_freedoms=fit.gauge_freedoms,
+        located=not fit.gauge_freedoms,
         omissions=tuple(_omissions(fit, remainder, overall, plausible=plausible, doubted=doubted)),
     )
 
@@ -445,10 +457,10 @@ def _by_joints(fit: Fit, kinematics: ForwardKinematics) -> Array:
     return kinematics.position_jacobian(fit.robot.moving[: len(fit.robot.joints)])
 
 
-def _without_gauge(fit: Fit, at: Postures, moves: Array) -> Array:
-    """Remove from moves ``(targets, draws, 3, n)`` what a motion of everything explains, one for all targets."""
-    motions = [gauge_motions(fit.gauge_freedoms, fit.robot, kinematics)[0] for kinematics in _to_targets(fit, at)]
-    Q = np.linalg.qr(np.concatenate(motions))[0]
+def _without(motions: tuple[str, ...], fit: Fit, at: Postures, moves: Array) -> Array:
+    """Remove from moves ``(targets, draws, 3, n)`` what motions of everything explain, one for all targets."""
+    columns = [gauge_motions(motions, fit.robot, kinematics)[0] for kinematics in _to_targets(fit, at)]
+    Q = np.linalg.qr(np.concatenate(columns))[0]
     targets, draws = moves.shape[:2]
     flat = np.swapaxes(moves, 0, 1).reshape(draws, -1)
     left = flat - (flat @ Q) @ Q.T

@@ -1,7 +1,8 @@
 """Notice a workspace that is known much worse than the held-out error says.
 
 Held-out configurations are like those that were measured. Where the joints moved little, the error there stays small
-and says nothing about the rest of the workspace: the expected error does. A model that takes the geometry as exact does
+and says nothing about the rest of the workspace: the expected error does. The scale is left out of it where no length
+was measured: it is as uncertain wherever the joints move. A model that takes the geometry as exact does
 not expect any error of it: there the geometry is fitted as well, and the robot found is judged by that one.
 """
 
@@ -68,13 +69,13 @@ def check_narrow_data_without_geometry(
     wider = identify(nominal, measured, model, loss=loss, held=fit.held)
     expected = expected_error(as_residuals_allow(wider, measured))
     apart = _apart(fit, wider)
-    low, high = expected.overall.interval_90
-    overall = replace(
-        expected.overall,
-        mean=math.hypot(expected.overall.mean, apart),
+    low, high = expected.without_scale.interval_90
+    both = replace(
+        expected.without_scale,
+        mean=math.hypot(expected.without_scale.mean, apart),
         interval_90=(max(low, apart - high), apart + high),
     )
-    found = check_narrow_data(wider, replace(expected, overall=overall), measured, judged, held_out=held_out)
+    found = check_narrow_data(wider, replace(expected, without_scale=both), measured, judged, held_out=held_out)
     more = f" The {fit.model.name} model takes the geometry as exact; here it is as uncertain as its priors."
     return [replace(notice, message=notice.message + more) for notice in found]
 
@@ -105,8 +106,7 @@ def check_narrow_data(
     known = of_readings.mean
     if not held_out:  # the parameters have taken their part of these
         known *= math.sqrt(fit.numbers / max(fit.numbers - fit.spent, 1.0))
-    low, high = expected.overall.interval_90
-    mean = expected.overall.mean
+    mean, (low, high) = expected.without_scale.mean, expected.without_scale.interval_90
     if (judged.position is None or fit.gauge_freedoms) and mean > _NEGLIGIBLE:
         # Such readings see positions badly wherever the arm is, and a length is one coordinate of three.
         known = max(known if judged.position else _OF_ONE * known, expected_where_measured(fit, measured))
@@ -117,7 +117,8 @@ def check_narrow_data(
         return []
     part = "held-out" if held_out else "training"
     words = (
-        f"Over the workspace the targets are expected to be off by {_mm(mean)} mm on average (90 %: {_mm(low)} to "
+        f"Over the workspace the targets are expected to be off by {_mm(mean)} mm on average"
+        f"{', errors of the scale left out' * ('size' in fit.gauge_freedoms)} (90 %: {_mm(low)} to "
         f"{_mm(high)}), where the {part} {'error' if judged.position else 'error of lengths'} is "
         f"{_mm(of_readings.mean)} mm: that one says how good the robot is where it was measured, not elsewhere. "
     )
@@ -160,9 +161,9 @@ def _beyond_curves(fit: Fit, expected: ExpectedError, measured: Dataset, known: 
 
 
 def expected_where_measured(fit: Fit, measured: Dataset) -> float:
-    """Return the mean error to expect at the configurations of the training part [m]."""
+    """Return the mean error to expect at the configurations of the training part, without that of the scale [m]."""
     some = np.linspace(0, measured.configurations - 1, min(measured.configurations, _PLACES)).round().astype(np.intp)
-    return float(PositionErrors(fit, _DRAWS).at(measured.joints[some]).mean())
+    return float(PositionErrors(fit, _DRAWS, scale_counts=False).at(measured.joints[some]).mean())
 
 
 def joints_that_moved_little(fit: Fit, measured: Dataset) -> list[str]:

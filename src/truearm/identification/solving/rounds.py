@@ -21,7 +21,7 @@ from truearm.identification.solving.likelihood import Linearised
 from truearm.identification.solving.losses import Loss, norms_of, scale_of, weighed_together
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Evaluation, Problem, check_circumstances, check_solvable
-from truearm.identification.solving.redundancy import Redundancy, find_redundancies
+from truearm.identification.solving.redundancy import Redundancy, find_redundancies, gauge_freedoms
 from truearm.identification.solving.solver import SMALL, Solution, solve
 from truearm.identification.solving.variance_components import (
     Components,
@@ -54,6 +54,8 @@ DECLARED: Final = "declared"
 #: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
 _ROUNDS: Final = 6
 _SETTLED: Final = 0.02  # largest relative change of a deviation that changes nothing
+#: Information of the readings on a direction, by that of the priors, that is none.
+_UNSEEN: Final = 1e-3
 _LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
 
 
@@ -200,8 +202,35 @@ def find_parameters(
         dropped = tuple(r for r in dropped if r.dropped in out)
     if limits is not None and check_bounds is not None:
         limits = _limits_of(check_bounds, free, reduced.free)
+    if reduced.priors and "size" in gauge_freedoms(data, held):
+        solution = _not_shrunk(reduced, solution, limits)
     start = start.with_parameters(curves.priors_of(start))
     return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held, curves)
+
+
+def _not_shrunk(problem: Problem, solution: Solution, limits: tuple[Array, Array] | None) -> Solution:
+    """Return a solution with the size that the priors say, where no length was measured.
+
+    A robot that is smaller by a share makes all residuals smaller by that share. So such readings pull the size down by
+    the sum of their squares, the more the more there are, although they do not know it: the target was at the fixture,
+    and the joints were read. As a density of the joints a likelihood of n numbers is proportional to
+    ``size^n exp(-size^2 chi^2 / 2)``, which is largest where the residuals are as large as declared, and so broad, by
+    ``1 / sqrt(2 n)``, that the priors alone decide. They do along all directions of which the readings say nothing but
+    what is in proportion to the residuals.
+    """
+    prior, here = problem.free.prior, evaluated(problem, solution)
+    is_length = np.concatenate([np.full(b.rows, b.observation.unit == "m") for b in problem.blocks])
+    residual = np.where(is_length, here.residual, 0.0)
+    triangle = np.zeros((0, len(prior) + 1))
+    for rows, part in here.portions():
+        both = np.column_stack([part.jacobian * prior, residual[rows]])
+        triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, both]), mode="r"), dtype=np.float64)
+    A, r = triangle[:, :-1], triangle[:, -1]
+    _, s, Vt = np.linalg.svd(A - np.outer(r, r @ A) / max(float(r @ r), 1e-300), full_matrices=True)
+    unseen = Vt[int((s**2 > _UNSEEN).sum()) :]
+    vector = solution.vector - prior * (unseen.T @ (unseen @ ((solution.vector - problem.free.nominal) / prior)))
+    vector = vector if limits is None else np.clip(vector, *limits)
+    return replace(solution, vector=vector, at=problem.at(vector))
 
 
 def _begun_at(problem: Problem, near: Solved) -> Problem:

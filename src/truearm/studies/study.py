@@ -220,7 +220,7 @@ class Study(Record):
     def html(self) -> str:
         """Return the report as one HTML page."""
         figures = {picture.name: picture.figure for picture in self.pictures}
-        return page("study.html.jinja", figures, study=self, number=number, silent=SILENT)
+        return page("study.html.jinja", figures, self, study=self, number=number, silent=SILENT)
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write ``report.html``, ``study.json`` and the study's own files into a folder.

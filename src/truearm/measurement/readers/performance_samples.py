@@ -29,6 +29,8 @@ from truearm.measurement.readers.sample_times import refuse_out_of_order
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_from_quaternion
 from truearm.printable import is_one_line
+from truearm.simulated import COLUMN as SIMULATED
+from truearm.simulated import YES
 from truearm.units import LENGTH_UNITS, TIME_UNITS, as_number, checked_unit, from_si
 
 _POSITION: Final = ("x", "y", "z")
@@ -164,6 +166,7 @@ def _columns(headings: Sequence[str], header: str, place: Place) -> dict[str, tu
     }
     allowed = ", ".join(known.values())
     columns: dict[str, tuple[int, str]] = {}
+    known[SIMULATED] = SIMULATED
     for number, heading in enumerate(headings):
         where = f"{header}, column {number + 1}"
         match = _HEADING.fullmatch(heading)
@@ -394,6 +397,7 @@ def _samples(
         line=lines,
         source=header.source,
         resolution=_resolution(header, numbers),
+        simulated=YES in labels.get(SIMULATED, ()),
     )
 
 

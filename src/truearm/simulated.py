@@ -18,8 +18,8 @@ YES: Final = "yes"
 WORD: Final = "SIMULATED:"
 _WORDS: Final[Mapping[tuple[Marked, ...], str]] = {
     ("data",): "measurements of a virtual instrument, not of a robot.",
-    ("robot",): "the robot was calibrated with measurements of a virtual instrument.",
-    ("data", "robot"): "measurements and calibration come from a virtual instrument, not from a robot.",
+    ("robot",): "the robot's parameters come from measurements of a virtual instrument.",
+    ("data", "robot"): "measurements and the robot's parameters come from a virtual instrument, not from a robot.",
 }
 _LINES: Final = tuple(f"{WORD} {words}" for words in _WORDS.values())
 #: What programs for a robot that was calibrated so have as a comment; every language has room for it.

@@ -28,7 +28,10 @@ class Record(ABC):
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:
-        """What of it comes from a virtual instrument: ``data``, ``robot``, both or nothing."""
+        """What of it comes from a virtual instrument: ``data``, ``robot``, both or nothing.
+
+        A record that holds neither has a field ``simulated_from`` instead.
+        """
         return parts_of(getattr(self, one.name) for one in fields(self))  # type: ignore[arg-type]
 
     @abstractmethod

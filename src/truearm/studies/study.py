@@ -13,6 +13,7 @@ from typing import Any
 from truearm.reporting.drawing import Figure
 from truearm.reporting.page import page
 from truearm.results.record import Record
+from truearm.simulated import Marked
 from truearm.studies.verdicts import SILENT, VERDICTS, Claim, Comparison, Verdict
 from truearm.writing import output_folder, write_files
 
@@ -177,6 +178,11 @@ class Study(Record):
     notes: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``: every study repeats a published experiment on a twin."""
+        return ("data",)
 
     @property
     def rows(self) -> tuple[Row, ...]:

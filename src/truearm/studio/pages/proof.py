@@ -68,9 +68,8 @@ class ProofPage:
         result = _read_result(folder / "result.json")
         try:
             made, marks = made_with(result, self._window.calibrated()), said_of(result.get("simulated_parts", ()))
-            shown_figures = words.lines([*marks, f"Of {made.line()}.", f"Status: {result['status']}"]) + figures_table(
-                result
-            )
+            about = [*marks, f"Of {made.line()}.", f"Status: {result['status']}"]
+            shown_figures = words.lines(about) + figures_table(result)
             warnings = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
             now, told = words.notices(self._differing(result, made)), words.notices(warnings)
             told += words.lines(f"Next: {step['message']}" for step in result.get("next", ()))

@@ -180,6 +180,15 @@ def test_what_commands_write_of_simulated_measurements_has_the_mark(tmp_path: Pa
         assert {row["simulated"] for row in rows} == {"yes"}, name
 
 
+@pytest.mark.parametrize("device", ["two-spheres", "two-sockets", "ballbar", "drawn-circle"])
+def test_measurements_against_fixtures_have_the_mark_and_are_read_again(device: str, tmp_path: Path) -> None:
+    out = tmp_path / "data.csv"
+    made = truearm.simulate("irb120", truth="random", poses=4, device=device, seed=1, out=out)
+    assert told(made)
+    assert told(truearm.load_data(out))
+    assert csv_text(read_csv(out)) == out.read_text()
+
+
 # -- the file of measurements -------------------------------------------------------------------------------------
 
 

@@ -348,7 +348,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     writer.writerow(heading)
     writer.writerows(row for found in rows for row in found)
     for reading in range(0 if setup is None else len(setup.target)):
-        ends = [""] * (len(units) + (order is not None)), [""] * len(circumstances) + mark
+        ends = [""] * (len(units) + (order is not None)), [""] * (len(circumstances) + len(mark))
         row = ["", *ends[0], *reading_cells(setup, "fixture", reading), *ends[1]]  # type: ignore[arg-type]
         writer.writerow(row)
     return stream.getvalue()

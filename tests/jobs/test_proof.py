@@ -137,7 +137,7 @@ def test_an_unproven_robot_is_corrected_with_a_note(robot: Robot, program: Path)
     assert codes(done)["unproven"] == "note"
     assert done.summary()["programs"][0]["expected_mm"] is None
     assert done.applied()["proof"] is None
-    assert done.lines()[0] == "plate.mod  RAPID: the error to expect is not known"
+    assert done.lines()[1] == "plate.mod  RAPID: the error to expect is not known"
     with pytest.raises(InputError, match="not calibrated"):
         truearm.compensate("irb120", [program])
 
@@ -193,7 +193,7 @@ def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -
     (told,) = done.summary()["programs"]
     assert told["expected_mm"]["before"]["max"] == pytest.approx(1e3 * before.max())
     assert told["expected_mm"]["after"]["mean"] == pytest.approx(1e3 * now.mean())
-    assert f"error to expect {1e3 * before.mean():.3f} mm before, {1e3 * now.mean():.3f} mm now" in done.lines()[0]
+    assert f"error to expect {1e3 * before.mean():.3f} mm before, {1e3 * now.mean():.3f} mm now" in done.lines()[1]
     page = (tmp_path / "out" / "compensation.html").read_text()
     assert 'id="expected"' in page
     assert f'<td class="n">{1e3 * now.mean():.3f}</td>' in page

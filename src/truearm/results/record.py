@@ -61,7 +61,10 @@ def _marked_summary(summary: Callable[[Any], dict[str, Any]]) -> Callable[[Any],
     @wraps(summary)
     def marked(record: Record) -> dict[str, Any]:
         parts, content = record.simulated_from, summary(record)
-        return {"simulated": True, "simulated_parts": [*parts], **content} if parts else content
+        if not parts:
+            return content
+        schema = {name: content[name] for name in ("truearm",) if name in content}
+        return {**schema, "simulated": True, "simulated_parts": [*parts], **content}
 
     return marked
 

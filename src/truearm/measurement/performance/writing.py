@@ -65,16 +65,18 @@ def samples_text(read: Samples, place: str, *, conditions: bool = True) -> str:
         Whether there are columns of velocity and load.
     """
     mark = [SIMULATED] if read.simulated else []
-    heading = ["criterion", place, "cycle", *(_SHARES if conditions else ()), *mark, "time [s]", *_PLACE]
+    heading = ["criterion", place, "cycle", *(_SHARES if conditions else ()), "time [s]", *_PLACE]
     if read.rotation is not None:
         heading += _TURN
+    heading += mark
     return "\n".join([",".join(heading), *_sample_lines(read, conditions=conditions)]) + "\n"
 
 
 def _sample_lines(read: Samples, *, conditions: bool) -> Iterator[str]:
     """Give the rows in blocks of lines: what is the same in many rows is written into their format once."""
     oriented = read.rotation is not None
-    numbers = ",".join([_TIME, *[_LENGTH] * 3, *([_QUATERNION] * 4 if oriented else [])])
+    mark = [YES] if read.simulated else []
+    numbers = ",".join([_TIME, *[_LENGTH] * 3, *([_QUATERNION] * 4 if oriented else []), *mark])
     shares = np.stack([read.velocity, read.load], axis=1)
     keys = np.column_stack([read.criterion.code, read.place.code, read.cycle, shares])
     new = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
@@ -84,7 +86,6 @@ def _sample_lines(read: Samples, *, conditions: bool) -> Iterator[str]:
         words.append(str(int(read.cycle[first])))
         if conditions:
             words += [_percent(float(read.velocity[first])), _percent(float(read.load[first]))]
-        words += [YES] if read.simulated else []
         row = ",".join(words).replace("%", "%%") + "," + numbers
         for start in range(first, end, _BLOCK):
             rows = slice(start, min(start + _BLOCK, end))

@@ -308,8 +308,8 @@ def test_configurations_that_are_off_are_not_called_nothing_wrong() -> None:
     found = check("irb120", replace(data, joints=joints))
     assert not found.warnings
     assert found.next[0].code == "measure-again"
-    assert found.lines()[1] == "Nothing looks wrong but the configurations named next."
-    assert check("irb120", data).lines()[1] == "Nothing looks wrong."
+    assert found.lines()[2] == "Nothing looks wrong but the configurations named next."
+    assert check("irb120", data).lines()[2] == "Nothing looks wrong."
 
 
 def test_messages_count_in_words() -> None:

@@ -107,7 +107,7 @@ def test_a_robot_whose_result_ends_with_an_error_is_named(measured: Path, tmp_pa
     found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
     told = {notice.code: notice.message for notice in found.warnings}
     assert told["robots-in-error"].startswith("The result of 1 robot (one) should not be used")
-    assert ("no-result" in told, found.lines()[0]) == (
+    assert ("no-result" in told, found.lines()[1]) == (
         True,
         "1 robot: 0 usable, 1 whose result ends with an error, 0 not calibrated.",
     )
@@ -124,8 +124,8 @@ def test_what_cannot_be_used_is_told_first_and_figures_say_of_how_many_they_are(
     found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
     text = found.lines()
     said = "1 usable, 1 whose result ends with an error, 1 not calibrated."
-    assert text[0] == f"3 robots: {said}"
-    assert [line.partition(":")[0] for line in text[1:3]] == [
+    assert text[1] == f"3 robots: {said}"
+    assert [line.partition(":")[0] for line in text[2:4]] == [
         "Nominal robots, mean error of 1 robot",
         "Calibrated robots, mean error of 1 robot",
     ]

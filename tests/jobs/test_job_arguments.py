@@ -108,7 +108,7 @@ def test_a_program_is_restored_once(tmp_path: Path) -> None:
 
 def test_one_configuration_is_singular(tmp_path: Path) -> None:
     robot = EXAMPLES["validate"](tmp_path)["robot"]
-    assert truearm.validate(robot, DATA.of_configurations(np.array([0]))).lines()[0].startswith("On 1 configuration of")
+    assert truearm.validate(robot, DATA.of_configurations(np.array([0]))).lines()[1].startswith("On 1 configuration of")
 
 
 @pytest.mark.parametrize("wrong", [{"prior": -1.0}, {"prior": 10**400}, {"nominal": np.nan}])

@@ -132,7 +132,7 @@ def test_an_unproven_robot_is_corrected_with_a_note(robot: Robot, program: Path)
     assert codes(done)["unproven"] == "note"
     assert done.summary()["programs"][0]["expected_mm"] is None
     assert done.applied()["proof"] is None
-    assert done.lines()[0] == "plate.mod  RAPID: the error to expect is not known"
+    assert done.lines()[1] == "plate.mod  RAPID: the error to expect is not known"
     with pytest.raises(InputError, match="not calibrated"):
         compensate("irb120", [program])
 
@@ -188,7 +188,7 @@ def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -
     (told,) = done.summary()["programs"]
     assert told["expected_mm"]["before"]["max"] == pytest.approx(1e3 * before.max())
     assert told["expected_mm"]["after"]["mean"] == pytest.approx(1e3 * now.mean())
-    said = done.lines()[0]
+    said = done.lines()[1]
     assert f"RAPID: relative error to expect {1e3 * before.mean():.3f} mm before, {1e3 * now.mean():.3f} mm" in said
     assert f"largest expected, not a bound: {1e3 * before.max():.3f} and {1e3 * now.max():.3f} mm" in said
     assert "at most" not in said
@@ -218,8 +218,8 @@ def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
         low, high = done.summary()["programs"][0]["expected_mm"]["after"]["interval_90"]
         assert low > 0.0
         assert (high is None) is bound
-        assert (" mm or more now; " in done.lines()[0]) is bound
-        assert ("(90 %: " in done.lines()[0]) is not bound
+        assert (" mm or more now; " in done.lines()[1]) is bound
+        assert ("(90 %: " in done.lines()[1]) is not bound
 
 
 def test_errors_in_measured_frames_are_not_called_relative(robot: Robot, program: Path, tmp_path: Path) -> None:
@@ -228,7 +228,7 @@ def test_errors_in_measured_frames_are_not_called_relative(robot: Robot, program
         "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
         "frames:\n  wobjPlate: {of: base, translation: [310, -110, 60]}\n"
     )
-    assert "RAPID: error to expect" in compensate(robot, [program], frames=cell).lines()[0]
+    assert "RAPID: error to expect" in compensate(robot, [program], frames=cell).lines()[1]
 
 
 def test_nothing_is_promised_that_no_robot_repeats(robot: Robot, program: Path) -> None:
@@ -241,7 +241,7 @@ def test_nothing_is_promised_that_no_robot_repeats(robot: Robot, program: Path) 
         lower_bound=False,
     )
     done = compensate(sealed(robot, known), [program])
-    assert " mm before, 0.010 mm or more now (no robot repeats better); " in done.lines()[0]
+    assert " mm before, 0.010 mm or more now (no robot repeats better); " in done.lines()[1]
     after = done.summary()["programs"][0]["expected_mm"]["after"]
     assert (after["mean"], after["max"]) == pytest.approx((0.01, 0.01))
 

@@ -54,11 +54,12 @@ def test_a_truth_is_a_name_a_file_or_a_robot(tmp_path: Path) -> None:
     for other in said[1:]:
         assert np.array_equal(said[0].data.position, other.data.position)
     assert said[0].lines() == [
-        f"4 configurations of irb120 (nominal), 12 readings of 3 targets: {tmp_path / 'data.csv'}"
+        "SIMULATED: measurements of a virtual instrument, not of a robot.",
+        f"4 configurations of irb120 (nominal), 12 readings of 3 targets: {tmp_path / 'data.csv'}",
     ]
     assert truearm.load_data(tmp_path / "data.csv").configurations == 4
     one = truearm.simulate("irb120", truth="nominal", poses=1, device="ballbar")
-    assert one.lines()[0].startswith("1 configuration of irb120 (nominal), 1 reading of 1 target against cup_")
+    assert one.lines()[1].startswith("1 configuration of irb120 (nominal), 1 reading of 1 target against cup_")
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ def test_a_twin_comes_to_a_plan_as_the_robot_does_that_drives_its_ways(name: str
     arm = truearm.load_robot(name).with_effects(["approach"])
     truth = arm.with_values({one: 2e-3 for one in arm.parameters if one.startswith("approach_")})
     made = truearm.simulate(name, truth=truth, poses=table, noise=0.0, out=file)
-    assert made.lines()[1].startswith("Before each the arm stopped at its approach_i;")
+    assert made.lines()[2].startswith("Before each the arm stopped at its approach_i;")
     twin = truth_twin(planned.made.robot, truth, np.random.default_rng(0))
     stops = planned.tour.stops
     driven = measure(twin, np.array([stop.joints for stop in stops]), 0.0, np.random.default_rng(0))
@@ -106,7 +106,7 @@ def test_a_program_without_stops_before_has_a_plan_without_them(tmp_path: Path) 
     assert "approach" not in table.read_text()
     assert read_stops(table) is None
     made = truearm.simulate("irb120", truth="nominal", poses=table, noise=0.0)
-    assert (len(made.lines()), made.stopped_before) == (1, False)
+    assert (len(made.lines()), made.stopped_before) == (2, False)
     assert made.data.number is not None
     assert made.data.number.tolist() == list(range(10))
 

@@ -72,7 +72,7 @@ def test_every_row_is_counted_and_the_counts_are_printed() -> None:
     assert study.lines()[-1] == (
         "Verdicts: agrees 1, same order 0, not worse 0, by construction 0, undecided 0, differs 1."
     )
-    assert study.lines()[2] == "  agrees          near: 1, published 1.0 mm, within 0.1"
+    assert study.lines()[3] == "  agrees          near: 1, published 1.0 mm, within 0.1"
 
 
 @pytest.mark.parametrize(
@@ -89,6 +89,8 @@ def test_a_study_is_written_whole(tmp_path: Path) -> None:
     content = json.loads(files[1].read_text())
     assert list(content) == [
         "truearm",
+        "simulated",
+        "simulated_parts",
         "name",
         "title",
         "source",

@@ -66,6 +66,18 @@ def test_what_a_result_is_of_stands_on_the_page(window: Window) -> None:
     assert "other-" not in proof._now.content
 
 
+def test_a_result_of_simulated_measurements_says_so_before_its_figures(window: Window) -> None:
+    proof = proof_of(window)
+    assert proof._table.content.count("SIMULATED: measurements of a virtual instrument, not of a robot.") == 1
+    assert proof._table.content.index("SIMULATED:") < proof._table.content.index("Of irb120")
+    file = window.project.folder / "result" / "result.json"
+    text = file.read_text()
+    file.write_text(text.replace('"simulated_parts": [\n    "data"\n  ],', ""))
+    proof.refresh()
+    assert "SIMULATED" not in proof._table.content
+    file.write_text(text)
+
+
 def test_a_robot_that_is_gone_does_not_make_the_result_none(window: Window) -> None:
     file = window.project.folder / "truearm-studio.yaml"
     file.write_text(file.read_text().replace("robot: arm.yaml", "robot: gone.yaml"))

@@ -91,6 +91,7 @@ def path_program(path: CorrectedPath, robot: Robot, name: str, *, targets: Targe
         apart,
         path.calibrated,
         _beside(path, rows, straight=targets == "poses"),
+        robot.simulated,
     )
 
 

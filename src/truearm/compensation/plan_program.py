@@ -35,6 +35,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.inverse.kinematics import reach
 from truearm.modeling.robot import Robot
 from truearm.planning.driving.tour import Stop, Tour
+from truearm.simulated import IN_PROGRAMS
 from truearm.units import from_si
 
 #: Name of the program; every language takes it.
@@ -198,6 +199,7 @@ def _notes(robot: Robot, carried: Carried, driving: Driving, fastest: float, mar
         return "X {} Y {} Z {} mm".format(*point)
 
     return (
+        *((IN_PROGRAMS,) if robot.simulated else ()),
         "Measuring program of a plan",
         f"Robot {robot.name}",
         f"Plan {mark}",

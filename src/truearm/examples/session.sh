@@ -1,6 +1,6 @@
 #!/bin/sh
-# A whole session. my_robot.yaml is the nominal robot, measurements.csv what a tracker saw at 60 configurations,
-# check.csv what it saw at 15 others.
+# A whole session. my_robot.yaml is the nominal robot, measurements.csv what a virtual tracker reads of a simulated
+# robot at 60 configurations, check.csv what it reads at 15 others.
 set -e
 cd "$(dirname "$0")"
 truearm show my_robot.yaml

@@ -73,6 +73,7 @@ class _Row(TypedDict):
     errors: list[Name]
     drawn: NotRequired[bool]
     covariance: NotRequired[list[Number]]
+    simulated: NotRequired[bool]
 
 
 class _Said(TypedDict):

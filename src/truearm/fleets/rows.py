@@ -202,6 +202,8 @@ class Row:
         Whether priors drew the parameters towards nominal.
     covariance
         Of the parameters, in priors: the rows of the lower triangle one after the other; empty where it is not kept.
+    simulated
+        Whether its measurements are marked as those of a virtual instrument.
     """
 
     name: str
@@ -220,6 +222,7 @@ class Row:
     errors: tuple[str, ...] = ()
     drawn: bool = True
     covariance: tuple[float, ...] = ()
+    simulated: bool = False
 
     @property
     def machine(self) -> str:
@@ -245,6 +248,7 @@ class Row:
             "errors": [*self.errors],
             **({} if self.drawn else {"drawn": False}),
             **({"covariance": [*self.covariance]} if self.covariance else {}),
+            **({"simulated": True} if self.simulated else {}),
         }
 
     @classmethod
@@ -271,6 +275,7 @@ class Row:
             errors=tuple(content["errors"]),
             drawn=content.get("drawn", True),
             covariance=tuple(content.get("covariance", ())),
+            simulated=content.get("simulated", False),
         )
 
 

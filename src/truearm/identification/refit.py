@@ -99,7 +99,7 @@ def refit(robot: Robot, data: Dataset, moved: Moved) -> Refit:
         If the readings are too few to find it and to judge it.
     """
     data = _comparable(robot, data)
-    here = _referenced(robot)
+    here = _referenced(robot.marked(data.simulated))
     placed = _start(here, data, moved)
     noise = {observation.name: 1e-4 for observation in OBSERVATIONS}
     for _ in range(_NOISE_ROUNDS):

@@ -79,6 +79,7 @@ from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.notices import Notice
 from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
 from truearm.shown import counted
+from truearm.simulated import IN_PROGRAMS
 
 #: Targets that cannot be corrected, shown one by one in a refusal.
 _SHOWN: Final = 5
@@ -281,6 +282,7 @@ def compensate(
         )
     day = day_of(notes)
     comment = correction_comment(day, arm.name, hashes.get("robot", ""))
+    comment += (IN_PROGRAMS,) if arm.simulated else ()
     corrected = []
     for number, correction in enumerate(result.corrections):
         edits = _edits(correction, splits[number] if splits else None)

@@ -13,6 +13,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.distances import Distances
+from truearm.simulated import parts_of
 from truearm.validation.pair_distances import pair_distances
 
 
@@ -47,4 +48,4 @@ def distances(
     measured = readings.position[seen]
     with refusals_of("data"):
         found = pair_distances(measured + predicted[seen], measured, readings.configuration[seen])
-    return Distances(readings.source, readings.configurations, found)
+    return Distances(readings.source, readings.configurations, found, parts_of((arm, readings)))

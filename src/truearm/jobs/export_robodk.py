@@ -83,4 +83,6 @@ def export_robodk(
     text = robodk_csv(shown, points, rotations)
     if file is not None:
         write_new_text(file, text)
-    return ExportedMeasurements(text, readings.configurations, len(text.splitlines()) - 1, joints_are, file)
+    return ExportedMeasurements(
+        text, readings.configurations, len(text.splitlines()) - 1, joints_are, file, readings.simulated_from
+    )

@@ -132,6 +132,7 @@ def _row(entry: RobotEntry, made: Calibration, began: float) -> Row:
         errors=tuple(notice.code for notice in made.warnings if notice.level == "error"),
         drawn=entry.options.get("redundancy", "prior") == "prior",
         covariance=covariance,
+        simulated=bool(made.simulated_from),
     )
 
 

@@ -68,7 +68,7 @@ def hexapod_world_frame(
     stand = arm.base
     points = (position - np.array(stand.translation)) @ stand.rotation
     with refusals_of("touches"):
-        return HexapodFrame(world_frame(points, sides))
+        return HexapodFrame(world_frame(points, sides), loaded.simulated_from)
 
 
 def _touches_argument(touches: object, robot: Robot) -> Array:

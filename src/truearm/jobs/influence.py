@@ -49,6 +49,7 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.influence import INFLUENCE_FILES, Identified, InfluenceResult, Way
 from truearm.shown import counted, listed
+from truearm.simulated import parts_of
 
 Frames = Literal["placed", "robot"]
 #: What is too large to be an error of an angle or a length [rad, m].
@@ -197,6 +198,7 @@ def influence(
         tuple(notices),
         call,
         files_of(robot, data),
+        parts_of((given, measured)),
     )
     if folder is not None:
         progress("writing the files")

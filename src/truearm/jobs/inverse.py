@@ -133,7 +133,7 @@ def inverse(
     if file is not None:
         write_text(file, joints_csv(solutions, labels, arm.joints, counting(arm, joints_are)))
     told = (*told_of(arm), *check_force([(arm, solutions.joints[solutions.usable])]))
-    return JointTable(labels, solutions, (*told, *_other_frame(arm, frame, target)), joints_are)
+    return JointTable(labels, solutions, (*told, *_other_frame(arm, frame, target)), joints_are, arm.simulated_from)
 
 
 def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]:

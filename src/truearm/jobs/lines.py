@@ -28,6 +28,7 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
 from truearm.planning.poses.seven_lines import seven_lines, usable_joints
 from truearm.results.line_test import LineTest
+from truearm.simulated import parts_of
 from truearm.simulation.truths import truth_twin
 from truearm.validation.line_test import LineErrors, from_data, on_twin
 
@@ -98,6 +99,7 @@ def lines(
             commanded = usable_joints(fake_targets(errors, at_poses).solutions, poses.labels, "compensated line test")
     before: LineErrors | None = None
     after: LineErrors | None = None
+    measured: Dataset | None = None
     if truth is not None:
         rng = np.random.default_rng(seed)
         with refusals_of("truth"):
@@ -108,7 +110,8 @@ def lines(
         measured = readings_argument(nominal, data)
         with refusals_of("data"):
             before = from_data(poses, _placed(nominal, errors, measured), measured)
-    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are)
+    marks = parts_of((nominal, errors, measured)) if truth is None else ("data",)
+    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are, marks)
     if path is not None:
         found.save(path)
     return found

@@ -146,6 +146,7 @@ class OpenCampaign(Campaign):
             folder=self._folder,
             command=self._said.command,
             told=self.notices,
+            simulated=self.placed is not None,
         )
 
     def finish(self) -> Measured:

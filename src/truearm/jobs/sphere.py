@@ -31,6 +31,7 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
 from truearm.results.sphere_tests import OneSphere, SphereTests
+from truearm.simulated import parts_of
 from truearm.validation.sphere_test import SphereTest, sphere_test
 
 
@@ -117,6 +118,7 @@ def sphere(
         call,
         (*changed_since(robot), *told_of(arm)),
         files_of(robot, data),
+        parts_of((arm, measured)),
     )
     if page is not None:
         found.save(page)

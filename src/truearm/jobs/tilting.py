@@ -133,6 +133,7 @@ def tilting(
     read = _inclinations(start, inclinations)
     pairs = None if pushed is None else readings_argument(start, pushed, "pushed")
     measured = None if poses is None else readings_argument(start, poses, "poses")
+    start = start.marked(any(one is not None and one.simulated for one in (read, pairs)))
     if measured is None:
         if train is not None:
             raise InputError("there are no poses to split", parameter="train", cure="Give `poses`, or leave it out.")

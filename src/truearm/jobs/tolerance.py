@@ -59,11 +59,12 @@ def tolerance(
     if lean is None and position is None:
         with refusals_of("robot"):
             design(robot)  # refuses robots without joint errors
-        return UsedTolerances(robot.name, depths, joint_tolerances(robot, depths))
+        return UsedTolerances(robot.name, depths, joint_tolerances(robot, depths), robot.simulated_from)
     leans = lengths_argument(0.0 if lean is None else lean, "lean", count, 0.0, one_for_all=True)
     positions = lengths_argument(0.0 if position is None else position, "position", count, 0.0, one_for_all=True)
     with refusals_of("robot"):
         errors = robot if robot.convention_name == CONVENTION else converted(robot, CONVENTION)
     q = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
     angles = tuple(errors_of_tolerance(a, 0.0, d)[0] for a, d in zip(leans, depths, strict=True))
-    return AllowedErrors(robot.name, len(q), angles, flange_error(errors, angles, positions, q))
+    found = flange_error(errors, angles, positions, q)
+    return AllowedErrors(robot.name, len(q), angles, found, robot.simulated_from)

@@ -25,6 +25,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.postures import Postures, approach_of
 from truearm.shown import as_html, counted, listed, short_text
+from truearm.simulated import Marked, said_of
 
 IntArray = NDArray[np.intp]
 
@@ -97,6 +98,8 @@ class Dataset:
     references
         Fixed points beside the robot that were measured along with the targets, with the same fields; None if
         there are none.
+    simulated
+        Whether a virtual instrument read any of it.
     """
 
     source: str
@@ -123,6 +126,7 @@ class Dataset:
     wrench: Array | None = None
     references: Dataset | None = None
     joints_are: str = "model"
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         """Refuse fields that do not fit together."""
@@ -151,6 +155,7 @@ class Dataset:
         }
         return short_text(
             [
+                *said_of(self.simulated_from),
                 f"{self.source}: {counted(self.configurations, 'configuration')} "
                 f"of {counted(len(self.joint_kinds), 'joint')}"
                 f"{' as the controller shows them' if self.joints_are == 'controller' else ''}",
@@ -279,6 +284,11 @@ class Dataset:
             temperature=self.temperature,
             wrench=self.wrench,
         )
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``, if a virtual instrument read any of it."""
+        return ("data",) if self.simulated else ()
 
     @property
     def configurations(self) -> int:

@@ -14,6 +14,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
+from truearm.simulated import Marked
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +108,8 @@ class Inclinations:
         ``(n, 4)``.
     joints_are
         ``model``, or ``controller`` if it shows these joint positions.
+    simulated
+        Whether virtual instruments read any of it.
     """
 
     source: str
@@ -120,6 +123,7 @@ class Inclinations:
     wrench: Array
     payload: Array
     joints_are: str = "model"
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         """Refuse fields that do not fit together, and angles that are none."""
@@ -150,6 +154,11 @@ class Inclinations:
         for what, is_so in wrong.items():
             if is_so:
                 raise InputError(what, where=self.source)
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``, if virtual instruments read any of it."""
+        return ("data",) if self.simulated else ()
 
     @cached_property
     def pairs(self) -> NDArray[np.intp]:

@@ -143,6 +143,10 @@ class Robot(RobotData):
         refuse_above_rating(self, wrench)
         return replace(self, wrench=wrench)
 
+    def marked(self, simulated: bool) -> Robot:
+        """Return the robot with the mark of a virtual instrument, if what it is identified from has that."""
+        return replace(self, simulated=True) if simulated and not self.simulated else self
+
     def tool_place(self, target: str | None) -> Transform:
         """Return where a target is on the flange; the flange itself for None."""
         if target is None:

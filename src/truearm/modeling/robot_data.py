@@ -37,6 +37,7 @@ from truearm.modeling.robot_parameters import all_parameters
 from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
 from truearm.modeling.wrench import Wrench
 from truearm.shown import as_html, counted, listed, short_text
+from truearm.simulated import Marked, said_of
 
 Part = TypeVar("Part", Target, Fixture)
 
@@ -101,6 +102,8 @@ class RobotData:
         One line for each thing done to the robot.
     proof
         What its calibration knew about it; None if it was not calibrated, or by an older version.
+    simulated
+        Whether anything of it was identified from readings of a virtual instrument.
     """
 
     name: str
@@ -128,10 +131,12 @@ class RobotData:
     proof: Proof | None = None
     balancers: tuple[Balancer, ...] = ()
     reach: Reach | None = None
+    simulated: bool = False
 
     def __repr__(self) -> str:
         changed = sum(p.value != p.nominal for p in self.parameters.values())
         lines = [
+            *said_of(self.simulated_from),
             f"{self.name}: {self.title}",
             f"{counted(len(self.joints), 'joint')} ({self.convention_name}), "
             f"{changed} of {counted(len(self.parameters), 'parameter')} not at the nominal value",
@@ -149,6 +154,11 @@ class RobotData:
     def share(self, other: RobotData, names: Sequence[str]) -> None:
         """Let another robot have what is cached of this one under some names, such as :data:`ARM`."""
         other.__dict__.update({name: getattr(self, name) for name in names})
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``robot``, if anything of it was identified from readings of a virtual instrument."""
+        return ("robot",) if self.simulated else ()
 
     @property
     def convention(self) -> Convention:

@@ -33,6 +33,7 @@ def bag_html(imported: ImportedBag) -> str:
         imported.data.source,
         imported.lines(),
         imported.command,
+        imported,
         pictures=[drawing],
         tables=[_table(found)],
     )

@@ -49,6 +49,7 @@ def fleet_html(found: Fleet) -> str:
     return page(
         "fleet.html.jinja",
         fleet_figures(said),
+        found,
         title=found.recorded.manifest.file.stem,
         simulated=simulated,
         said=said,

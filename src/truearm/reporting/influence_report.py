@@ -36,6 +36,7 @@ def influence_html(found: InfluenceResult) -> str:
     return page(
         "influence.html.jinja",
         figures,
+        found,
         found=found,
         rows=[
             row

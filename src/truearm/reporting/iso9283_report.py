@@ -55,6 +55,7 @@ def iso9283_report(found: Iso9283Evaluation) -> str:
         "Pose and path characteristics with their intervals.",
         words,
         found.command,
+        found,
         pictures=[
             *pose_pictures(
                 plan, evaluation.clouds, evaluation.drift, evaluation.settling, evaluation.pushes, found.comparison

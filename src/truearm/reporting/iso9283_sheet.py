@@ -43,6 +43,7 @@ def iso9283_sheet(planned: Iso9283Plan) -> str:
             "standard's own text.",
         ],
         planned.command,
+        planned,
         pictures=[
             Drawing(
                 "cube",

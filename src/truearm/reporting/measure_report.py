@@ -67,6 +67,7 @@ def measure_report(measured: Measured) -> str:
         f"The plan {measured.plan}. No reading was kept or set aside for how well it fits a model.",
         [line for line in measured.lines() if line not in said],
         measured.command,
+        measured,
         pictures=pictures,
         tables=tables,
         details=details,

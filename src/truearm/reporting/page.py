@@ -17,6 +17,7 @@ from markupsafe import Markup, escape
 
 from truearm.printable import LONGEST_WORD, TURNING, printable, shortened, with_short_words
 from truearm.reporting.drawing import AFTER, BEFORE, DARK, Figure
+from truearm.simulated import parts_of, said_of
 from truearm.version import __version__
 
 #: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
@@ -25,7 +26,7 @@ _UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
 _LONG_WORD: Final = re.compile(rf'[^\s"\\,:\[\]{{}}]{{{LONGEST_WORD + 1},}}')
 
 
-def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
+def page(template: str, figures: Mapping[str, Figure], of: object, **content: Any) -> str:
     """Return a page.
 
     Parameters
@@ -34,6 +35,8 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
         Name of a template in this room; it includes ``style.css.jinja`` and ``script.html.jinja``.
     figures
         Pictures by the name of their place on the page.
+    of
+        The record that it tells about: if that is simulated, the page begins with it.
     content
         What the template tells about.
     """
@@ -42,6 +45,7 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
         .get_template(template)
         .render(
             **content,
+            mark=said_of(parts_of([of])),
             drawn=set(figures),
             heights={name: figure["layout"]["height"] for name, figure in figures.items()},
             figures=Markup(json_for_script(figures)),

@@ -68,6 +68,7 @@ def path_page(followed: FollowedPath) -> str:
         f"{', '.join(path.planned.kinds)}; {path.planned.source}.",
         followed.answer,
         followed.command,
+        followed,
         pictures=pictures,
         tables=tables,
         notices=followed.warnings,

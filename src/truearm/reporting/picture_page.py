@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from truearm.notices import Notice, worst_first
 from truearm.reporting.drawing import Figure
 from truearm.reporting.page import page
+from truearm.simulated import without_mark
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,7 @@ def picture_page(
     subtitle: str,
     words: Sequence[str],
     command: str,
+    of: object,
     *,
     pictures: Sequence[Drawing],
     tables: Sequence[Figures] = (),
@@ -73,6 +75,8 @@ def picture_page(
         What was found, a sentence each.
     command
         How to run it again.
+    of
+        The record that it tells about.
     pictures, tables
         What is shown.
     details
@@ -83,9 +87,10 @@ def picture_page(
     return page(
         "pictures.html.jinja",
         {picture.name: picture.figure for picture in pictures},
+        of,
         title=title,
         subtitle=subtitle,
-        words=words,
+        words=without_mark(words),
         command=command,
         pictures=pictures,
         tables=tables,

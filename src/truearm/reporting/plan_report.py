@@ -31,6 +31,7 @@ def plan_html(planned: Plan) -> str:
     return page(
         "plan.html.jinja",
         figures,
+        planned,
         plan=plan,
         chosen_by=planned.chosen_by,
         command=planned.command,

@@ -56,6 +56,7 @@ def plan_sheet(planned: Plan) -> str:
     return page(
         "plan-sheet.html.jinja",
         {},
+        planned,
         title=f"Measuring {made.robot.title}",
         subtitle=f"Plan {mark}{files}: {len(tour.measured)} configurations, joint positions {shown}.",
         words=(*(() if program is None else program.answer), *planned.driving),

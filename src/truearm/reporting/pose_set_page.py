@@ -26,6 +26,7 @@ def pose_set_page(poses: PlannedPoses) -> str:
         f"{len(made.labels)} poses of the set {made.name}.",
         poses.answer,
         poses.command,
+        poses,
         pictures=[Drawing("poses", "Where the poses are", words, drawn)],
         notices=poses.warnings,
     )

@@ -60,6 +60,7 @@ def program_html(correction: ProgramCorrection) -> str:
     return page(
         "program.html.jinja",
         figures,
+        correction,
         correction=correction,
         notices=worst_first(correction.warnings),
         in_plane="path" in figures and "scene" not in figures["path"]["layout"],

@@ -164,6 +164,7 @@ def report_html(calibration: Calibration) -> str:
     return page(
         "report.html.jinja",
         report.figures(),
+        calibration,
         report=report,
         run=calibration,
         expected=calibration.expected,

@@ -10,6 +10,7 @@ from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded
 from truearm.reporting.picture_page import Drawing, Figures, picture_page
 from truearm.results.sphere_tests import OneSphere, SphereTests
+from truearm.simulated import without_mark
 from truearm.validation.sphere_test import SphereTest
 
 
@@ -25,8 +26,9 @@ def sphere_page(tests: SphereTests) -> str:
     return picture_page(
         f"Ballbar on a sphere: {tests.robot.title}",
         f"Measurements of {tests.source}.",
-        [tests.lines()[0].replace(":", ".")],
+        [without_mark(tests.lines())[0].replace(":", ".")],
         tests.command,
+        tests,
         tables=[Figures("Errors of the distance", heading, tuple(rows))],
         pictures=[
             Drawing(

@@ -40,6 +40,7 @@ def tilting_html(found: Tilting) -> str:
     return page(
         "tilting.html.jinja",
         figures,
+        found,
         found=found,
         rows=[_shown(row) for row in rows],
         words=_WORDS,

@@ -46,6 +46,7 @@ def validation_html(found: Validation) -> str:
     return page(
         "validation.html.jinja",
         validation_figures(found),
+        found,
         run=found,
         source=Path(found.source).name,
         title=found.source if found.robot is None else found.robot.title,

@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.results.record import Record
 from truearm.shown import counted
+from truearm.simulated import Marked
 from truearm.validation.pair_distances import PairDistances
 
 #: Bars of the histogram where a person reads, about, and signs in the longest.
@@ -28,11 +29,14 @@ class Distances(Record):
         How many there are.
     errors
         Predicted minus measured distances.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     source: str
     configurations: int
     errors: PairDistances
+    simulated_from: tuple[Marked, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from truearm.results.record import Record
+from truearm.simulated import Marked
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -20,6 +21,11 @@ class ExampleSession(Record):
     """
 
     files: tuple[Path, ...]
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``: a virtual instrument reads."""
+        return ("data",)
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""

@@ -9,6 +9,7 @@ from typing import Any
 from truearm.modeling.controller import JointsOf
 from truearm.results.record import Record, joints_lines
 from truearm.shown import counted
+from truearm.simulated import Marked
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -25,6 +26,8 @@ class ExportedMeasurements(Record):
         Whose joint positions the file holds.
     file
         The file; None if none was written.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     text: str
@@ -32,6 +35,7 @@ class ExportedMeasurements(Record):
     readings: int
     joints_are: JointsOf
     file: Path | None = None
+    simulated_from: tuple[Marked, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""

@@ -23,6 +23,7 @@ from truearm.notices import Notice
 from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary, outcome_words
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted, listed
+from truearm.simulated import Marked
 from truearm.writing import output_folder, write_files
 
 #: The nominal robot with the priors that follow from a fleet; written where some do.
@@ -131,6 +132,12 @@ class Fleet(Record):
         folder = self.recorded.folder / ROBOTS
         return [name for name, _ in self.analysis.failed if exists(folder / name)]
 
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``, if the series is simulated, or the measurements of any robot are."""
+        simulated = self.recorded.manifest.experiment is not None or any(line.simulated for line in self._read[1])
+        return ("data",) if simulated else ()
+
     @cached_property
     def analysis(self) -> Analysis:
         """What the fleet says, of all rows."""
@@ -159,7 +166,7 @@ class Fleet(Record):
         else:
             source = next(entry.robot for entry in asked.robots if entry.name == first)
         robot, names = with_proposed(load_robot(source), self.analysis.kinds[0].spreads)
-        return (robot, names) if names else None
+        return (robot.marked(bool(self.simulated_from)), names) if names else None
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -171,6 +178,7 @@ class Fleet(Record):
         found = self.analysis
         return {
             "truearm": "truearm-fleet-result/1",
+            **({"simulated": True} if self.simulated_from else {}),
             "digest": self.recorded.manifest.digest,
             "robots": self.recorded.manifest.count,
             "calibrated": found.measurements - len(found.failed),
@@ -272,6 +280,7 @@ class _Line:
     errors: Mapping[str, Accuracy]
     codes: str
     message: str
+    simulated: bool
 
     @property
     def name(self) -> str:
@@ -286,4 +295,5 @@ class _Line:
             {kind: found for kind in ACCURACIES if (found := getattr(row, kind)) is not None},
             " ".join(row.errors),
             row.message,
+            row.simulated,
         )

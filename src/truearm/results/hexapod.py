@@ -27,6 +27,7 @@ from truearm.planning.hexapod.reachable import Reachable
 from truearm.planning.hexapod.steps import steps_text
 from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
 from truearm.shown import counted
+from truearm.simulated import Marked
 from truearm.writing import output_file, write_text
 
 _CUPS: Final = ("t1", "t2", "t3")
@@ -331,9 +332,12 @@ class HexapodFrame(Record):
     ----------
     found
         The frame, what it would be without the measured distances, and what is left at the cups.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     found: WorldFrame
+    simulated_from: tuple[Marked, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

@@ -21,6 +21,7 @@ from truearm.notices import Notice, has_error
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.summaries import error_line, errors_summary
 from truearm.shown import counted
+from truearm.simulated import Marked
 from truearm.units import SHOWN_AS, from_si
 from truearm.writing import output_folder, write_files
 
@@ -88,6 +89,8 @@ class InfluenceResult(Record):
         How to run it again.
     inputs
         The files that were read: none of them is overwritten.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     robot: Robot
@@ -98,6 +101,7 @@ class InfluenceResult(Record):
     notices: tuple[Notice, ...]
     command: str
     inputs: tuple[Path, ...] = ()
+    simulated_from: tuple[Marked, ...] = ()
 
     @property
     def warnings(self) -> tuple[Notice, ...]:

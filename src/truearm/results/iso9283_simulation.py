@@ -11,6 +11,7 @@ from truearm.modeling.transform import Transform
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted
+from truearm.simulated import Marked
 from truearm.units import from_si
 from truearm.validation.iso9283.simulated_readings import SimulatedCampaign, Tracker
 from truearm.writing import output_folder, write_files
@@ -93,6 +94,11 @@ class Iso9283Simulation(Record):
     command: str
     inputs: tuple[Path, ...] = ()
     warnings: tuple[Notice, ...] = ()
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``: an instrument that is simulated reads."""
+        return ("data",)
 
     def _counts(self) -> dict[str, int]:
         campaign = self.campaign

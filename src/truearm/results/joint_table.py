@@ -11,6 +11,7 @@ from truearm.modeling.controller import JointsOf
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.notices import Notice
 from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
+from truearm.simulated import Marked
 
 #: Poses explained one by one where a person reads.
 _EXPLAINED: Final = 10
@@ -30,12 +31,15 @@ class JointTable(Record):
         What speaks against the calibration of the robot.
     joints_are
         Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     labels: tuple[str, ...]
     solutions: JointSolutions
     warnings: tuple[Notice, ...] = ()
     joints_are: JointsOf = "model"
+    simulated_from: tuple[Marked, ...] = ()
 
     @property
     def joints(self) -> Array:

@@ -12,6 +12,7 @@ from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_
 from truearm.modeling.robot import Robot
 from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines
 from truearm.results.record import Record
+from truearm.simulated import Marked
 from truearm.validation.line_test import LineErrors, reduction
 from truearm.writing import output_file, write_text
 
@@ -38,6 +39,8 @@ class LineTest(Record):
         The files that were read: none of them is overwritten.
     joints_are
         Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     robot: Robot
@@ -48,6 +51,7 @@ class LineTest(Record):
     after: LineErrors | None
     inputs: tuple[Path, ...] = ()
     joints_are: JointsOf = "model"
+    simulated_from: tuple[Marked, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

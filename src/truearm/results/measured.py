@@ -19,6 +19,7 @@ from truearm.measurement.readers.rows import Configurations
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted, listed
+from truearm.simulated import Marked
 from truearm.writing import write_files
 
 DATA: Final = "measurements.csv"
@@ -51,6 +52,8 @@ class Measured(Record):
         How to go on, or to write the files again.
     told
         What to know about how it was measured.
+    simulated
+        Whether a virtual instrument reads.
     """
 
     title: str
@@ -62,11 +65,17 @@ class Measured(Record):
     folder: Path
     command: str
     told: tuple[Notice, ...] = ()
+    simulated: bool = False
 
     @property
     def data(self) -> Dataset | None:
         """The readings that are kept; None if there is none of a target."""
-        return kept_readings(self.session, self.configurations, str(self.folder / DATA))
+        return kept_readings(self.session, self.configurations, str(self.folder / DATA), self.simulated)
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``, if a virtual instrument reads."""
+        return ("data",) if self.simulated else ()
 
     @property
     def drift(self) -> NestDrift | None:

@@ -382,6 +382,7 @@ class ProgramCorrection(Record):
         frames, choice = self.result.frames, self.result.choice
         made: dict[str, Any] = {
             "robot": self.robot.name,
+            **({"simulated": True} if self.robot.simulated else {}),
             **({"notes": self.notes} if self.notes else {}),
             "history": list(self.robot.history),
             "proof": None if self.robot.proof is None else self.robot.proof.summary(),

@@ -12,6 +12,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
 from truearm.results.record import Record
+from truearm.simulated import Marked, parts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -61,6 +62,8 @@ class Residuals(Record):
         Predicted minus measured [m, rad], ``(rows, 3)``.
     norm
         Length of it [m, rad], ``(rows,)``.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     configuration: NDArray[np.str_]
@@ -69,6 +72,7 @@ class Residuals(Record):
     kind: NDArray[np.str_]
     error: Array
     norm: Array
+    simulated_from: tuple[Marked, ...] = ()
 
     def __len__(self) -> int:
         return len(self.norm)
@@ -135,7 +139,7 @@ def residuals_of(parts: Iterable[tuple[Part, Dataset, Errors]]) -> Residuals:
     parts
         Of each its name, its readings and their errors.
     """
-    names: list[tuple[str, str, Part, Kind]] = []
+    parts, names = [*parts], list[tuple[str, str, Part, Kind]]()
     errors = [np.zeros((0, 3))]
     for part, data, found in parts:
         length = None
@@ -158,4 +162,12 @@ def residuals_of(parts: Iterable[tuple[Part, Dataset, Errors]]) -> Residuals:
             ]
     error = np.concatenate(errors)
     configuration, target, part_of, kind_of = np.array(names, dtype=np.str_).reshape(-1, 4).T
-    return Residuals(configuration, target, part_of, kind_of, error, np.sqrt(np.nansum(error**2, axis=1)))
+    return Residuals(
+        configuration,
+        target,
+        part_of,
+        kind_of,
+        error,
+        np.sqrt(np.nansum(error**2, axis=1)),
+        parts_of(data for _, data, _ in parts),
+    )

@@ -11,6 +11,7 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted
+from truearm.simulated import Marked
 from truearm.validation.sphere_test import SphereTest
 from truearm.writing import output_file, write_text
 
@@ -64,6 +65,8 @@ class SphereTests(Record):
         What speaks against the calibration of the robot.
     inputs
         The files that were read: none of them is overwritten.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     robot: Robot
@@ -73,6 +76,7 @@ class SphereTests(Record):
     command: str
     warnings: tuple[Notice, ...] = ()
     inputs: tuple[Path, ...] = ()
+    simulated_from: tuple[Marked, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

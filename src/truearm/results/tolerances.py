@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from truearm.results.record import Record
+from truearm.simulated import Marked
 from truearm.validation.tolerances import FlangeError, Tolerance
 
 
@@ -22,11 +23,14 @@ class UsedTolerances(Record):
         Of the joints' holes [m].
     joints
         What each joint uses.
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     robot: str
     depths: tuple[float, ...]
     joints: tuple[Tolerance, ...]
+    simulated_from: tuple[Marked, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm and deg."""
@@ -66,12 +70,15 @@ class AllowedErrors(Record):
         Largest angle of each joint's axis [rad].
     errors
         What the tolerances may do at the flange [m].
+    simulated_from
+        What of it comes from a virtual instrument.
     """
 
     robot: str
     configurations: int
     angles: tuple[float, ...]
     errors: FlangeError
+    simulated_from: tuple[Marked, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm and deg."""

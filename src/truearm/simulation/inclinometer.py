@@ -86,6 +86,7 @@ def read_pairs(
         order=np.arange(1, count + 1),
         wrench=wrench + 0.0,  # no negative zeros
         payload=np.zeros((count, 4)),
+        simulated=True,
     )
 
 

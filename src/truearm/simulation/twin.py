@@ -387,6 +387,7 @@ def measure(
         number=conditions["number"],
         temperature=conditions.get("temperature"),
         wrench=conditions.get("wrench"),
+        simulated=True,
     )
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from truearm.reporting.drawing import Figure
 from truearm.reporting.page import page
 from truearm.results.record import Record
+from truearm.simulated import Marked
 from truearm.studies.verdicts import SILENT, VERDICTS, Claim, Comparison, Verdict
 from truearm.writing import output_folder, write_files
 
@@ -179,6 +180,11 @@ class Study(Record):
     command: str = ""
 
     @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``: every study repeats a published experiment on a twin."""
+        return ("data",)
+
+    @property
     def rows(self) -> tuple[Row, ...]:
         """All rows."""
         return tuple(row for table in self.tables for row in table.rows)
@@ -220,7 +226,7 @@ class Study(Record):
     def html(self) -> str:
         """Return the report as one HTML page."""
         figures = {picture.name: picture.figure for picture in self.pictures}
-        return page("study.html.jinja", figures, study=self, number=number, silent=SILENT)
+        return page("study.html.jinja", figures, self, study=self, number=number, silent=SILENT)
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write ``report.html``, ``study.json`` and the study's own files into a folder.

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from truearm.files import confined_reads
+from truearm.simulated import with_mark, without_mark
 from truearm.studio.tasks import Outcome, Progress, option_words
 
 
@@ -57,8 +58,10 @@ def evaluate_tests(folder: Path, plan: str, out: str, progress: Progress, **opti
     with confined_reads(folder):
         made = iso9283_evaluate(plan, out=out, command=command, progress=progress, **given)
     beside = () if made.comparison is None else made.comparison.lines()
-    absent = [line for line in made.lines() if line.startswith("Not measured:")]
-    return Outcome((*made.lines()[:2], *absent, *beside), made.warnings, tuple(made.contents()))
+    said = without_mark(made.lines())
+    absent = [line for line in said if line.startswith("Not measured:")]
+    shown = with_mark((*said[:2], *absent, *beside), made.simulated_from)
+    return Outcome(tuple(shown), made.warnings, tuple(made.contents()))
 
 
 def _given(options: Mapping[str, Any]) -> dict[str, Any]:

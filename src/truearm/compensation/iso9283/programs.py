@@ -33,6 +33,7 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import homogeneous
 from truearm.planning.iso9283.criteria import TESTS
 from truearm.planning.iso9283.planned import PerformancePlan, PlannedPose, PlannedTest, visited
+from truearm.simulated import IN_PROGRAMS
 
 #: The first run: no more than this share of the rated velocity, and no faster than this along paths and in joint
 #: motions [m/s].
@@ -225,6 +226,7 @@ class _Programs:
     def _notes(self, test: PlannedTest, share: float, load: float) -> tuple[str, ...]:
         carried = "no load" if test.id == "compliance" else f"load {load * self.plan.rated_load:g} kg"
         return (
+            *((IN_PROGRAMS,) if self.plan.robot.simulated else ()),
             f"ISO 9283 {test.id}",
             f"Robot {self.plan.robot.name}",
             f"{100 * share:g} % velocity, {carried}",

@@ -13,6 +13,7 @@ from typing import Final
 from truearm.compensation.programs.marks import correction_comment
 from truearm.compensation.programs.new_targets import NewTargets, ascii_only
 from truearm.modeling.chain import Array
+from truearm.simulated import IN_PROGRAMS
 
 #: What a program may be called in every language: FANUC's controllers allow the fewest characters.
 NAME: Final = r"[A-Za-z][A-Za-z0-9_]{0,31}"
@@ -41,6 +42,8 @@ class NewProgram(NewTargets):
         Whether the targets are corrected for one robot, which then must not be done again.
     beside
         How far the tip leaves the path between the targets [m].
+    simulated
+        Whether that robot was calibrated with simulated measurements.
     """
 
     durations: Array
@@ -48,6 +51,7 @@ class NewProgram(NewTargets):
     spacing: Array
     corrected: bool
     beside: float
+    simulated: bool = False
 
     def __len__(self) -> int:
         return len(self.joints)
@@ -61,7 +65,8 @@ class NewProgram(NewTargets):
         """What a person should know who opens the program, in ASCII, 32 characters at most."""
         kind = "joint positions" if self.poses is None else "poses of the flange"
         text = [f"Path for {ascii_only(self.robot)[:20]}", f"{len(self)} targets: {kind}"]
-        return (*text, *((*correction_comment(date.today()), "do not correct it again") if self.corrected else ()))
+        corrected = (*correction_comment(date.today()), "do not correct it again") if self.corrected else ()
+        return (*((IN_PROGRAMS,) if self.simulated else ()), *text, *corrected)
 
     def seconds(self, row: int) -> float:
         """Return the time of the move to a target [s]."""

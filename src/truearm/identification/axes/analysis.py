@@ -24,6 +24,7 @@ from truearm.modeling.parameters import Group
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_vector
 from truearm.notices import Notice
+from truearm.simulated import Marked, parts_of
 
 #: Tables of parameters that are made of the axes; parallel axes leave only Hayati's.
 TABLES: Final = ("standard-dh", "s-model", "hayati")
@@ -83,7 +84,13 @@ class AxisAnalysis:
         made = robot.with_frames(robot.base, places)
         kept = {n: p for n, p in robot.parameters.items() if p.group in ("geometry", "joint zero")}
         said = f"calibrated axis by axis on {len(self.found.circles)} circles of {self.data.source}"
-        return replace(made.with_parameters(kept.values()), history=(*robot.history, said), proof=None)
+        found = replace(made.with_parameters(kept.values()), history=(*robot.history, said), proof=None)
+        return found.marked(self.data.simulated)
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """What of it comes from a virtual instrument."""
+        return parts_of((self.data, self.nominal))
 
     @cached_property
     def base(self) -> tuple[Transform, float, float]:

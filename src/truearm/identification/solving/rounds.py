@@ -126,6 +126,7 @@ def find_parameters(
         A solution of the same robot and model from other data: the search begins at its frames, values and variances.
         What is found does not depend on it.
     """
+    robot = robot.marked(data.simulated)
     start = start_from_readings(model.prepared(robot), data, held) if near is None else near.start
     check_circumstances(start, data)
     free = held.free_of(unanchored(model.free(start), data), start)

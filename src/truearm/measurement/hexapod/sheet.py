@@ -162,6 +162,7 @@ class Sheet:
             if several and self.places is not None
             else None,
             sigma=sigma,
+            simulated=self.configurations.simulated,
         )
 
 

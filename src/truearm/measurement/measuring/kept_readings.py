@@ -50,7 +50,9 @@ def stated_sigma(session: Session) -> StatedSigma:
     return StatedSigma(None, "none is stated: the scatter of a dwell does not say how well a place is found again")
 
 
-def kept_readings(session: Session, configurations: Configurations, source: str) -> Dataset | None:
+def kept_readings(
+    session: Session, configurations: Configurations, source: str, simulated: bool = False
+) -> Dataset | None:
     """Return the readings that are kept, as a dataset; None if there is none of a target.
 
     Configurations come in the order in which the robot came to them. One to which it came again has visits. A target
@@ -65,6 +67,8 @@ def kept_readings(session: Session, configurations: Configurations, source: str)
         Those of the plan.
     source
         What messages call the data.
+    simulated
+        Whether a virtual instrument reads.
     """
     targets = [entry for entry in session.kept if not entry.is_nest]
     if not targets:
@@ -86,6 +90,7 @@ def kept_readings(session: Session, configurations: Configurations, source: str)
         "joints": configurations.joints[places],
         "joint_kinds": configurations.kinds,
         "joints_are": configurations.joints_are,
+        "simulated": simulated,
     }
     nests = [entry for entry in session.kept if entry.is_nest]
     references = None

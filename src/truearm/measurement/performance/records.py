@@ -76,6 +76,8 @@ class AttainedPoses:
         Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
     resolution_rot
         The same of the components of quaternions.
+    simulated
+        Whether a virtual instrument read any of them.
     """
 
     criterion: Names
@@ -92,6 +94,7 @@ class AttainedPoses:
     source: str
     resolution: float = 0.0
     resolution_rot: float = 0.0
+    simulated: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +123,8 @@ class Samples:
         The file, for messages.
     resolution
         Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
+    simulated
+        Whether a virtual instrument read any of them.
     """
 
     criterion: Names
@@ -133,6 +138,7 @@ class Samples:
     line: NDArray[np.intp]
     source: str
     resolution: float = 0.0
+    simulated: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +161,8 @@ class Pushes:
         The file, for messages.
     resolution
         Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
+    simulated
+        Whether a virtual instrument read any of them.
     """
 
     direction: Names
@@ -164,3 +172,4 @@ class Pushes:
     line: NDArray[np.intp]
     source: str
     resolution: float = 0.0
+    simulated: bool = False

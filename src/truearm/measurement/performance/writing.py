@@ -10,6 +10,8 @@ import numpy as np
 
 from truearm.measurement.performance.records import AttainedPoses, Names, Pushes, Samples
 from truearm.modeling.transform import quaternion_from_rotation
+from truearm.simulated import COLUMN as SIMULATED
+from truearm.simulated import YES
 
 _PLACE: Final = ("x [mm]", "y [mm]", "z [mm]")
 _TURN: Final = ("qw", "qx", "qy", "qz")
@@ -30,6 +32,8 @@ def poses_text(read: AttainedPoses) -> str:
     if read.rotation is not None:
         heading += _TURN
         columns.append(quaternion_from_rotation(read.rotation))
+    mark = [YES] if read.simulated else []
+    heading += [SIMULATED] if mark else []
     criterion, robot, pose, approach = (_texts(one) for one in names)
     rows = zip(
         criterion,
@@ -46,7 +50,7 @@ def poses_text(read: AttainedPoses) -> str:
     lines = [",".join(heading)]
     for c, r, p, cycle, a, velocity, load, time, numbers in rows:
         words = [c, r, p, str(cycle), a, _percent(velocity), _percent(load), "" if np.isnan(time) else _TIME % time]
-        lines.append(",".join([*words, *_numbers(numbers)]))
+        lines.append(",".join([*words, *_numbers(numbers), *mark]))
     return "\n".join(lines) + "\n"
 
 
@@ -60,16 +64,19 @@ def samples_text(read: Samples, place: str, *, conditions: bool = True) -> str:
     conditions
         Whether there are columns of velocity and load.
     """
+    mark = [SIMULATED] if read.simulated else []
     heading = ["criterion", place, "cycle", *(_SHARES if conditions else ()), "time [s]", *_PLACE]
     if read.rotation is not None:
         heading += _TURN
+    heading += mark
     return "\n".join([",".join(heading), *_sample_lines(read, conditions=conditions)]) + "\n"
 
 
 def _sample_lines(read: Samples, *, conditions: bool) -> Iterator[str]:
     """Give the rows in blocks of lines: what is the same in many rows is written into their format once."""
     oriented = read.rotation is not None
-    numbers = ",".join([_TIME, *[_LENGTH] * 3, *([_QUATERNION] * 4 if oriented else [])])
+    mark = [YES] if read.simulated else []
+    numbers = ",".join([_TIME, *[_LENGTH] * 3, *([_QUATERNION] * 4 if oriented else []), *mark])
     shares = np.stack([read.velocity, read.load], axis=1)
     keys = np.column_stack([read.criterion.code, read.place.code, read.cycle, shares])
     new = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
@@ -91,10 +98,11 @@ def _sample_lines(read: Samples, *, conditions: bool) -> Iterator[str]:
 
 def forces_text(read: Pushes) -> str:
     """Return pushes as ``forces.csv`` holds them."""
-    lines = [",".join(["direction", "force [N]", "cycle", *_PLACE])]
+    mark = [YES] if read.simulated else []
+    lines = [",".join(["direction", "force [N]", "cycle", *_PLACE, *([SIMULATED] if mark else [])])]
     places = (1e3 * read.position).tolist()
     rows = zip(_texts(read.direction), read.force.tolist(), read.cycle.tolist(), places, strict=True)
-    lines += [",".join([way, f"{force:.6g}", str(cycle), *_numbers(at)]) for way, force, cycle, at in rows]
+    lines += [",".join([way, f"{force:.6g}", str(cycle), *_numbers(at), *mark]) for way, force, cycle, at in rows]
     return "\n".join(lines) + "\n"
 
 

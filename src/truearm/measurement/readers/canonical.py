@@ -17,7 +17,7 @@ import numpy as np
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_text
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical_rows import ROLES, order_of, roles_of, scale_sigma_of, visits_of
+from truearm.measurement.readers.canonical_rows import ROLES, check_mark, order_of, roles_of, scale_sigma_of, visits_of
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.fixtures import check_lengths, read_setup
 from truearm.measurement.readers.rows import (
@@ -30,6 +30,8 @@ from truearm.measurement.readers.rows import (
 )
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_columns import COLUMN, JOINT_COLUMN, joint_names
+from truearm.simulated import COLUMN as SIMULATED
+from truearm.simulated import YES
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_unit, written
 
 _POSITION: Final = ("x", "y", "z")
@@ -43,7 +45,7 @@ _UNITS: Final[dict[str, tuple[str, ...]]] = (
     | dict.fromkeys(_FORCE, ("N",))
     | dict.fromkeys(_MOMENT, ("N m",))
 )
-_PLAIN: Final = ("configuration", "order", "target", "role", "fixture", "visit", *_QUATERNION)
+_PLAIN: Final = ("configuration", "order", "target", "role", "fixture", "visit", SIMULATED, *_QUATERNION)
 #: Every column as one writes it, for messages.
 _SHOWN: Final = (
     {
@@ -60,6 +62,7 @@ _SHOWN: Final = (
     | {"scale_sigma": "scale_sigma [ppm]", "temperature": "temperature [degC]"}
     | {name: f"{name} [N]" for name in _FORCE}
     | {name: f"{name} [N m]" for name in _MOMENT}
+    | {SIMULATED: SIMULATED}
 )
 _ALLOWED: Final = ", ".join(_SHOWN.values()).replace("[deg]", "[deg] ..")
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
@@ -90,6 +93,8 @@ def read_csv(path: Path) -> Dataset:
     refuse_other_separators(text, f"{path}, line {header}", ", or import it with `truearm import table`")
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
+    if SIMULATED in columns:
+        check_mark(cells, columns[SIMULATED].place)
     setup = None
     if "role" in columns and "fixture" in (roles := roles_of(cells, columns["role"].place)):
         beside = [role == "fixture" for role in roles]
@@ -296,9 +301,11 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
         *(["sigma_rot [mrad]"] if with_sigma_rot else []),
         *([_SHOWN["scale_sigma"]] if dataset.scale_sigma is not None else []),
         *(_SHOWN[name] for name in circumstances),
+        *([SIMULATED] if dataset.simulated else []),
     ]
     joints = [[_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()]
     rows: list[list[list[str]]] = [[] for _ in dataset.labels]
+    mark = [YES] if dataset.simulated else []
 
     def reading_cells(part: Dataset, role: str, reading: int) -> list[str]:
         row = [part.targets[part.target[reading]], *([role] if with_roles else [])]
@@ -327,6 +334,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
             place = [] if order is None else [order[configuration]]
             row = [dataset.labels[configuration], *place, *joints[configuration], *reading_cells(part, role, reading)]
             row += [_shown(float(values[configuration]), "1") for values in circumstances.values()]
+            row += mark
             rows[configuration].append(row)
     unmeasured = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
     if unmeasured is not None:
@@ -340,7 +348,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     writer.writerow(heading)
     writer.writerows(row for found in rows for row in found)
     for reading in range(0 if setup is None else len(setup.target)):
-        ends = [""] * (len(units) + (order is not None)), [""] * len(circumstances)
+        ends = [""] * (len(units) + (order is not None)), [""] * (len(circumstances) + len(mark))
         row = ["", *ends[0], *reading_cells(setup, "fixture", reading), *ends[1]]  # type: ignore[arg-type]
         writer.writerow(row)
     return stream.getvalue()

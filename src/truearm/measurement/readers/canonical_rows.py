@@ -12,6 +12,7 @@ from truearm.measurement.dataset import IntArray
 from truearm.measurement.dataset_fields import VISITS
 from truearm.measurement.readers.cells import Cells
 from truearm.measurement.readers.rows import Configurations
+from truearm.simulated import YES
 
 ROLES: Final = ("target", "reference", "fixture")
 #: What the order of measurement is numbered with.
@@ -34,6 +35,18 @@ def roles_of(cells: Cells, place: int | None) -> tuple[str, ...]:
                 "a fixture is what targets are measured against.",
             )
     return roles
+
+
+def check_mark(cells: Cells, place: int) -> None:
+    """Refuse rows of which it is not clear whether a virtual instrument read them."""
+    for row, text in enumerate(cells.columns[place]):
+        if text.lower() not in ("", YES, "no"):
+            raise InputError(
+                "this does not say whether a virtual instrument read the row",
+                where=cells.place(row, place),
+                came=text,
+                allowed=f"{YES}, or nothing of a real instrument",
+            )
 
 
 def scale_sigma_of(cells: Cells, place: int, unit: str) -> float:

@@ -20,6 +20,8 @@ from truearm.errors import InputError
 from truearm.limits import limit, refuse_beyond
 from truearm.modeling.chain import Array
 from truearm.printable import is_one_line
+from truearm.simulated import COLUMN as SIMULATED
+from truearm.simulated import YES
 from truearm.units import as_number, sized_si
 
 #: A number with a decimal comma.
@@ -95,6 +97,12 @@ class Cells:
             lines=tuple(compress(self.lines, kept)),
             columns=tuple(tuple(compress(column, kept)) for column in self.columns),
         )
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a virtual instrument read any of the rows, as a column of its own says."""
+        marks = [column for name, column in zip(self.names, self.columns, strict=True) if name == SIMULATED]
+        return any(cell.lower() == YES for column in marks for cell in column)
 
     def place(self, row: int, column: int) -> str:
         """Return the file, line and column of a cell, or the file and its place in a sheet, for messages."""

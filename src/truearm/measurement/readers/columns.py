@@ -16,6 +16,7 @@ from truearm.measurement.readers.rows import Configurations, found_configuration
 from truearm.measurement.readers.sheets import is_workbook, read_sheet
 from truearm.measurement.readers.stops import stops_in
 from truearm.modeling.formats.joint_columns import JOINT_COLUMN, joint_names
+from truearm.simulated import COLUMN as SIMULATED
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
@@ -75,6 +76,8 @@ def _found_columns(cells: Cells, shown: Mapping[str, str], units: Mapping[str, t
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
         fitting = (*ANGLE_UNITS, *LENGTH_UNITS) if more and JOINT_COLUMN.fullmatch(name) else units.get(name)
+        if name == SIMULATED:  # every table of measurements may have it, and none needs it
+            continue
         if fitting is None and name not in shown:
             near = nearest_names(name, shown, 1, _ALIKE)
             raise InputError(

@@ -159,6 +159,7 @@ def _dataset(source: str, found: Configurations, target: str) -> Dataset:
         configuration=np.arange(n),
         target=np.zeros(n, dtype=np.intp),
         position=np.full((n, 3), np.nan),
+        simulated=found.simulated,
     )
     return in_order(empty)
 

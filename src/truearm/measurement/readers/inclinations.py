@@ -20,6 +20,8 @@ from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cell
 from truearm.measurement.readers.rows import Configurations, found_configurations, same_everywhere
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_columns import COLUMN, JOINT_COLUMN, joint_names
+from truearm.simulated import COLUMN as SIMULATED
+from truearm.simulated import YES
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_unit, from_si, written
 
 _AXES: Final = ("x", "y", "z")
@@ -33,7 +35,7 @@ _UNITS: Final[dict[str, tuple[str, ...]]] = (
     | {"payload": ("kg", "g")}
     | dict.fromkeys(_COG, LENGTH_UNITS)
 )
-_PLAIN: Final = ("configuration", "order", "link", "sensor")
+_PLAIN: Final = ("configuration", "order", "link", "sensor", SIMULATED)
 #: Columns of the canonical CSV that this file has not.
 _OF_TARGETS: Final = ("target", "fixture", "distance", "height", "role", "qw")
 #: Every column as one writes it, for messages.
@@ -45,6 +47,7 @@ _SHOWN: Final = (
     | {name: f"{name} [mm]" for name in _COG}
     | {name: f"{name} [N]" for name in _FORCE}
     | {name: f"{name} [N m]" for name in _MOMENT}
+    | {SIMULATED: SIMULATED}
 )
 _ALLOWED: Final = ", ".join(_SHOWN.values()).replace("_1 [deg]", "_1 [deg] ..")
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
@@ -112,6 +115,7 @@ def read_inclinations(path: Path) -> Inclinations:
         wrench=circumstances(*_FORCE, *_MOMENT),
         payload=payload,
         joints_are=joints_are,
+        simulated=cells.simulated,
     )
 
 
@@ -251,6 +255,7 @@ def inclinations_text(read: Inclinations) -> str:
     column = COLUMN["controller" if read.joints_are == "controller" else "model"]
     forced, moved, carried = read.wrench.any(), read.wrench[:, 3:].any(), read.payload.any()
     axes = [number for number in range(3) if np.isfinite(read.angle[..., number]).any()]
+    mark = [YES] if read.simulated else []
     sensors = [name.partition(", sensor ")[2] for name in read.instruments.names]
     beside = {
         **(dict(zip(_FORCE, read.wrench[:, :3].T, strict=True)) if forced else {}),
@@ -267,6 +272,7 @@ def inclinations_text(read: Inclinations) -> str:
             *("link", *(["sensor"] if any(sensors) else [])),
             *(_SHOWN[_AXES[number]] for number in axes),
             _SHOWN["sigma"],
+            *([SIMULATED] if read.simulated else []),
         ]
     )
 
@@ -283,5 +289,6 @@ def inclinations_text(read: Inclinations) -> str:
             if np.isfinite(read.sigma[at, number]):
                 angles = [shown(read.angle[at, number, axis], "deg") for axis in axes]
                 sensor = [sensors[number]] if any(sensors) else []
-                writer.writerow([*still, str(link + 1), *sensor, *angles, shown(read.sigma[at, number], "deg")])
+                sigma = shown(read.sigma[at, number], "deg")
+                writer.writerow([*still, str(link + 1), *sensor, *angles, sigma, *mark])
     return stream.getvalue()

@@ -89,6 +89,7 @@ def read_attained_poses(path: Path) -> AttainedPoses:
         source=str(path),
         resolution=_resolution(cells, columns, group),
         resolution_rot=resolution_rot,
+        simulated=cells.simulated,
     )
     _refuse_repeated(read)
     return read
@@ -132,6 +133,7 @@ def read_pushes(path: Path) -> Pushes:
         line=np.array(cells.lines, dtype=np.intp),
         source=str(path),
         resolution=_resolution(cells, columns, names.code),
+        simulated=cells.simulated,
     )
 
 

@@ -29,6 +29,8 @@ from truearm.measurement.readers.sample_times import refuse_out_of_order
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_from_quaternion
 from truearm.printable import is_one_line
+from truearm.simulated import COLUMN as SIMULATED
+from truearm.simulated import YES
 from truearm.units import LENGTH_UNITS, TIME_UNITS, as_number, checked_unit, from_si
 
 _POSITION: Final = ("x", "y", "z")
@@ -72,7 +74,7 @@ class _Header:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        return tuple(name for name in self.columns if name not in self.numbers)
+        return tuple(name for name in self.columns if name not in (*self.numbers, SIMULATED))
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -114,13 +116,17 @@ def _read(path: Path, place: Place) -> Samples:
     refuse_beyond("samples_read", content.count(b"\n") - header.line, where=source)
     keys: dict[tuple[str, ...], int] = {}
     codes, numbers, lines = [], [], []
+    simulated = False
     for first, texts in _blocks(content, start, header):
+        simulated = simulated or _simulated(texts, first, header)
         codes.append(_codes(texts, first, header, keys))
         numbers.append(_numbers(texts, first, header))
         lines.append(first)
     if not codes:
         raise InputError("the file holds a header and no rows", where=source, cure="Check that it was exported whole.")
-    return _samples(header, place, keys, np.concatenate(codes), np.concatenate(numbers), np.concatenate(lines))
+    return _samples(
+        header, place, keys, np.concatenate(codes), np.concatenate(numbers), np.concatenate(lines), simulated
+    )
 
 
 def _header(content: bytes, source: str, place: Place) -> tuple[_Header, int]:
@@ -164,6 +170,7 @@ def _columns(headings: Sequence[str], header: str, place: Place) -> dict[str, tu
     }
     allowed = ", ".join(known.values())
     columns: dict[str, tuple[int, str]] = {}
+    known[SIMULATED] = SIMULATED
     for number, heading in enumerate(headings):
         where = f"{header}, column {number + 1}"
         match = _HEADING.fullmatch(heading)
@@ -269,6 +276,15 @@ def _codes(
     return code
 
 
+def _simulated(texts: list[str], lines: NDArray[np.intp], header: _Header) -> bool:
+    """Return whether a virtual instrument read any of these rows."""
+    if SIMULATED not in header.columns:
+        return False
+    place = header.columns[SIMULATED][0]
+    rows = zip(texts, lines.tolist(), strict=True)
+    return any(_cells(text, line, header)[place].lower() == YES for text, line in rows)
+
+
 def _check_labels(labels: dict[str, str], line: int, header: _Header) -> None:
     place: Place = "path" if "path" in labels else "pose"
     known = TESTS_OF[place]
@@ -351,6 +367,7 @@ def _samples(
     code: NDArray[np.intp],
     numbers: Array,
     lines: NDArray[np.intp],
+    simulated: bool,
 ) -> Samples:
     of = {name: column for column, name in enumerate(header.numbers)}
     position = np.empty((len(code), 3))
@@ -394,6 +411,7 @@ def _samples(
         line=lines,
         source=header.source,
         resolution=_resolution(header, numbers),
+        simulated=simulated,
     )
 
 

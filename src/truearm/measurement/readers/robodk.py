@@ -30,6 +30,7 @@ from truearm.modeling.orientations import MOVING_XYZ_ANGLES
 from truearm.modeling.postures import approach_of
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.shown import counted
+from truearm.simulated import COLUMN as SIMULATED
 
 AngleUnit = Literal["deg", "rad"]
 Delimiter = Literal["comma", "semicolon", "tab"]
@@ -46,9 +47,10 @@ _NOT_MEASURED: Final = 1e-6
 _NUMBERED: Final = re.compile(r"\D*?([0-9]{1,2})")
 #: Headings that no joint has.
 _NO_JOINTS: Final = frozenset({"x", "y", "z", "configuration", "target", "name", "point", "id"})
+#: What the headings of measured numbers begin with; those of a virtual instrument say so instead.
+_MEASURED: Final = "measured"
 _HEADINGS: Final = {
     "joints": [f"J{number} [deg]" for number in range(1, _JOINTS + 1)],
-    "measured": [f"measured {axis} [mm]" for axis in "XYZ"],
     "tool": [f"TCP {axis} [mm]" for axis in "XYZ"],
 }
 
@@ -160,6 +162,7 @@ def read_robodk(
         quaternion=quaternion,
         approach=approach_of(at, np.arange(count)),
         number=np.arange(float(count)),
+        simulated=any(heading.startswith(SIMULATED) for heading in cells.names),
     )
     return RoboDKTable(data, points[order], int(lost.sum()))
 
@@ -175,8 +178,9 @@ def robodk_csv(data: Dataset, tool_points: Sequence[Array], rotations: Sequence[
         Where each target is in the flange frame [m], ``(3,)``, and how it is turned, ``(3, 3)``; None for a point.
     """
     poses = data.quaternion is not None
-    headings = [*_HEADINGS["joints"], *_HEADINGS["measured"]]
-    headings += [f"measured {axis} [rad]" for axis in ("RX", "RY", "RZ")] if poses else []
+    measured = SIMULATED if data.simulated else _MEASURED
+    headings = [*_HEADINGS["joints"], *(f"{measured} {axis} [mm]" for axis in "XYZ")]
+    headings += [f"{measured} {axis} [rad]" for axis in ("RX", "RY", "RZ")] if poses else []
     headings += _HEADINGS["tool"]
     headings += [f"TCP {axis} [rad]" for axis in ("RX", "RY", "RZ")] if poses else []
     lines = [",".join(headings)]

@@ -42,6 +42,8 @@ class Configurations:
         ``model``, or ``controller`` if it shows these joint positions.
     before
         Where the arm stops right before each, where a plan says so.
+    simulated
+        Whether a virtual instrument read any of their rows.
     """
 
     labels: tuple[str, ...]
@@ -50,6 +52,7 @@ class Configurations:
     of_row: IntArray
     joints_are: JointsOf = "model"
     before: Configurations | None = None
+    simulated: bool = False
 
 
 def found_configurations(
@@ -79,7 +82,7 @@ def found_configurations(
             cure="A configuration is one standstill of the robot: give other joints another label.",
         )
     kinds = tuple("revolute" if unit in ("deg", "rad") else "prismatic" for unit in units)
-    return Configurations(tuple(place), joints[first], kinds, of_row, joints_are)
+    return Configurations(tuple(place), joints[first], kinds, of_row, joints_are, simulated=cells.simulated)
 
 
 def same_everywhere(cells: Cells, configurations: Configurations, column: int, unit: str) -> Array:
@@ -239,6 +242,7 @@ def _part(
         joints=configurations.joints,
         joint_kinds=configurations.kinds,
         joints_are=configurations.joints_are,
+        simulated=configurations.simulated,
         targets=tuple(place),
         configuration=readings.configuration[rows],
         target=target,

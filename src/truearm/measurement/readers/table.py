@@ -198,6 +198,7 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
         called=called_in(content),
     )
     data = dataset_of(readings, configurations, _order(cells, configurations, of_row, files))
+    data = replace(data, simulated=data.simulated or cells.simulated)
     noticed = (
         *uneven_deviations(cells, content, mapping),
         *unlikely_radians(cells, content, files.of_joints, of_joints, mapping),

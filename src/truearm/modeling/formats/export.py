@@ -20,6 +20,7 @@ from truearm.modeling.formats.ur_kinematics import KINEMATICS_FILE, kinematics_t
 from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
+from truearm.simulated import without_mark
 from truearm.units import from_si, to_si
 
 
@@ -92,7 +93,8 @@ def _urdf(robot: Robot) -> Export:
     text, left = urdf_text(robot)
     first, _, rest = text.partition("\n")
     frame = f"{frames(robot)} They are the links tool0 and base_link."
-    said = (re.sub("-(?=-)", "- ", line) for line in comments(robot, frame, left))  # XML comments hold no two hyphens
+    said = without_mark(comments(robot, frame, left))  # which the URDF has already
+    said = [re.sub("-(?=-)", "- ", line) for line in said]  # XML comments hold no two hyphens
     return Export("\n".join([first, "<!--", *said, "-->", rest]), frame, tuple(left))
 
 

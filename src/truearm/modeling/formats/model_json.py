@@ -28,6 +28,7 @@ def model_json(robot: Robot, frames: str, left_out: Iterable[str]) -> str:
         "name": robot.name,
         "title": robot.title,
         "source": robot.source,
+        **({"simulated": True} if robot.simulated else {}),
         "units": {"length": "m", "angle": "rad", "force": "N", "mass": "kg"},
         "frames": frames,
         "left_out": list(left_out),

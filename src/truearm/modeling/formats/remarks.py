@@ -10,6 +10,7 @@ from truearm.modeling.effects.balancing import Balancing
 from truearm.modeling.parts import NO_PAYLOAD
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
+from truearm.simulated import said_of
 
 #: Two frames less than this apart [m, rad] are the same to any instrument.
 _SAME_FRAME: Final = 1e-9
@@ -79,5 +80,11 @@ def first_frame_remark(base: Transform) -> str:
 def comments(robot: Robot, frame: str, left: Sequence[str]) -> list[str]:
     """Return what the head of a file says in its comments, each one line without control characters."""
     title = robot.title if robot.title == robot.name else f"{robot.name}: {robot.title}"
-    said = [f"{title}, written by truearm", frame, *left, *(f"History: {line}" for line in robot.history)]
+    said = [
+        *said_of(robot.simulated_from),
+        f"{title}, written by truearm",
+        frame,
+        *left,
+        *(f"History: {line}" for line in robot.history),
+    ]
     return [" ".join("".join(c if c.isprintable() else " " for c in line).split()) for line in said]

@@ -45,6 +45,7 @@ from truearm.modeling.formats.urdf_tree import (
 from truearm.modeling.parts import JOINT_SPEEDS, Joint, LinkMass
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
+from truearm.simulated import ROBOT_LINE
 
 #: How far the length of an axis may be from 1: files print five digits, but 0 0 2 means something else.
 _AXIS_TOLERANCE: Final = 1e-3
@@ -64,7 +65,8 @@ def read_urdf(path: Path, tip: str | None = None) -> Robot:
         Link at the end of the chain. If None, the moving joints must lie on one path, and the end is the link
         ``tool0`` or else ``flange`` fixed behind the last of them, or else that joint's own link.
     """
-    tree = read_tree(read_bytes(path), str(path))
+    content = read_bytes(path)
+    tree = read_tree(content, str(path))
     end = _only_end(tree, path) if tip is None else tree.known(tip, str(path))
     route = tree.joints_to(end)
     links, tail = _links(tree.where, route)
@@ -86,7 +88,13 @@ def read_urdf(path: Path, tip: str | None = None) -> Robot:
         flange=Transform.from_matrix(tail[:3, :3], tail[:3, 3]),
         masses=tuple(mass for mass in masses if mass is not None),
         controller=_controller(tree, links[-1].joint.child, end),
+        simulated=_is_marked(content),
     )
+
+
+def _is_marked(content: bytes) -> bool:
+    """Return whether a URDF says in a comment that its robot was calibrated with simulated measurements."""
+    return f"<!-- {ROBOT_LINE} -->".encode() in content
 
 
 def _controller(tree: Tree, last: str, end: str) -> Controller:
@@ -138,6 +146,8 @@ def calibrated_urdf(source: bytes, robot: Robot) -> tuple[bytes, list[str]]:
         edits += _origin_edits(source, link.joint, xyz if False in changed else None, rpy if True in changed else None)
     for start, end, text in sorted(edits, reverse=True):
         source = source[:start] + text + source[end:]
+    if robot.simulated and not _is_marked(source):
+        source = source.rstrip() + f"\n<!-- {ROBOT_LINE} -->\n".encode()
     return source, left_out(robot, "A URDF")
 
 

@@ -14,6 +14,7 @@ from truearm.modeling.formats.remarks import left_out
 from truearm.modeling.formats.urdf_tree import Triple, roll_pitch_yaw
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
+from truearm.simulated import said_of
 
 
 def urdf_text(robot: Robot) -> tuple[str, list[str]]:
@@ -35,6 +36,7 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     said = left_out(robot, "A URDF")
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
+        *(f"<!-- {line} -->" for line in said_of(robot.simulated_from)),
         f"<robot name={quoteattr(robot.name)}>",
         '  <link name="base_link"/>',
     ]

@@ -29,6 +29,7 @@ from truearm.planning.constraints.constraints import Constraints, allowed, refus
 from truearm.planning.driving.drawing import Drawn, drawn_clear
 from truearm.planning.driving.joint_window import joint_window, on_principal_turn
 from truearm.planning.driving.ways import WayFinder
+from truearm.simulated import Marked
 from truearm.simulation.devices import Device, in_view_of
 from truearm.simulation.truths import carrying_targets
 
@@ -101,6 +102,12 @@ class MeasurementPlan:
     reads: tuple[str, ...] = ()
     fixtures: Mapping[str, Array] = field(default_factory=dict)
     drawn: Drawn | None = None
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``robot``, if it is for a robot that was calibrated with simulated measurements."""
+        return self.robot.simulated_from
+
     among: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 

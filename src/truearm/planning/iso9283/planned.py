@@ -9,6 +9,7 @@ from typing import Literal
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.planning.poses.iso9283 import Cube
+from truearm.simulated import Marked
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +136,11 @@ class PerformancePlan:
     rated_velocity: float
     limit_band: float = 0.1e-3
     hours: float = 8.0
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``robot``, if it was planned for a robot that was calibrated with simulated measurements."""
+        return self.robot.simulated_from
 
     def test(self, test: str) -> PlannedTest | None:
         """Return what is planned for a test, None if nothing is."""

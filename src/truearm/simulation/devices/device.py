@@ -145,7 +145,8 @@ def measured_with(
             allowed="1 configuration or more, deviation 0 or more",
         )
     twin, placed = seen_by(device, nominal, twin)
-    return device.campaign(placed, _InOrder(twin), count, device.sigma if sigma is None else sigma, rng)
+    data = device.campaign(placed, _InOrder(twin), count, device.sigma if sigma is None else sigma, rng)
+    return replace(data, simulated=True)
 
 
 def seen_by(device: Device, nominal: Robot, twin: Twin) -> tuple[Twin, Robot]:

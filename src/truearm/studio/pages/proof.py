@@ -12,6 +12,7 @@ from truearm.files import exists, read_text
 from truearm.measurement.excluded import read_exclusions
 from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES
+from truearm.simulated import said_of
 from truearm.studio import words
 from truearm.studio.made_with import MadeWith, made_with
 from truearm.studio.pages.choices import NONE, offer
@@ -66,8 +67,9 @@ class ProofPage:
             return
         result = _read_result(folder / "result.json")
         try:
-            made = made_with(result, self._window.calibrated())
-            shown_figures = words.lines([f"Of {made.line()}.", f"Status: {result['status']}"]) + figures_table(result)
+            made, marks = made_with(result, self._window.calibrated()), said_of(result.get("simulated_parts", ()))
+            about = [*marks, f"Of {made.line()}.", f"Status: {result['status']}"]
+            shown_figures = words.lines(about) + figures_table(result)
             warnings = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
             now, told = words.notices(self._differing(result, made)), words.notices(warnings)
             told += words.lines(f"Next: {step['message']}" for step in result.get("next", ()))

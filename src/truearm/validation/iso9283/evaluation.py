@@ -13,6 +13,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.transform import homogeneous
 from truearm.planning.iso9283.criteria import CRITERIA, TESTS
 from truearm.planning.iso9283.planned import PerformancePlan, PlannedTest
+from truearm.simulated import Marked
 from truearm.validation.iso9283.alignment import Alignment
 from truearm.validation.iso9283.compliance import PushLine, evaluate_pushes
 from truearm.validation.iso9283.corners import CornerCurves, corner_values
@@ -57,6 +58,11 @@ class Measurements:
     settling: Samples | None = None
     forces: Pushes | None = None
 
+    @property
+    def simulated(self) -> bool:
+        """Whether a virtual instrument read any of them."""
+        return any(one is not None and one.simulated for one in (self.poses, self.paths, self.settling, self.forces))
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -78,6 +84,8 @@ class Evaluation:
         Places that have no value in tests that were measured, in words.
     readings
         The instrument as its readings stand in each file: by the names of :class:`Measurements`.
+    simulated
+        Whether a virtual instrument read any of them.
     """
 
     values: tuple[Value, ...]
@@ -94,6 +102,12 @@ class Evaluation:
     wild_pushes: tuple[WildPush, ...] = ()
     missing: tuple[str, ...] = ()
     readings: Mapping[str, Instrument] = field(default_factory=dict)
+    simulated: bool = False
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``, if a virtual instrument read any of it."""
+        return ("data",) if self.simulated else ()
 
 
 def evaluated(
@@ -205,6 +219,7 @@ def evaluated(
         wild_pushes(pushes, readings.get("forces", instrument)),
         (*missing, *dict.fromkeys(one.words for one in absent)),
         readings,
+        measured.simulated,
     )
 
 

@@ -109,6 +109,7 @@ def poses_of(stands: Sequence[Stand], frames: Array, tracker: Tracker, rng: np.r
         turned @ frames[:, :3, :3],
         np.arange(2, n + 2),
         "simulated poses",
+        simulated=True,
     )
 
 
@@ -137,6 +138,7 @@ def samples_of(streams: Sequence[Stream], source: str) -> Samples:
         rotation,
         np.arange(2, n + 2),
         source,
+        simulated=True,
     )
 
 
@@ -151,4 +153,5 @@ def pushes_of(pushed: Sequence[Pushed]) -> Pushes:
         np.concatenate([p.position for p in pushed]),
         np.arange(2, sum(counts) + 2),
         "simulated forces",
+        simulated=True,
     )

@@ -143,6 +143,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
             for name, tool in content.tools.items()
         },
         history=tuple(content.history),
+        simulated=content.simulated,
     )
     check_anchors(robot, where)
     return _with_values(_with_controller(robot, content, where), content, where)

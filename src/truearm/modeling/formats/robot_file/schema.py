@@ -241,4 +241,5 @@ class RobotFile(_Entry):
     parameters: dict[str, ParameterEntry] = {}
     joint_curves: list[CurveEntry] = []
     proof: ProofEntry | None = None
+    simulated: Annotated[bool, Field(strict=True)] = False
     history: list[str] = []

@@ -216,6 +216,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
         ]
     if robot.proof is not None:
         content["proof"] = _proof(robot, robot.proof, flow, listed, text)
+    if robot.simulated:
+        content["simulated"] = True
     if robot.history:
         content["history"] = list(robot.history)
     return content

@@ -22,10 +22,13 @@ POSES = (
     "def a():\n  set_tcp(p[0,0,0,0,0,0])\n"
     "  movel(p[-0.5, -0.3, 0.4, 0, 3.1, 0])\n  movel(p[-0.5, -0.2, 0.4, 0, 3.1, 0])\nend\n"
 )
-JOINTS = "def a():\n  set_tcp(p[0,0,0,0,0,0])\n  movej([0.1, -1.2, 1.3, -1.5, -1.5, 0.2])\nend\n"
+JOINTS = (
+    "def a():\n  set_tcp(p[0,0,0,0,0,0])\n"
+    "  movej([0.1, -1.2, 1.3, -1.5, -1.5, 0.2])\n  movej([0.3, -1.2, 1.3, -1.5, -1.5, 0.2])\nend\n"
+)
 RAPID = (
     "MODULE a\n  CONST robtarget p1:=[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
-    "  PROC main()\n    MoveL p1,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
+    "  PROC main()\n    MoveL p1,v100,fine,tool0;\n    MoveL Offs(p1,0,90,0),v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
 )
 
 
@@ -72,7 +75,7 @@ def test_joints_do_not_pass_through_kinematics(kinematics: str, tmp_path: Path) 
     made = truearm.compensate(worn("ur10", kinematics), job)  # nothing is corrected, so nothing is asked either
     assert made.files[0].text == job[0].read_bytes()
     told = compensate(worn("ur10", kinematics), job, controller_kinematics=None, joint_targets="correct")
-    assert told.files[0].corrected == 1
+    assert told.files[0].corrected == 2
 
 
 def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path) -> None:
@@ -100,7 +103,7 @@ def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path)
             truearm.compensate(worn("irb120"), job, out=out, **answered)
         assert refusal.value.parameter == left
     made = compensate(worn("irb120"), job, out=out)
-    assert made.files[0].corrected == 1
+    assert made.files[0].corrected == 2
     assert made.files[0].text == compensate(worn("irb120", "nominal"), job).files[0].text
 
 
@@ -117,7 +120,7 @@ def test_a_cell_file_keeps_the_answers(tmp_path: Path) -> None:
     ):
         assert (kept.files[0].text, kept.applied()["taught"]) == (told.files[0].text, [])
         assert kept.applied()["controller"] == told.applied()["controller"]
-    assert truearm.compensate(worn("irb120"), job, tools=cell, taught=["points"]).files[0].corrected == 0
+    assert truearm.compensate(worn("irb120"), job, tools=cell, taught=["points"]).files[0].kept == {"taught": 1}
     other.write_text(f"{CELL}taught: [points]\n")
     with pytest.raises(InputError, match="two files answer this differently"):
         truearm.compensate(worn("irb120"), job, tools=cell, frames=other)

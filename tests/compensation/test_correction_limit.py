@@ -128,7 +128,7 @@ def test_a_frame_with_a_slip_is_refused_before_anything_is_written(tmp_path: Pat
     accepted = str(refused).rpartition("`accept_correction=")[2].partition("`")[0]
     with pytest.raises(InputError, match="larger than what was accepted"):
         truearm.compensate(longer(), [program], accept_correction="90mm,3deg", **given)
-    made = truearm.compensate(longer(), [program], accept_correction=accepted, **given)
+    made = truearm.compensate(longer(), [program], accept_correction=accepted, accept=["skipped"], **given)
     assert [notice.level for notice in made.warnings if notice.code == "corrections-large"] == ["warning"]
     assert f"accept_correction='{accepted}'" in made.command
     assert out.exists()

@@ -98,8 +98,9 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
 def without_comment(text: str) -> str:
     lines = text.splitlines(keepends=True)
     first = next(number for number, line in enumerate(lines) if MARK in line)
-    assert all(line.lstrip().startswith("!") for line in lines[first : first + 3])
-    return "".join(lines[:first] + lines[first + 3 :])
+    behind = next(number for number in range(first, len(lines)) if not lines[number].lstrip().startswith("!"))
+    assert behind >= first + 3
+    return "".join(lines[:first] + lines[behind:])
 
 
 def with_a_line(text: str) -> str:

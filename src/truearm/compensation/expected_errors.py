@@ -147,7 +147,7 @@ class DrawnErrors:
             return None
         lengths = np.where(corrected[self.rows][mine, None], self.after[mine], self.before[mine])
         low, high = np.percentile(lengths.mean(axis=0), _INTERVAL)
-        return float(low), float(high)
+        return float(low), max(float(high), REPEATABILITY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,11 +173,8 @@ class ExpectedErrors:
     drawn: DrawnErrors
 
     def at_least(self, least: float) -> ExpectedErrors:
-        """Return it with no distance below one [m]."""
-        drawn = replace(
-            self.drawn, before=np.maximum(self.drawn.before, least), after=np.maximum(self.drawn.after, least)
-        )
-        return replace(self, before=np.maximum(self.before, least), after=np.maximum(self.after, least), drawn=drawn)
+        """Return it with no mean distance below one [m]."""
+        return replace(self, before=np.maximum(self.before, least), after=np.maximum(self.after, least))
 
     def of_some(self, rows: NDArray[np.intp], count: int) -> ExpectedErrors:
         """Return it for `count` targets, of which these are the ones in `rows`; NaN for the others."""

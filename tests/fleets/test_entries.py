@@ -33,7 +33,7 @@ def table(folder: Path, text: str, options: str = "{}") -> Path:
 
 def test_options_are_those_that_calibrate_takes() -> None:
     keywords = {name for name, p in inspect.signature(truearm.calibrate).parameters.items() if p.kind is p.KEYWORD_ONLY}
-    assert set(OPTIONS) == keywords - {"out", "notes", "command", "progress"}
+    assert set(OPTIONS) == keywords - {"out", "replace", "notes", "command", "progress"}
 
 
 def test_a_table_gives_every_robot_its_options(folder: Path) -> None:

@@ -40,7 +40,7 @@ def judged(old: Array, new: Array, joints: Array | None = None) -> list[tuple[st
     n = len(old)
     data = Dataset(
         labels=tuple(map(str, range(n))),
-        joints=np.arange(n)[:, None] * 0.1 if joints is None else joints,
+        joints=np.asarray(np.arange(n)[:, None] if joints is None else joints, dtype=np.float64),
         joint_kinds=("revolute",),
         targets=("1",),
         configuration=np.arange(n),
@@ -48,8 +48,8 @@ def judged(old: Array, new: Array, joints: Array | None = None) -> list[tuple[st
         position=np.zeros((n, 3)),
         source="x.csv",
     )
-    errors = [Errors(n, size[:, None] * np.array([1e-3, 0.0, 0.0]), None) for size in (old, new)]
-    return [(notice.code, notice.level) for notice in check_gain(*errors, data)]
+    before, after = (Errors(n, size[:, None] * np.array([1e-3, 0.0, 0.0]), None) for size in (old, new))
+    return [(notice.code, notice.level) for notice in check_gain(before, after, data)]
 
 
 def test_pairs_tell_gain_loss_and_neither() -> None:

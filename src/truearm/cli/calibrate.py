@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -116,44 +118,51 @@ def calibrate(
     Writes calibrated.yaml, result.json, report.html and calibrated.urdf into DIR.
     """
     from truearm.jobs.calibrate import calibrate as run
-    from truearm.results.standing import ResultKeptError
 
-    try:
-        with progress() as say:
-            calibration = run(
-                robot,
-                data,
-                out=out,
-                model=model,
-                train=read_train(train),
-                seed=seed,
-                loss=loss,  # type: ignore[arg-type]
-                redundancy=redundancy,  # type: ignore[arg-type]
-                bounds=bounds,
-                hold=[name.strip() for text in hold or () for name in text.split(",")],
-                frames=frames,
-                bootstrap=bootstrap,
-                effects=effects or (),
-                payload=payload,
-                gravity=read_gravity(gravity),
-                base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
-                without=[name.strip() for text in without or () for name in text.split(",")],
-                exclude=exclude,
-                monte_carlo=monte_carlo,
-                zones=_number_or(zones),
-                notes=read_notes(notes),
-                replace=replace,
-                command=command_line(),
-                progress=say,
-            )
-    except ResultKeptError as kept:
-        _print(kept.calibration, json=json)
-        raise
+    with _told_if_kept(json=json), progress() as say:
+        calibration = run(
+            robot,
+            data,
+            out=out,
+            model=model,
+            train=read_train(train),
+            seed=seed,
+            loss=loss,  # type: ignore[arg-type]
+            redundancy=redundancy,  # type: ignore[arg-type]
+            bounds=bounds,
+            hold=[name.strip() for text in hold or () for name in text.split(",")],
+            frames=frames,
+            bootstrap=bootstrap,
+            effects=effects or (),
+            payload=payload,
+            gravity=read_gravity(gravity),
+            base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
+            without=[name.strip() for text in without or () for name in text.split(",")],
+            exclude=exclude,
+            monte_carlo=monte_carlo,
+            zones=_number_or(zones),
+            notes=read_notes(notes),
+            replace=replace,
+            command=command_line(),
+            progress=say,
+        )
     _print(calibration, json=json)
     if not json:
         print_line(f"Written to {out}: {', '.join(calibration.files)}")
     if not calibration.finished:
         raise typer.Exit(3)
+
+
+@contextmanager
+def _told_if_kept(*, json: bool) -> Iterator[None]:
+    """Print what a calibration says also where it is not written, because a sound result stays."""
+    from truearm.results.standing import ResultKeptError
+
+    try:
+        yield
+    except ResultKeptError as kept:
+        _print(kept.calibration, json=json)
+        raise
 
 
 def _print(calibration: Calibration, *, json: bool) -> None:

@@ -191,10 +191,8 @@ def flange_spread(robot: Robot, *, taught: bool = False) -> Array:
         ``(6, 6)``: translation and rotation vector of the flange in its own axes [m, rad], by independent numbers of
         deviation 1, one for each; see :func:`flange_draws`.
     """
-    length, angle, zero = (
-        _found_accuracy(robot, group, unit)
-        for group, unit in (("geometry", "m"), ("geometry", "rad"), ("joint zero", "rad"))
-    )
+    length, angle = _found_accuracy(robot, "geometry", "m"), _found_accuracy(robot, "geometry", "rad")
+    zero = _found_accuracy(robot, "joint zero", "rad")
     size = np.array([length, length, 2.0 * length, angle, angle, 2.0 * zero]) / math.sqrt(2.0)
     freedom = np.eye(6) if taught else _flange_freedom(robot)
     within = (freedom / size[:, None] ** 2).T

@@ -17,6 +17,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tests.simulated import campaign
 
+from truearm.compensation.advice import check_correction
 from truearm.compensation.cell import Cell, Placed
 from truearm.compensation.chosen_targets import Choice
 from truearm.compensation.expected_errors import REPEATABILITY
@@ -170,6 +171,20 @@ def test_what_the_flange_does_not_move_is_promised_as_sharply_as_before(spread: 
     assert sum(one.held for one in made) >= ROBOTS - 2
     assert max(one.expected for one in made) == REPEATABILITY
     assert max(one.missed for one in made) < 0.01e-3
+
+
+def test_notices_say_that_the_tool_is_not_known() -> None:
+    robot = cell(0).robot
+    one = RAPID.read([Source(Path("p.mod"), program(20, np.random.default_rng(5000)))])
+    told = {}
+    for name, arm in (("known", robot), ("unproven", replace(robot, proof=None))):
+        result = corrected_programs(arm, [one], Cell({}, {}), choice=Choice(taught=frozenset()))
+        told[name] = {notice.code: notice.message for notice in check_correction(arm, result)}
+    assert told["known"]["tools-assumed"].endswith(
+        "No reading tells where it really is; the errors to expect contain that."
+    )
+    assert "give `tools`, or measure more" in told["known"]["not-better-here"]
+    assert "errors to expect" not in told["unproven"]["tools-assumed"]
 
 
 def test_the_flange_is_as_uncertain_as_the_arm_is_found_to_be_inaccurate() -> None:

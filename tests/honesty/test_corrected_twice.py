@@ -98,8 +98,8 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
 def without_comment(text: str) -> str:
     lines = text.splitlines(keepends=True)
     first = next(number for number, line in enumerate(lines) if MARK in line)
-    behind = next(number for number in range(first, len(lines)) if not lines[number].lstrip().startswith("!"))
-    assert behind >= first + 3
+    behind = first + 3 + ("SIMULATED" in lines[first + 3])
+    assert all(line.lstrip().startswith("!") for line in lines[first:behind])
     return "".join(lines[:first] + lines[behind:])
 
 

@@ -22,6 +22,8 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import counted, listed
 
+#: Orientations are alike that differ by less [rad].
+_TURNED: Final = 0.01
 #: With so few targets and no frame, a correction without a mean is no correction.
 _FEW_TARGETS: Final = 3
 _LISTED: Final = 5
@@ -148,9 +150,17 @@ def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
         f"They need {beyond} outside of what was measured: measure there."
         if beyond
         else "The corrections are small beside what is known of them: "
-        f"{'give `tools`, or ' * (result.frames.tools == 'assumed')}measure more configurations near the program."
+        f"{'give `tools`, or ' * _flange_counts(result)}measure more configurations near the program."
     )
     return [Notice("not-better-here", words)]
+
+
+def _flange_counts(result: CorrectedPrograms) -> bool:
+    """Return whether it counts in programs where on the flange tools are that were not measured."""
+    judged = [(one, np.isfinite(one.expected.before)) for one in result.corrections if one.expected is not None]
+    turns = np.concatenate([one.before[rows, :3, :3] for one, rows in judged])
+    alike = result.frames.frames == "assumed" and np.allclose(turns, turns[0], atol=_TURNED)
+    return result.frames.tools == "assumed" and not alike
 
 
 def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:

@@ -370,7 +370,9 @@ def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: Cor
         turns = np.linalg.norm(turns_between(np.broadcast_to(np.eye(4), bases.shape), bases), axis=1)
         limit = limit.beside(float(turns.max(initial=0.0)))
     shared = shared_motion([one.motions(some) for one, some in rows])
-    common = "" if shared is None else f"All targets share a shift of {shared.moved * 1e3:.2f} mm. "
+    common = ""
+    if shared is not None and result.frames.frames != "assumed":
+        common = f"All targets share a shift of {shared.moved * 1e3:.2f} mm. "
     return check_size(
         np.concatenate([one.moved[some] for one, some in rows]),
         np.concatenate([one.turned[some] for one, some in rows]),

@@ -379,9 +379,8 @@ def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: Cor
         limit,
         accepted,
         where=lambda row: place(programs[row], targets[row]),
-        check=f"{common}Usual causes are a frame or a tool that is elsewhere or turned otherwise than the file says, "
-        "numbers of the controller for them that are not those of this program, and a wrong unit or convention of "
-        "angles.",
+        check=f"{common}Check where frame and tool were measured and how they are turned (a target that is a point does "
+        "not say it), the numbers that the controller has for them, units, conventions of angles, and the load.",
         parameter=", ".join(given) or "programs",
     )
 

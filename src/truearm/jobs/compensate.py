@@ -379,8 +379,8 @@ def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: Cor
         limit,
         accepted,
         where=lambda row: place(programs[row], targets[row]),
-        check=f"{common}Check where frame and tool were measured and how they are turned (a target that is a point does "
-        "not say it), the numbers that the controller has for them, units, conventions of angles, and the load.",
+        check=f"{common}Check where frame and tool were measured and how they are turned (a target that is a point "
+        "does not say it), the numbers that the controller has for them, units, conventions of angles, and the load.",
         parameter=", ".join(given) or "programs",
     )
 

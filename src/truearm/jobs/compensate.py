@@ -399,16 +399,17 @@ def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: Cor
         turns = np.linalg.norm(turns_between(np.broadcast_to(np.eye(4), bases.shape), bases), axis=1)
         limit = limit.beside(float(turns.max(initial=0.0)))
     shared = shared_motion([one.motions(some) for one, some in rows])
-    common = "" if shared is None else f"All targets share a shift of {shared.moved * 1e3:.2f} mm. "
+    common = ""
+    if shared is not None and result.frames.frames != "assumed":
+        common = f"All targets share a shift of {shared.moved * 1e3:.2f} mm. "
     return check_size(
         np.concatenate([one.moved[some] for one, some in rows]),
         np.concatenate([one.turned[some] for one, some in rows]),
         limit,
         accepted,
         where=lambda row: place(programs[row], targets[row]),
-        check=f"{common}Usual causes are a frame or a tool that is elsewhere or turned otherwise than the file says, "
-        "numbers of the controller for them that are not those of this program, and a wrong unit or convention of "
-        "angles.",
+        check=f"{common}Check where frame and tool were measured and how they are turned (a target that is a point "
+        "does not say it), the numbers that the controller has for them, units, conventions of angles, and the load.",
         parameter=", ".join(given) or "programs",
     )
 

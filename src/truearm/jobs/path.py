@@ -227,7 +227,7 @@ def _check_size(followed: CorrectedPath, limit: CorrectionLimit, accepted: Corre
         limit,
         accepted,
         where=lambda row: f"{followed.planned.source}, {trajectory.distance[row] * 1e3:.1f} mm along the path",
-        check="Usual causes are a payload or a force that the arm does not carry, and a calibration of another robot.",
+        check="Check the payload, the force, and that the calibration is of this robot.",
         parameter="file",
     )
 

@@ -77,7 +77,8 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
     run = truearm("calibrate", "irb120", small / "data.csv", "--model", "geometric", "--out", out, "--json")
     assert run.code == 0
     summary = json.loads(run.out)
-    assert list(summary) == ["status", "warnings", "next", "nominal", "train", "validation", "expected_mm"]
+    marks = ["simulated", "simulated_parts"]
+    assert list(summary) == [*marks, "status", "warnings", "next", "nominal", "train", "validation", "expected_mm"]
     assert summary["status"] == "converged"
     assert (summary["train"]["configurations"], summary["validation"]["configurations"]) == (28, 12)
     assert summary["nominal"]["configurations"] == 12
@@ -225,7 +226,8 @@ def test_too_alike_data_end_with_exit_code_3(truearm: Truearm, small: Path, tmp_
 
 def test_example_is_a_session_that_runs(truearm: Truearm, tmp_path: Path) -> None:
     folder = tmp_path / "session"
-    listed = truearm("example", folder).out.split()
+    mark, *listed = truearm("example", folder).out.splitlines()
+    assert mark == "SIMULATED: measurements of a virtual instrument, not of a robot."
     assert sorted(Path(p).name for p in listed) == ["check.csv", "measurements.csv", "my_robot.yaml", "session.sh"]
     assert truearm("show", folder / "my_robot.yaml").code == 0
     run = truearm("calibrate", folder / "my_robot.yaml", folder / "measurements.csv", "--out", folder / "result")

@@ -220,7 +220,8 @@ def test_distances(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     run = truearm("distances", tmp_path / "calibrated.yaml", data, "--json")
     assert run.code == 0
     found = json.loads(run.out)
-    assert list(found) == ["configurations", "pairs", "distance_mm", "positive", "histogram"]
+    keys = ["configurations", "pairs", "distance_mm", "positive", "histogram"]
+    assert list(found) == ["simulated", "simulated_parts", *keys]
     assert list(found["distance_mm"]) == ["mean", "deviation", "max"]
     assert (found["configurations"], found["pairs"]) == (40, 120 * 119 // 2 - 40 * 3)
     assert sum(found["histogram"]["counts"]) == found["pairs"]

@@ -29,7 +29,8 @@ def test_both_stages_from_files_into_files(truearm: Truearm, campaign: Path, tmp
     run = truearm("tilting", "katana450", *files, "--out", tmp_path, "--json")
     assert run.code == 0, run.err
     told = json.loads(run.out)
-    assert list(told) == ["status", "warnings", "inclinations", "constants", "geometry", "geometry_alone"]
+    keys = ["status", "warnings", "inclinations", "constants", "geometry", "geometry_alone"]
+    assert list(told) == ["simulated", "simulated_parts", *keys]
     assert told["inclinations"]["pairs"] == 12
     assert told["inclinations"]["pushed"] == 16
     after, alone = (told[key]["validation"]["position_mm"]["mean"] for key in ("geometry", "geometry_alone"))

@@ -87,7 +87,7 @@ def test_lines_are_planned_tried_and_judged(found: AxisCalibration, tmp_path: Pa
     assert tried.compensated
     assert np.abs(tried.joints - plan.joints).max() > 1e-4
     assert min(line["reduction_percent"] for line in tried.summary()["lines"]) > 95.0
-    assert len(tried.lines()) == 7
+    assert len(tried.lines()) == 8
 
 
 def test_measured_lines_are_judged_by_the_frames_of_the_joint_errors(found: AxisCalibration) -> None:

@@ -337,7 +337,7 @@ def test_orientations_that_are_degrees_off_are_said(small: Arguments) -> None:
     place = header.index("qw")
     q = np.array([row[place : place + 4] for row in rows], dtype=float)
     turned = quaternion_from_rotation(rotation_from_quaternion(q) @ rotation_from_vector(np.array([0, 0, 0.1])))
-    lines = [",".join([*row[:place], *map(str, one)]) for row, one in zip(rows, turned, strict=True)]
+    lines = [",".join([*row[:place], *map(str, one), *row[place + 4 :]]) for row, one in zip(rows, turned, strict=True)]
     small["poses"].write_text("\n".join([",".join(header), *lines]) + "\n")
     off = truearm.iso9283_evaluate(small["plan"], **given, alignment=small["alignment"])
     (said,) = [notice for notice in off.warnings if notice.code == "orientation-far-off"]

@@ -79,10 +79,10 @@ def test_the_files_have_the_columns_and_units_that_are_read(tmp_path: Path) -> N
     texts = {path.name: path.read_text().splitlines() for path in (tmp_path / "run").iterdir()}
     place, turn = "x [mm],y [mm],z [mm]", "qw,qx,qy,qz"
     shares = "velocity [%],load [%],time [s]"
-    assert texts["poses.csv"][0] == f"criterion,robot,pose,cycle,approach,{shares},{place},{turn}"
-    assert texts["paths.csv"][0] == f"criterion,path,cycle,{shares},{place},{turn}"
-    assert texts["settling.csv"][0] == f"criterion,pose,cycle,time [s],{place}"
-    assert texts["forces.csv"][0] == f"direction,force [N],cycle,{place}"
+    assert texts["poses.csv"][0] == f"criterion,robot,pose,cycle,approach,{shares},{place},{turn},simulated"
+    assert texts["paths.csv"][0] == f"criterion,path,cycle,{shares},{place},{turn},simulated"
+    assert texts["settling.csv"][0] == f"criterion,pose,cycle,time [s],{place},simulated"
+    assert texts["forces.csv"][0] == f"direction,force [N],cycle,{place},simulated"
     assert texts["alignment.yaml"][1] == "truearm: truearm-alignment/1"
     rows = {name: len(lines) - 1 for name, lines in texts.items() if name.endswith(".csv")}
     assert rows == {f"{name}.csv": count for name, count in found.summary()["rows"].items()}

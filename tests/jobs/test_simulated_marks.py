@@ -294,6 +294,15 @@ def test_of_a_robot_and_measurements_it_is_said_which_are_simulated(calibrated: 
     assert truearm.validate(robot, marked).summary()["simulated_parts"] == ["data", "robot"]
 
 
+def test_real_measurements_do_not_wash_a_robot_clean(calibrated: tuple[Robot, Dataset]) -> None:
+    robot, data = calibrated
+    again = truearm.calibrate(robot, data, model="frames", train="all")
+    assert again.summary()["simulated_parts"] == ["robot"]
+    assert again.robot.simulated
+    assert truearm.check(robot, data).summary()["simulated_parts"] == ["robot"]
+    assert not told(truearm.check("irb120", data))
+
+
 def test_what_truearm_simulates_for_itself_marks_nothing(calibrated: tuple[Robot, Dataset]) -> None:
     data = calibrated[1]
     found = truearm.calibrate("irb120", data, model="offsets", train="all", monte_carlo=100)

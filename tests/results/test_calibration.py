@@ -56,7 +56,8 @@ def test_residuals_as_a_data_frame(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_text_is_what_the_command_prints_and_is_short() -> None:
     text = repr(run(28))
-    assert text.startswith("On 12 configurations the fit has not seen:\n  nominal     mean ")
+    mark = "SIMULATED: measurements of a virtual instrument, not of a robot.\n"
+    assert text.startswith(f"{mark}On 12 configurations the fit has not seen:\n  nominal     mean ")
     assert "Status: converged." in text
     assert run(28)._repr_html_() == f"<pre>{text}</pre>".replace("'", "&#x27;")
     for record in (run(28), run(28).residuals()):

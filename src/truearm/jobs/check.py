@@ -22,6 +22,7 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.data_check import DataCheck
 from truearm.shown import counted
+from truearm.simulated import parts_of
 
 
 def check(
@@ -62,11 +63,11 @@ def check(
             "there is no reading", parameter="data", where=measured.source, cure="Fill in x, y and z, or distance."
         )
     noticed, fit, part = _compared(measured, against, device, excluded=count_excluded(excluded))
-    noticed = (*noticed, *excluded_notices(excluded))
+    noticed, marks = (*noticed, *excluded_notices(excluded)), parts_of((measured, against))
     if fit is None or part is None:
-        return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None))
+        return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None), marks)
     steps = steps_after_check(noticed, LeftOver.of(fit, part), errors_of(fit.robot, part))
-    return DataCheck(measured, noticed, steps)
+    return DataCheck(measured, noticed, steps, marks)
 
 
 def notices_of(

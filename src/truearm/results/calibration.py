@@ -51,6 +51,7 @@ from truearm.results.summaries import (
 )
 from truearm.results.zones import ZONES_FILE, ZoneChoice, robot_file_of, zone_files
 from truearm.shown import counted, listed
+from truearm.simulated import Marked
 from truearm.units import SHOWN_AS, from_si
 from truearm.writing import output_folder, write_files
 
@@ -128,6 +129,11 @@ class Calibration(Record):
     next: tuple[NextStep, ...] = ()
     monte_carlo: SimulatedCalibrations | None = None
     zones: ZoneChoice | None = None
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``, or ``robot`` where it was calibrated with simulated measurements before."""
+        return self.data.simulated_from or self.fit.robot.simulated_from
 
     @cached_property
     def robot(self) -> Robot:

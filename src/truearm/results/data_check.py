@@ -10,6 +10,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import listed
+from truearm.simulated import Marked
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,11 +25,14 @@ class DataCheck(Record):
         One notice for each kind of fault; none for believable data.
     next
         What to do next, three steps at most, the most useful first.
+    simulated_from
+        What of measurements and robot comes from a virtual instrument.
     """
 
     data: Dataset
     warnings: tuple[Notice, ...]
     next: tuple[NextStep, ...] = ()
+    simulated_from: tuple[Marked, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""

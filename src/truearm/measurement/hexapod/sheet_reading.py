@@ -20,9 +20,10 @@ from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cell
 from truearm.measurement.readers.rows import found_configurations
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_columns import JOINT_COLUMN, joint_names
+from truearm.simulated import COLUMN as SIMULATED
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
-_PLAIN: Final = ("configuration", "place", "pose", "branch", "side", "design", "solution", "attachment")
+_PLAIN: Final = ("configuration", "place", "pose", "branch", "side", "design", "solution", "attachment", SIMULATED)
 _LENGTHS: Final = (*FIXTURES, *TO_FOURTH, *LEGS, *FOURTH_LEGS)
 _NEEDED: Final = ("configuration", "design", "solution", *FIXTURES, *LEGS)
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")

@@ -114,7 +114,9 @@ def _configurations(sheets: Sequence[Sheet], labels: tuple[str, ...]) -> Configu
     if not parts:
         return None
     joints = np.vstack([part.joints for part in parts])
-    return Configurations(labels, joints, parts[0].kinds, np.arange(len(labels)), parts[0].joints_are)
+    simulated = any(part.simulated for part in parts)
+    rows = np.arange(len(labels))
+    return Configurations(labels, joints, parts[0].kinds, rows, parts[0].joints_are, simulated=simulated)
 
 
 def _refuse_moved(sheet: Sheet, place: str) -> None:

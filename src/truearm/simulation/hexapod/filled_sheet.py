@@ -11,6 +11,8 @@ from truearm.measurement.hexapod.geometry import DEVICE, triangle
 from truearm.measurement.hexapod.sheet import PlannedRow, sheet_csv
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import Transform
+from truearm.simulated import COLUMN as SIMULATED
+from truearm.simulated import YES
 from truearm.simulation.hexapod.simulated import Ballbar, measured_legs, measured_sides
 from truearm.simulation.hexapod.tool_changer import ToolChanger
 from truearm.simulation.twin import Twin
@@ -79,4 +81,5 @@ def filled_sheet(
         legs = measured_legs(bar, row.design, feet[list(SIDES_OF_FOUR[row.side - 1])], cups)
         names = dict(zip(row.design.leg_names, row.leg_names, strict=True))
         lengths.append(read | {names[name]: length for name, length in legs.items()})
-    return sheet_csv(rows, twin.robot.joints, lengths)
+    heading, *filled = sheet_csv(rows, twin.robot.joints, lengths).splitlines()
+    return "\n".join([f"{heading},{SIMULATED}", *(f"{line},{YES}" for line in filled)]) + "\n"

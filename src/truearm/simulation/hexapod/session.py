@@ -168,6 +168,7 @@ def joined(a: Dataset, b: Dataset) -> Dataset:
         number=part("number"),
         temperature=part("temperature"),
         wrench=part("wrench"),
+        simulated=a.simulated or b.simulated,
     )
 
 

@@ -206,7 +206,8 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
     }
     drawn = (curves, offsets) if same_tie else ({}, {})
     told = {why: tuple(ids) for why, ids in unlike.items()}
-    return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)), told, second.plan is None, *drawn)
+    called = f"{other} (simulated)" if second.simulated and not first.simulated else str(other)
+    return Comparison(called, tuple(rows), tuple(dict.fromkeys(left)), told, second.plan is None, *drawn)
 
 
 def _unlike(

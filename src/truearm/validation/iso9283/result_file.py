@@ -91,6 +91,7 @@ class ResultFile(BaseModel):
 
     model_config = _LENIENT
     truearm: Literal["truearm-iso9283-result/1"]
+    simulated: bool = False
     robot: str
     alignment: _Tie
     instrument: InstrumentOfResult | None = None

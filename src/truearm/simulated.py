@@ -24,8 +24,8 @@ _WORDS: Final[Mapping[tuple[Marked, ...], str]] = {
 _LINES: Final = tuple(f"{WORD} {words}" for words in _WORDS.values())
 #: What programs for a robot that was calibrated so have as a comment; every language has room for it.
 IN_PROGRAMS: Final = "SIMULATED: no real calibration"
-#: The mark of data, and of a robot alone.
-DATA_LINE, ROBOT_LINE = _LINES[:2]
+#: The mark of a robot alone, as files have it in a comment.
+ROBOT_LINE: Final = _LINES[1]
 
 
 def parts_of(things: Iterable[object]) -> tuple[Marked, ...]:

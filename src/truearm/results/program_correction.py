@@ -223,8 +223,8 @@ class FileCorrection(Record):
             return ""
         return (
             f"{self.name}, common to its targets: shift {self.shared.moved * 1e3:.3f} mm, turn "
-            f"{math.degrees(self.shared.turned):.3f} deg, which frame and tool decide; remainder "
-            f"{self.shared.remainder * 1e3:.3f} mm on average, the robot"
+            f"{math.degrees(self.shared.turned):.3f} deg (check frame and tool); remainder "
+            f"{self.shared.remainder * 1e3:.3f} mm on average (errors of the robot)"
         )
 
     def lines(self) -> list[str]:

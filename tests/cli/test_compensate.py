@@ -178,7 +178,7 @@ def test_what_cannot_be_corrected_is_listed_and_refused_unless_accepted(truearm:
     assert code == 2
     assert "3 targets cannot be corrected, and the others would move without them" in said
     assert f"{program}, line 9: out of reach of the nominal robot" in said
-    assert "with --keep, or accept all of them with --accept skipped." in " ".join(said.split())
+    assert "with --keep; or accept all of them with --accept skipped." in " ".join(said.split())
     assert not (cell / "out").exists()
     code, said = run(truearm, cell, "--accept", "skipped")
     assert code == 0

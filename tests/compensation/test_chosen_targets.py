@@ -13,8 +13,10 @@ import pytest
 from tests.answered import compensate
 
 import truearm
+from truearm.compensation.chosen_targets import Patterns
 from truearm.compensation.fake_targets import matrices
 from truearm.compensation.program_correction import commanded
+from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.program import Source
 from truearm.compensation.programs.urscript import URSCRIPT
 from truearm.errors import InputError
@@ -335,3 +337,43 @@ def test_of_frames_that_were_taught_one_with_a_single_target_leaves_it(tmp_path:
     assert apart.files[0].kept == {"alone, with `frames` not given": 1}
     together = truearm.compensate(worn(), [program], **ANSWERED)
     assert sorted(corrected_lines(together)) == ["a", "b", "c", "d"]
+
+
+def test_a_program_of_which_all_was_taught_says_so_first_and_is_still_an_original(tmp_path: Path) -> None:
+    """It was written with a record, and refused as corrected already when somebody gave it again."""
+    program, out = tmp_path / "taught.mod", tmp_path / "out"
+    program.write_text("\n".join(line for line in plate(tmp_path).read_text().splitlines() if "Offs" not in line))
+    made = compensate(worn(), [program], taught=["points"], out=out)
+    assert made.lines()[0] == "Warning (nothing-corrected): Nothing was corrected: the programs are as they were."
+    assert (out / "taught.mod").read_bytes() == program.read_bytes()
+    again = compensate(worn(), [out / "taught.mod"])
+    assert again.files[0].corrected > 10
+    assert "nothing-corrected" not in {notice.code for notice in again.warnings}
+
+
+LS = """\
+/PROG  SEAM
+/MN
+   1:J P[1] 20% FINE    ;
+   2:L P[2:seam] 100mm/sec FINE    ;
+/POS
+P[1]{
+   GP1:
+\tUF : 0, UT : 0,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tX =   400.000  mm,\tY =    20.000  mm,\tZ =   350.000  mm,
+\tW =   180.000 deg,\tP =   -60.000 deg,\tR =   180.000 deg
+};
+P[2:"seam"]{
+   GP1:
+\tUF : 0, UT : 0,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tX =   400.000  mm,\tY =    80.000  mm,\tZ =   330.000  mm,
+\tW =   180.000 deg,\tP =   -60.000 deg,\tR =   180.000 deg
+};
+/END
+"""
+
+
+@pytest.mark.parametrize("name", ["P[2]", "P[2:seam]", "P[2*"])
+def test_a_position_of_fanuc_is_named_with_or_without_its_comment(name: str) -> None:
+    target = FANUC_LS.read([Source(Path("a.ls"), LS)])
+    assert [Patterns([target], [name], "keep").fit(one.name) for one in target.targets] == [False, True]

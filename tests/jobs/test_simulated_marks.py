@@ -101,7 +101,7 @@ def written(found: object, folder: Path) -> None:
 
 #: What files of a result say of themselves, by their kind: a pattern that is there once.
 SAYS = {
-    ".html": r'id="simulated"><strong>SIMULATED:</strong>',
+    ".html": r'simulated"><strong>SIMULATED:</strong>',
     ".json": r'"simulated": true',
     ".urdf": r"<!-- SIMULATED: ",
     ".mod": r"SIMULATED: no real calibration",
@@ -165,7 +165,7 @@ def test_a_corrected_program_its_record_and_its_report_say_it(simulated: Path, r
         record = json.loads((folder / "compensated" / "plate.mod.truearm.json").read_text())
         assert record["applied"].get("simulated", False) is marked
         page = (folder / "compensated" / "compensation.html").read_text()
-        assert page.count('id="simulated"') == marked
+        assert page.count('class="notice warning simulated"') == marked
 
 
 def test_what_commands_write_of_simulated_measurements_has_the_mark(tmp_path: Path) -> None:
@@ -324,4 +324,4 @@ def test_a_fleet_of_robots_one_of_which_is_simulated_says_so(tmp_path: Path) -> 
         out = tmp_path / f"out-{count}"
         assert told(truearm.fleet(manifest, out=out, workers=1)) is marked
         assert json.loads((out / "fleet.json").read_text()).get("simulated", False) is marked
-        assert (out / "report.html").read_text().count('id="simulated"') == marked
+        assert (out / "report.html").read_text().count('class="notice warning simulated"') == marked

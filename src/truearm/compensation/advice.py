@@ -53,7 +53,7 @@ def check_correction(
     count = sum(int(one.corrected.sum()) for one in corrections)
     if any(one.program.targets for one in corrections):
         alone = sum(why == ALONE for one in corrections for why in one.kept.values())
-        made = _nothing(alone) if alone and not count else _assumed(result)
+        made = _assumed(result) if count else _nothing(alone)
         made += _by_joints(corrections)
     else:
         made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
@@ -195,7 +195,9 @@ def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
 
 
 def _nothing(alone: int) -> list[Notice]:
-    """Say that no target can be corrected, because where the frame of the only one is is not known."""
+    """Say that no target was corrected, and why not if single ones were without a frame whose place is known."""
+    if not alone:
+        return [Notice(NOTHING_CORRECTED, "Nothing was corrected: the programs are as they were.")]
     left = "only one target is left to correct" if alone == 1 else f"{alone} targets are left, each alone in its frame"
     return [
         Notice(
@@ -313,8 +315,8 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
         ]
     else:
         said = [
-            "`frames` is not given. Calibration cannot know where a program's frames really are, so the base was "
-            f"shifted by {size(frames.base)} until the corrections of all targets have no shift and no turn in common: "
+            "No frame has a measured place (`frames`). Calibration cannot know where a program's frames really are, so "
+            f"the base was shifted by {size(frames.base)} until the corrections of all targets have no shift and no turn in common: "
             "targets are right to each other, and the pattern of their positions stays where it was. A work object "
             "that was located elsewhere than at its targets may be off by what the uncorrected robot missed there: "
             "give `frames`."
@@ -326,7 +328,11 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
             "The calibration held targets on the flange, so the program's tools are where the controller has them."
         )
     else:
-        given = "The tools were taught with this robot" if result.choice.was_taught("tools") else "`tools` is not given"
+        given = (
+            "The tools were taught with this robot"
+            if result.choice.was_taught("tools")
+            else "No tool has a measured place (`tools`)"
+        )
         said.append(
             f"{given}. The program's tools are taken to sit on a flange that agrees best with the nominal one all over "
             f"the workspace, {size(frames.flange)} from the identified one."

@@ -20,6 +20,8 @@ from truearm.errors import InputError, did_you_mean
 #: What may have been taught with the robot itself.
 Taught = Literal["points", "frames", "tools"]
 TAUGHT: Final[tuple[Taught, ...]] = ("points", "frames", "tools")
+#: What FANUC's programs write behind the number of a position: P[13:seam].
+_COMMENT: Final = re.compile(r":[^\]]*(?=\]$)")
 #: Why a target stays, in words for a count: ``3 <words>``.
 Kept = Literal[
     "given by joints", "taught", "not in `only`", "in `keep`", "not better corrected", "alone, with `frames` not given"
@@ -91,7 +93,8 @@ def taught_question(programs: Sequence[Program], choice: Choice) -> Question | N
         "taught",
         "Were the points of these programs computed off-line, or taught with this robot? Points that were taught are "
         "right already, and a correction moves them away.",
-        "`taught=none` (all was computed), or with what was taught: `taught=points`, `taught=frames`, `taught=tools`",
+        "`taught=none` (all was computed), or with what was taught: `taught=points`, `taught=frames`, `taught=tools`; "
+        "where only some points were taught, with `taught=none` and their names as `keep`",
         "A cell file keeps the answer (taught: [none]).",
     )
 
@@ -134,7 +137,7 @@ class Patterns:
         for text in given:
             # P[3] is a name of FANUC, and no pattern
             wanted = re.compile(translate(text.replace("[", "[[]")), re.IGNORECASE)
-            found = {name for name in names if wanted.match(name)}
+            found = {name for name in names if wanted.match(name) or wanted.match(_COMMENT.sub("", name))}
             if not found:
                 raise InputError(
                     "no target of the programs has this name",

@@ -309,10 +309,10 @@ def _original(path: Path, again: bool) -> bytes:
                 "this program was corrected already",
                 where=str(path),
                 came=f"the comment '{comment}'",
-                cure="Give the original. A program of 'truearm path' has none: run it as it is.",
+                cure="Give the original. A program that 'truearm path' wrote has no original: run it as it is.",
             )
         return content
-    if not again:
+    if not again and record.corrected_sha256 != record.original_sha256:  # otherwise nothing was corrected in it
         raise InputError(
             "this program was corrected already",
             where=str(path),
@@ -327,7 +327,8 @@ def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
         raise InputError(
             "this program was changed after it was corrected, so its record is no longer about it",
             where=str(path),
-            cure=f"Make the change in the original. If this is an original, remove {record_path(path).name}.",
+            cure=f"Make the change in the original, which the record holds, and correct that. If this is another program, "
+            f"move it away from {record_path(path).name}.",
         )
     original = _unpacked(record.original, record_path(path))
     if _hash(original) != record.original_sha256:

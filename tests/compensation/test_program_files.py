@@ -86,7 +86,9 @@ def test_a_program_changed_since_is_no_longer_what_its_record_says(tmp_path: Pat
     path = corrected(tmp_path)
     path.write_bytes(path.read_bytes() + b"! taught anew\r\n")
     for ask in (partial(program_files, [path], again=True), partial(restored, [path])):
-        with pytest.raises(InputError, match=r"changed after it was corrected.*remove m\.mod\.truearm\.json"):
+        with pytest.raises(
+            InputError, match=r"changed after it was corrected.*move it away from m\.mod\.truearm\.json"
+        ):
             ask()
 
 

@@ -327,8 +327,8 @@ def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
         raise InputError(
             "this program was changed after it was corrected, so its record is no longer about it",
             where=str(path),
-            cure=f"Make the change in the original, which the record holds, and correct that. If this is another program, "
-            f"move it away from {record_path(path).name}.",
+            cure="Make the change in the original, which the record holds, and correct that. If this is another "
+            f"program, move it away from {record_path(path).name}.",
         )
     original = _unpacked(record.original, record_path(path))
     if _hash(original) != record.original_sha256:

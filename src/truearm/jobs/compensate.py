@@ -427,8 +427,8 @@ def _refuse_skipped(result: CorrectedPrograms) -> None:
             f"{counted(len(skipped), 'target')} cannot be corrected, and the others would move without "
             f"{'it' if len(skipped) == 1 else 'them'} ({'; '.join(skipped[:_SHOWN])}{more})",
             parameter="programs",
-            cure="Check frame and tool; mend the program; leave a target as it is on purpose by its name with `keep`; or "
-            f"accept all of them with `accept={SKIPPED}`.",
+            cure="Check frame and tool; mend the program; leave a target as it is on purpose by its name with `keep`; "
+            f"or accept all of them with `accept={SKIPPED}`.",
         )
 
 

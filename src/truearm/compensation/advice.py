@@ -316,9 +316,10 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
     else:
         said = [
             "No frame has a measured place (`frames`). Calibration cannot know where a program's frames really are, so "
-            f"the base was shifted by {size(frames.base)} until the corrections of all targets have no shift and no turn "
-            "in common: targets are right to each other, and the pattern of their positions stays where it was. A work object "
-            "that was located elsewhere than at its targets may be off by what the uncorrected robot missed there: "
+            f"the base was shifted by {size(frames.base)} until the corrections of all targets have no shift and no "
+            "turn in common: targets are right to each other, and the pattern of their positions stays where it was. A "
+            "work object that was located elsewhere than at its targets may be off by what the uncorrected robot "
+            "missed there: "
             "give `frames`."
         ]
     if frames.tools == "identified":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
 from importlib.resources import files
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.answered import compensate
+from tests.simulated import campaign
 
 import truearm
 from truearm import InputError, Robot, writing
@@ -271,3 +273,26 @@ def test_the_program_of_a_path_is_remembered(tmp_path: Path) -> None:
         compensate(robot, [unmarked])
     (robot.parent / LEDGER).unlink()
     assert compensate(robot, [unmarked]).files[0].corrected > 3
+
+
+@pytest.mark.parametrize("change", [str.upper, lambda text: text.replace("corrected by", "Corrected  by")])
+def test_a_comment_is_known_in_other_letters_and_with_other_blanks(program: Path, change: Callable[[str], str]) -> None:
+    compensate(calibrated(), [program], out=program.parent / "out")
+    copy = program.parent / "copy.mod"
+    copy.write_text(change((program.parent / "out" / "plate.mod").read_text()))
+    with pytest.raises(InputError, match="corrected already"):
+        compensate(calibrated(), [copy])
+
+
+def test_what_stays_by_its_name_is_said_not_to_be_in_the_errors(program: Path) -> None:
+    robot = truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, 8)[1]).robot
+    said = "  Targets that stay because of `keep` or `only` are not in these errors."
+    assert said in compensate(robot, [program], keep=["pHole3"]).lines()
+    assert said not in compensate(robot, [program]).lines()
+
+
+def test_offsets_from_a_point_that_stays_and_is_out_of_reach_stay_with_it(program: Path) -> None:
+    program.write_text(program.read_text().replace("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]"))
+    (file,) = compensate(calibrated(), [program], keep=["pHole1"]).files
+    assert file.kept["in `keep`"] == 3
+    assert not file.skipped

@@ -271,8 +271,12 @@ class ResolvedProgram:
             reasons |= self._changed_turns(rows, joints, reasons)
             on_edge = self._on_edge(rows, joints, reasons)
             after[rows] = np.linalg.inv(self._base.nominal[rows]) @ found.flange @ self._tool.nominal[rows]
+        # An offset that cannot be corrected goes along with the point that it begins at, where that stays on purpose.
+        along = {row: self._kept[self._first(row)] for row in reasons if self._first(row) in self._kept}
+        reasons = {row: reason for row, reason in reasons.items() if row not in along}
+        kept = {**self._kept, **along}
         corrected = np.ones(count, dtype=bool)
-        corrected[[*reasons, *self._kept]] = False
+        corrected[[*reasons, *kept]] = False
         after[~corrected], joints[~corrected] = self._poses[~corrected], self._resolved.joints[~corrected]
         targets = program.targets
         left = [Skipped(targets[row].source, targets[row].line, reason) for row, reason in reasons.items()]
@@ -286,7 +290,7 @@ class ResolvedProgram:
             tips=self.tips,
             joints=joints,
             on_edge=on_edge,
-            kept=self._kept,
+            kept=kept,
         )
 
     def _why_not(self, row: int) -> str:

@@ -342,6 +342,8 @@ class ProgramCorrection(Record):
         known = any(file.expected is not None for file in self.files)
         if known and self.relative:
             text.append(f"  {self.relative}")
+        if known and any(file.kept.keys() & {"in `keep`", "not in `only`"} for file in self.files):
+            text.append("  Targets that stay because of `keep` or `only` are not in these errors.")
         if self.lower_bound and known:
             text.append("  These errors are lower bounds: the calibration cannot know all errors of the robot.")
         text += skipped[:_EXPLAINED]

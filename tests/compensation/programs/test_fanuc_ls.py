@@ -146,6 +146,7 @@ def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
     assert circle.via_text is not None
     assert (text[slice(*circle.via_text)], text[slice(*circle.target_text)]) == ("P[5]", "P[6]")
     assert found.skipped == (
+        Skipped(0, 28, "UFRAME[2] is set here, so where its targets are is not known"),
         Skipped(0, 46, "which position P[R[5]] is, is known only when the program runs"),
         Skipped(0, 47, "PR[2:clear] is a position register, set elsewhere"),
         Skipped(0, 57, "P[77] is not among the positions of this program"),
@@ -527,3 +528,13 @@ def test_many_positions() -> None:
     assert (len(found.targets), len(found.moves), found.skipped, found.unknown) == (500, 500, (), {})
     assert [move.target for move in found.moves] == list(range(500))
     assert {move.routine for move in found.moves} == {0}
+
+
+@pytest.mark.parametrize(
+    ("line", "left"), [("UTOOL[1]=PR[7]", True), ("UFRAME[2] = PR[1]", True), ("PR[7]=UTOOL[1]", False)]
+)
+def test_tools_and_frames_that_the_program_puts_elsewhere_are_named(line: str, left: bool) -> None:
+    text = f"/PROG A\n/MN\n   1:  {line}    ;\n/POS\n/END\n"
+    read = FANUC_LS.read([Source(Path("a.ls"), text)])
+    assert [one.line for one in read.skipped] == [3] * left
+    assert all("is set here, so where its targets are is not known" in one.reason for one in read.skipped)

@@ -562,7 +562,7 @@ def split(program: Program, move: int, *points: tuple[float, ...]) -> list[Edit]
 
 
 def test_a_linear_move_is_split_by_the_same_instruction() -> None:
-    down = pose(rest="[0,0,1,0],[0,-1,1,5],[12.5,9E9,9E9,9E9,9E9,9E9]")
+    down = pose(rest="[0,0,1,0],[0,-1,1,5],[0,9E9,9E9,9E9,9E9,9E9]")
     program = read(
         "  MoveJ p1,v1,z1,tPen;\n  MoveL p2, v100,fine\t,tPen\\WObj:=wobj0 ; ! down",
         f"CONST robtarget p1:={pose()};\nCONST robtarget p2:={down};",
@@ -572,9 +572,9 @@ def test_a_linear_move_is_split_by_the_same_instruction() -> None:
     assert source.text.splitlines()[5:9] == [
         "  MoveJ p1,v1,z1,tPen;",
         "  MoveL [[1.000,2.000,0.000],[0.6000000,0.8000000,0.0000000,0.0000000],[0,-1,1,5],"
-        "[12.5,9E9,9E9,9E9,9E9,9E9]], v100,z1\t,tPen\\WObj:=wobj0 ;",
+        "[0,9E9,9E9,9E9,9E9,9E9]], v100,z1\t,tPen\\WObj:=wobj0 ;",
         "  MoveL [[1.500,2.250,3.001],[0.0000000,0.0000000,1.0000000,0.0000000],[0,-1,1,5],"
-        "[12.5,9E9,9E9,9E9,9E9,9E9]], v100,z1\t,tPen\\WObj:=wobj0 ;",
+        "[0,9E9,9E9,9E9,9E9,9E9]], v100,z1\t,tPen\\WObj:=wobj0 ;",
         "  MoveL p2, v100,fine\t,tPen\\WObj:=wobj0 ; ! down",
     ]
     again = RAPID.read([source])
@@ -650,3 +650,14 @@ def test_a_zero_correction_changes_nothing_and_a_correction_only_numbers() -> No
     ]
     again = RAPID.read(edited(program, edits))
     assert [t.values[:3] for t in again.targets] == [tuple(v + 0.5 for v in t.values[:3]) for t in program.targets]
+
+
+@pytest.mark.parametrize(("axis", "left"), [("9E9", False), ("0", False), ("500", True), ("-0.5", True)])
+def test_a_robot_that_an_external_axis_may_have_carried_away_is_left_alone(axis: str, left: bool) -> None:
+    pose = f"[[400,0,400],[0,0,1,0],[0,0,0,0],[{axis},9E9,9E9,9E9,9E9,9E9]]"
+    text = (
+        f"MODULE m\n  CONST robtarget p1:={pose};\n  PROC main()\n    MoveL p1,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
+    )
+    read = RAPID.read([Source(Path("m.mod"), text)])
+    assert [len(read.targets), len(read.skipped)] == [1 - left, int(left)]
+    assert all("an external axis that is not at zero" in one.reason for one in read.skipped)

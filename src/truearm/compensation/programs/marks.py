@@ -14,7 +14,8 @@ from truearm.version import __version__
 MARK: Final = "corrected by truearm"
 #: FANUC's and Yaskawa's controllers take no longer comments [characters].
 _LONGEST: Final = 32
-_MARKED: Final = re.compile(rf"({MARK}(?: \d[\w.+]*+)?)[ \t;>-]*(?=[\r\n]|\Z)")
+#: Controllers and editors may change letters and blanks.
+_MARKED: Final = re.compile(rf"({MARK.replace(' ', ' +')}(?: +\d[\w.+]*+)?)[ \t;>-]*(?=[\r\n]|\Z)", re.IGNORECASE)
 _LINE_END: Final = re.compile(r"[\r\n]|\Z")
 #: What ends a comment in some language, or what a controller may not read.
 _UNSAFE: Final = re.compile(r"[^A-Za-z0-9 ./+-]|-(?=-)")

@@ -47,6 +47,8 @@ _KNOWN: Final = re.compile(
     re.IGNORECASE,
 )
 
+#: A tool or user frame that the program itself puts elsewhere.
+_PLACED: Final = re.compile(r"\s*+(U(?:FRAME|TOOL)[ \t]*+\[[^\]\r\n]*+\])[ \t]*+=", re.IGNORECASE)
 #: Numbers of the active user frame and tool; None if a number is not known.
 Active = tuple[str | None, str | None]
 
@@ -112,6 +114,8 @@ class Instructions:
             move = _MOVE.match(text, statement.start, statement.stop)
             if move is not None:
                 self._move(statement, move)
+            elif (placed := _PLACED.match(text, statement.start, statement.stop)) is not None:
+                self._skip(statement.start, f"{placed[1]} is set here, so where its targets are is not known")
             elif _COMMENT.match(text, statement.start, statement.stop) is None:
                 self._other(text[statement.start : statement.stop])
 

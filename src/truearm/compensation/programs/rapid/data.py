@@ -126,6 +126,12 @@ def absent(values: tuple[float, ...]) -> bool:
     return any(value >= _ABSENT for value in values)
 
 
+def external_axis_moved(text: str) -> bool:
+    """Return whether a robtarget, as it is written, has an external axis that is there and not at zero."""
+    axes = text[text.rindex("[") + 1 :].rstrip("] \t\r\n").split(",")
+    return any(0.0 != float(axis) < _ABSENT for axis in axes)
+
+
 class RefusedPoseError(Exception):
     """A pose of a tool or work object that cannot be: what is wrong, what came, what is allowed."""
 

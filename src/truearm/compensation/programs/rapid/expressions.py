@@ -19,6 +19,7 @@ from truearm.compensation.programs.rapid.data import (
     ROBTARGET_TEXT,
     absent,
     configuration,
+    external_axis_moved,
     why_no_target,
 )
 from truearm.compensation.programs.rapid.frames import Use
@@ -128,6 +129,8 @@ class Expressions:
             candidate = Candidate(source, place, name, form, values, found.regs[1 : count + 1], posture)
             if joints and absent(values):
                 candidate.reason = "does not say where all joints of the robot are (9E9)"
+            elif not joints and external_axis_moved(found[0]):
+                candidate.reason = "has an external axis that is not at zero, and may carry the robot or move the work"
         self.candidates.append(candidate)
         return candidate
 

@@ -92,9 +92,9 @@ def test_the_error_to_expect_stands_beside_the_held_out_one() -> None:
 
 def test_a_lower_bound_is_called_one() -> None:
     bound = replace(run(28), expected=replace(run(28).expected, omissions=("values at a bound count as exact",)))
-    assert "  a lower bound: values at a bound count as exact" in bound.lines()
+    assert "  may be larger: values at a bound count as exact" in bound.lines()
     (said,) = [line for line in bound.lines() if line.startswith("Expected over the workspace: mean ")]
-    assert " mm or more (90 %: " in said
+    assert " mm (90 %: " in said
     assert " or more), 95 % " in said
     assert "95 % below" not in said
     assert bound.summary()["expected_mm"]["interval_90"][1] is None

@@ -201,7 +201,7 @@ class FileCorrection(Record):
         (mean, most), (mean_now, most_now) = ((v.mean() * 1e3, v.max() * 1e3) for v in self.expected)
         interval = f" now (90 %: {low * 1e3:.3f} to {high * 1e3:.3f})"
         if self.lower_bound:
-            interval = " or more now"
+            interval = f" now (90 %: {low * 1e3:.3f} or more)"
         elif mean_now < 1.01e3 * REPEATABILITY:
             interval = " or more now (no robot repeats better)"
         return (
@@ -345,7 +345,7 @@ class ProgramCorrection(Record):
         if known and any(file.kept.keys() & {"in `keep`", "not in `only`"} for file in self.files):
             text.append("  Targets that stay because of `keep` or `only` are not in these errors.")
         if self.lower_bound and known:
-            text.append("  These errors are lower bounds: the calibration cannot know all errors of the robot.")
+            text.append("  These errors may be larger: the calibration cannot know all errors of the robot.")
         text += skipped[:_EXPLAINED]
         if len(skipped) > _EXPLAINED:
             text.append(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")

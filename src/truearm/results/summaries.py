@@ -224,12 +224,12 @@ def expected_lines(expected: ExpectedError) -> list[str]:
     )
     places = max(3, -math.floor(math.log10(max(mean, 1e-6))) + 1)
     if expected.lower_bound:
-        figures = f"{mean:.{places}f} mm or more (90 %: {low:.{places}f} or more), 95 % {p95:.{places}f} mm or more"
+        figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} or more), 95 % {p95:.{places}f} mm"
     else:
         figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), 95 % below {p95:.{places}f} mm"
     lines = [f"Expected over the workspace: mean {figures}; {expected_of(expected)}"]
     if expected.lower_bound:
-        lines.append(f"  a lower bound: {'; '.join(expected.omissions)}")
+        lines.append(f"  may be larger: {'; '.join(expected.omissions)}")
     return lines
 
 

@@ -116,11 +116,12 @@ def check_narrow_data(
     if fit.gauge_freedoms and not few:
         return []
     part = "held-out" if held_out else "training"
+    most = "or more" if expected.lower_bound else f"to {_mm(high)}"
     words = (
         f"Over the workspace the targets are expected to be off by {_mm(mean)} mm on average"
-        f"{', errors of the scale left out' * ('size' in fit.gauge_freedoms)} (90 %: {_mm(low)} to "
-        f"{_mm(high)}), where the {part} {'error' if judged.position else 'error of lengths'} is "
-        f"{_mm(of_readings.mean)} mm: that one says how good the robot is where it was measured, not elsewhere. "
+        f"{', errors of the scale left out' * ('size' in fit.gauge_freedoms)} (90 %: {_mm(low)} {most}), where the "
+        f"{part} {'error' if judged.position else 'error of lengths'} is {_mm(of_readings.mean)} mm: that one says how "
+        "good the robot is where it was measured, not elsewhere. "
     )
     if few:
         words += f"Measure configurations in which these joints move further: {'; '.join(few)}."

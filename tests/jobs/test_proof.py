@@ -118,11 +118,11 @@ def test_narrow_data_are_judged_target_by_target(robot: Robot, program: Path) ->
 
 
 def test_only_known_names_are_accepted(robot: Robot, program: Path) -> None:
-    known = "narrow-data, wrong-robot, maker, other-kinematics, skipped, not-better-here"
+    known = "narrow-data, wrong-robot, maker, other-kinematics, numbers-read, skipped, not-better-here"
     with pytest.raises(InputError, match=known) as refusal:
         compensate(robot, [program], accept=["rank-lost"])
     assert refusal.value.parameter == "accept"
-    with pytest.raises(InputError, match="joint-sign, maker, other-kinematics, skipped, not-better-here"):
+    with pytest.raises(InputError, match="joint-sign, maker, other-kinematics, numbers-read, skipped, not-better-here"):
         compensate(ended(robot, "converged", SIGNS), [program], accept=["joint-signs"])
     assert codes(compensate(robot, [program], accept=["rank-loss"])) == codes(compensate(robot, [program]))
 

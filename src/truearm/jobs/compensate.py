@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -33,11 +33,12 @@ from truearm.compensation.controller_model import (
 from truearm.compensation.correction import Correction, shared_motion
 from truearm.compensation.correction_limit import CorrectionLimit, check_size, correction_limit
 from truearm.compensation.gauge import turns_between
+from truearm.compensation.numbers_read import numbers_read
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
 from truearm.compensation.program_poses import place
 from truearm.compensation.programs.marks import correction_comment
-from truearm.compensation.programs.program import Edit
+from truearm.compensation.programs.program import Edit, Language
 from truearm.compensation.questions import refuse_unanswered
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
 from truearm.errors import InputError, refusals_at, refusals_of
@@ -64,6 +65,7 @@ from truearm.jobs.arguments import (
 from truearm.jobs.corrected_already import day_of, ledger_of, ledger_to_write, refuse_corrected_already
 from truearm.jobs.proof import (
     NOT_BETTER,
+    NUMBERS_READ,
     SKIPPED,
     accept_argument,
     changed_since,
@@ -151,7 +153,8 @@ def compensate(
         ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with, such as
         ``wrong-robot``; ``maker`` for programs in the language of another maker; ``other-kinematics`` for kinematics of
         the controller that are not this arm's; ``skipped`` for programs of which some targets cannot be corrected and
-        stay as they are; and ``not-better-here`` to correct also the targets that would rather get worse.
+        stay as they are; ``numbers-read`` for programs that compute with numbers of corrected targets; and
+        ``not-better-here`` to correct also the targets that would rather get worse.
     accept_correction
         How far targets may be moved and turned, such as ``95mm,3deg``, in place of the limit: twice the largest
         deviation of the calibrated from the nominal robot, see :mod:`truearm.compensation.correction_limit`.
@@ -273,6 +276,7 @@ def compensate(
     large = _check_size(result, correction_limit(calibrated), allowed)
     if SKIPPED not in accepted:
         _refuse_skipped(result)
+    read_by_program = _check_numbers_read(language, result, accepted)
     splits: tuple[ProgramSplit, ...] = ()
     if split is not None:
         progress("splitting moves")
@@ -307,6 +311,7 @@ def compensate(
             *_payloads_unlikely(arm, result),
             *check_force(result.pushed),
             *large,
+            *read_by_program,
             *check_correction(arm, result, splits),
             *unremembered,
         ),
@@ -430,6 +435,26 @@ def _refuse_skipped(result: CorrectedPrograms) -> None:
             cure="Check frame and tool; mend the program; leave a target as it is on purpose by its name with `keep`; "
             f"or accept all of them with `accept={SKIPPED}`.",
         )
+
+
+def _check_numbers_read(language: Language, result: CorrectedPrograms, accepted: Collection[str]) -> list[Notice]:
+    """Refuse programs that compute with numbers which the correction changes, or say that it was accepted."""
+    places = numbers_read(language, result.corrections)
+    if not places:
+        return []
+    more = f"; and {len(places) - _SHOWN} more" if len(places) > _SHOWN else ""
+    words = (
+        "the program computes with numbers of targets, which the correction changes: another branch or another place "
+        f"may follow ({'; '.join(places[:_SHOWN])}{more})"
+    )
+    if NUMBERS_READ in accepted:
+        return [Notice(NUMBERS_READ, f"{words[0].upper()}{words[1:]}. It was accepted.")]
+    raise InputError(
+        words,
+        parameter="programs",
+        cure="Let the program compute with numbers of its own, leave these targets as they are with `keep`, or accept "
+        f"it with `accept={NUMBERS_READ}`.",
+    )
 
 
 def _edits(correction: Correction, split: ProgramSplit | None) -> list[Edit]:

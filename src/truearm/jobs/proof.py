@@ -28,13 +28,15 @@ _WRONG: Final = "wrong-robot"
 OTHER_MAKER: Final = "maker"
 #: Targets that would rather get worse, see :mod:`truearm.compensation.kept_targets`.
 NOT_BETTER: Final = "not-better-here"
+#: Programs that compute with the numbers of targets that are corrected.
+NUMBERS_READ: Final = "numbers-read"
 #: Programs of which some targets cannot be corrected.
 SKIPPED: Final = "skipped"
 
 
 def accept_argument(accept: object, robot: Robot) -> tuple[str, ...]:
     """Return the names of what is accepted although it speaks against a correction."""
-    of_programs = (OTHER_MAKER, OTHER_ARM, SKIPPED, NOT_BETTER)
+    of_programs = (OTHER_MAKER, OTHER_ARM, NUMBERS_READ, SKIPPED, NOT_BETTER)
     known = dict.fromkeys((*_UNSOUND, _ELSEWHERE, _WRONG, *_against(robot), *of_programs))
     return choices_argument(accept, "accept", list(known), "status or notice")
 

@@ -367,6 +367,9 @@ class Language:
     flange, base
         What the language calls the robot's own flange and base, in small letters. Every cell file may call them
         ``flange`` and ``base``.
+    reads
+        Where a text reads numbers of a place: the first group is the name of the place, without an index that follows;
+        None where comments and strings are matched instead. None if the language's programs cannot.
     """
 
     name: str
@@ -383,6 +386,7 @@ class Language:
     calibration: MakersCalibration | None = None
     flange: tuple[str, ...] = ()
     base: tuple[str, ...] = ()
+    reads: re.Pattern[str] | None = None
 
     def runs_on(self, maker: str) -> bool:
         """Return whether controllers of a maker run it, whatever else is in the maker's full name."""

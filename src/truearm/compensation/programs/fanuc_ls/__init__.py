@@ -186,6 +186,9 @@ def commented(text: str, lines: Sequence[str]) -> str:
     return replaced(remarked, 0, len(remarked), [(*count.span(1), str(int(count[1]) + len(lines)))])
 
 
+#: A position that goes to a position register.
+_READS: Final = re.compile(r"(?m)^[ \t]*+\d*+:[ \t]*+!.*+$|=[ \t]*+(P\[\d++)[^\]\n]*+\]", re.IGNORECASE)
+
 FANUC_LS: Final = Language(
     _NAME,
     (".ls",),
@@ -199,4 +202,5 @@ FANUC_LS: Final = Language(
     calibration=MakersCalibration("FANUC", "robot calibration (mechanism error parameters)"),
     flange=("0",),
     base=("0",),
+    reads=_READS,
 )

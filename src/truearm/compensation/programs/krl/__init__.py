@@ -66,6 +66,11 @@ def _commented(text: str, lines: Sequence[str]) -> str:
     return text if head is None else with_lines_behind(text, head.end(), [f"; {line}" for line in lines], ";")
 
 
+#: A component of a place that is not assigned.
+_READS: Final = re.compile(
+    r";[^\n]*+|\"[^\"\n]*+\"|(?<![\w$])([A-Z]\w*+)(?:\[[^\]\n]*+\])?+\.[XYZABC]\b(?!\s*+=(?!=))", re.IGNORECASE
+)
+
 KRL: Final = Language(
     name="KRL",
     suffixes=(".src", ".dat", ".sub"),
@@ -81,4 +86,5 @@ KRL: Final = Language(
     calibration=MakersCalibration("KUKA", "the positionally accurate robot model ($ABS_ACCUR)"),
     flange=("0", "$nullframe"),
     base=("0", "$nullframe", "$world", "$robroot"),
+    reads=_READS,
 )

@@ -50,6 +50,13 @@ def _commented(text: str, lines: Sequence[str]) -> str:
     return text if head is None else with_lines_behind(text, head.end(), [f"  ! {line}" for line in lines], "!")
 
 
+#: A component of a robtarget that is not assigned.
+_READS: Final = re.compile(
+    r"![^\n]*+|\"[^\"\n]*+\"|\b([A-Z]\w*+)(?:\s*+\{[^}\n]*+\})?+\s*+\.\s*+(?:trans|rot)\b"
+    r"(?!(?:\s*+\.\s*+\w++)*+\s*+:=)(?:\s*+\.\s*+\w++)*+",
+    re.IGNORECASE,
+)
+
 RAPID: Final = Language(
     name="RAPID",
     suffixes=(".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"),
@@ -64,4 +71,5 @@ RAPID: Final = Language(
     calibration=MakersCalibration("ABB", "Absolute Accuracy"),
     flange=("tool0",),
     base=("wobj0",),
+    reads=_READS,
 )

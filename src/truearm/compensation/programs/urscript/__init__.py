@@ -194,6 +194,11 @@ class _File:
         return self.targets.reach(value, at)
 
 
+#: A number of a pose that is not assigned.
+_READS: Final = re.compile(
+    r"#[^\n]*+|\"[^\"\n]*+\"|\b([A-Za-z_]\w*+)[ \t]*+\[[ \t]*+[0-5][ \t]*+\](?![ \t]*+=(?!=))", re.ASCII
+)
+
 URSCRIPT: Final = Language(
     "URScript",
     (".script", ".urscript"),
@@ -205,4 +210,5 @@ URSCRIPT: Final = Language(
     new_program,
     motion_program,
     calibration=MakersCalibration("Universal Robots", "the kinematic calibration of the factory", always=True),
+    reads=_READS,
 )

@@ -348,6 +348,11 @@ def _configuration(words: tuple[str, ...]) -> Configuration:
     )
 
 
+#: The transformation of a point, or a part of it, that is not assigned.
+_READS: Final = re.compile(
+    r"//[^\n]*+|\"[^\"\n]*+\"|\b([A-Za-z]\w*+)(?:\[[^\]\n]*+\])?+\.trsf\b(?!(?:\.\w++)?+\s*+=(?!=))(?:\.\w++)?+"
+)
+
 VAL3: Final = Language(
     "VAL3",
     (".dtx", ".pgx", ".pjx"),
@@ -359,4 +364,5 @@ VAL3: Final = Language(
     motion=motion_program,
     together=True,
     base=("world",),
+    reads=_READS,
 )

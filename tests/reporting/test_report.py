@@ -272,7 +272,12 @@ def test_the_error_to_expect_is_on_the_first_page_with_what_it_is_of() -> None:
     assert "Targets 1, 2, 3 in the instrument's frame, no payload" in text
     assert "may be larger" not in text
     bound = replace(made(), expected=replace(found, omissions=("values at a bound count as exact",)))
-    assert "The errors may be larger: values at a bound count as exact." in Page(report_html(bound)).text
+    said = Page(report_html(bound)).text
+    assert "The errors may be larger: values at a bound count as exact." in said
+    assert "positions are expected below" in text
+    assert "positions are expected below" not in said  # nor anywhere else an upper end
+    table = report_html(bound).partition('id="expected-targets"')[2].partition("</table>")[0]
+    assert table.count("or more") == 1 + len(found.targets)
 
 
 def test_held_out_readings_without_position() -> None:

@@ -134,16 +134,14 @@ class ExpectedRow:
 def expected_rows(expected: ExpectedError) -> tuple[ExpectedRow, ...]:
     """Return a row for all targets together, then one for each where there are several."""
     parts = {"all": expected.overall, **(expected.targets if len(expected.targets) > 1 else {})}
-    return tuple(
-        ExpectedRow(
-            name,
-            *(
-                deserved(1e3 * figure, 1e3 * (of.interval_90[1] - of.interval_90[0]) / _WIDTH_90)
-                for figure in (of.mean, *of.interval_90, of.p95)
-            ),
+    rows = []
+    for name, of in parts.items():
+        mean, low, high, p95 = (
+            deserved(1e3 * figure, 1e3 * (of.interval_90[1] - of.interval_90[0]) / _WIDTH_90)
+            for figure in (of.mean, *of.interval_90, of.p95)
         )
-        for name, of in parts.items()
-    )
+        rows.append(ExpectedRow(name, mean, low, "or more" if expected.lower_bound else high, p95))
+    return tuple(rows)
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def signed_rank_probability(differences: Array) -> float:
     differences
         One for each pair, ``(n,)``.
     """
-    from scipy.special import ndtr
+    from scipy.special import ndtr  # scipy.stats.wilcoxon is the same, but takes half a second to import
 
     d = differences[differences != 0.0]
     if not len(d):

@@ -82,6 +82,8 @@ def test_joints_are_put_in_the_robots_order(tmp_path: Path) -> None:
     named = truearm.import_ros(bag, joint_names=names)
     np.testing.assert_allclose(np.degrees(named.data.joints), STOPS, atol=2e-4)
     assert refused(bag, "no message holds all", joint_names=[*names[:5], "tool"])
+    assert refused(bag, "each joint has one name", joint_names=[]).parameter == "joint_names"
+    assert refused(bag, "each joint has one name", joint_names=np.array([], dtype=str)).parameter == "joint_names"
     slides = truearm.import_ros(bag, joint_names=names, prismatic=["elbow"]).data
     assert slides.joint_kinds[2] == "prismatic"
     assert refused(bag, "no such joint", joint_names=names, prismatic=["rail"]).parameter == "prismatic"

@@ -95,8 +95,9 @@ def import_ros(
         raise InputError("a point beside the robot is given, and no target", parameter="targets")
     allowed = "names of joints"
     named = None if joint_names is None else names_argument(joint_names, "joint_names", allowed)
-    if named is not None and (not named or len(named) != len(joint_names or ())):
-        raise InputError("each joint has one name", parameter="joint_names", came=", ".join(joint_names or ()))
+    given = () if joint_names is None else joint_names  # may be an array, which is neither true nor false
+    if named is not None and (not named or len(named) != len(given)):
+        raise InputError("each joint has one name", parameter="joint_names", came=", ".join(map(str, given)))
     sliding = names_argument(prismatic, "prismatic", allowed)
     if joint_topic is not None:
         name_argument(joint_topic, "joint_topic")

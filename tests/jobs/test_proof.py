@@ -15,6 +15,7 @@ import truearm
 from truearm import InputError, Robot
 from truearm.modeling.formats.robot_file import robot_text, sealed
 from truearm.notices import Notice
+from truearm.reporting.program_report import program_html
 from truearm.results.program_correction import ProgramCorrection
 from truearm.results.robot_description import RobotDescription
 
@@ -220,6 +221,9 @@ def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
         assert low > 0.0
         assert (high is None) is bound
         assert (" or more); largest" in done.lines()[1]) is bound
+        page = program_html(done)
+        assert (f"the mean is {low:.3f} mm or more now" in page) is bound
+        assert (f"the mean is {low:.3f} to " in page) is not bound
 
 
 def test_errors_in_measured_frames_are_not_called_relative(robot: Robot, program: Path, tmp_path: Path) -> None:

@@ -14,5 +14,4 @@ myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
-napoleon_google_docstring = False
 napoleon_use_rtype = False  # what stands before the description of a result is its name, not its type

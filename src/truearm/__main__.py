@@ -20,10 +20,8 @@ _INTERRUPTED = 130
 class _Interrupts:
     """Ctrl-C: ends the command at once while modules load, which may not survive it, and raises an exception later.
 
-    Attributes
-    ----------
-    came
-        Whether somebody pressed it, whatever exception that became on its way out.
+    Attributes:
+        came: Whether somebody pressed it, whatever exception that became on its way out.
     """
 
     came = False

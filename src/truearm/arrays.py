@@ -28,16 +28,11 @@ def number_array(
 ) -> NDArray[np.float64]:
     """Return numbers as an array of floats, refusing what has another shape or holds anything else.
 
-    Parameters
-    ----------
-    shape
-        Length of each axis; a letter for one that may have any length.
-    missing
-        Whether NaN may stand for numbers that are missing; what an array masks is missing.
-    allowed
-        What belongs here, for the message; numbers of that shape if None.
-    largest
-        Size that no number may exceed.
+    Args:
+        shape: Length of each axis; a letter for one that may have any length.
+        missing: Whether NaN may stand for numbers that are missing; what an array masks is missing.
+        allowed: What belongs here, for the message; numbers of that shape if None.
+        largest: Size that no number may exceed.
     """
     allowed = allowed or f"numbers, {shape_text(shape)}"
     try:

@@ -142,10 +142,8 @@ def _shown(came: object) -> str:
 def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
     """Return the known names most like `name`, best first, for a message that offers them; of very many the first few.
 
-    Parameters
-    ----------
-    likeness
-        How like they must be, 0 to 1.
+    Args:
+        likeness: How like they must be, 0 to 1.
     """
     import difflib  # only where something is misspelt
 

@@ -76,10 +76,8 @@ def _refuse_outside(path: Path) -> None:
 def read_bytes(path: Path, most: str = "file_size") -> bytes:
     """Return the content of a file, or refuse with the reason it cannot be read.
 
-    Parameters
-    ----------
-    most
-        Name of the limit of its size, see :mod:`truearm.limits`.
+    Args:
+        most: Name of the limit of its size, see :mod:`truearm.limits`.
     """
     try:
         _refuse_outside(path)

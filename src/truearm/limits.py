@@ -25,24 +25,12 @@ _ENTRY: Final = re.compile(r"(?P<name>[a-z_]+)=(?P<most>[1-9][0-9]{0,14})")
 
 @dataclass(frozen=True)
 class Limit:
-    """How much there may be of something.
+    """How much there may be of something."""
 
-    Attributes
-    ----------
-    most
-        So much and no more, unless the environment says otherwise.
-    what
-        What there is too much of, for the refusal.
-    unit
-        What is counted.
-    cure
-        What else to do than to allow more.
-    """
-
-    most: int
-    what: str
-    unit: str
-    cure: str = ""
+    most: int  #: So much and no more, unless the environment says otherwise.
+    what: str  #: What there is too much of, for the refusal.
+    unit: str  #: What is counted.
+    cure: str = ""  #: What else to do than to allow more.
 
 
 #: Every limit by its name.
@@ -111,14 +99,10 @@ def limit(name: str) -> int:
 def refuse_beyond(name: str, came: int, *, where: str | None = None, parameter: str | None = None) -> None:
     """Refuse what is more than a limit allows.
 
-    Parameters
-    ----------
-    name
-        Of the limit.
-    came
-        How much there is.
-    where, parameter
-        What the refusal names.
+    Args:
+        name: Of the limit.
+        came: How much there is.
+        where, parameter: What the refusal names.
     """
     most = limit(name)
     if came <= most:

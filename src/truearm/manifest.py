@@ -32,43 +32,23 @@ _LARGEST: Final = 50_000_000
 
 @dataclass(frozen=True)
 class FileSet:
-    """Files that were written together.
+    """Files that were written together."""
 
-    Attributes
-    ----------
-    files
-        Their hashes (SHA-256) by their names in the folder.
-    command
-        How to write them again; None if that was not said.
-    version
-        Of truearm, that wrote them.
-    inputs
-        Hashes of the files that they were made from, by the parameters that named these; empty where that was not said.
-    """
-
-    files: Mapping[str, str]
-    command: str | None = None
-    version: str = __version__
+    files: Mapping[str, str]  #: Their hashes (SHA-256) by their names in the folder.
+    command: str | None = None  #: How to write them again; None if that was not said.
+    version: str = __version__  #: Of truearm, that wrote them.
+    #: Hashes of the files that they were made from, by the parameters that named these; empty where that was not said.
     inputs: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Unfinished:
-    """What a run that has not finished replaces.
+    """What a run that has not finished replaces."""
 
-    Attributes
-    ----------
-    new
-        The files that it writes.
-    kept
-        The names beside them that the old ones have meanwhile, of those that there were.
-    made
-        The names of empty files beside the others, those that there were not. Whoever could write a mark, or copied
-        one, may not write beside every file that it names: without its empty file, none is removed.
-    """
-
-    new: FileSet
-    kept: Mapping[str, str]
+    new: FileSet  #: The files that it writes.
+    kept: Mapping[str, str]  #: The names beside them that the old ones have meanwhile, of those that there were.
+    #: The names of empty files beside the others, those that there were not. Whoever could write a mark, or copied one,
+    #: may not write beside every file that it names: without its empty file, none is removed.
     made: Mapping[str, str]
 
 
@@ -97,10 +77,8 @@ def _written(one: FileSet) -> dict[str, Any]:
 def sets_in(folder: Path) -> tuple[FileSet, ...]:
     """Return what was written together into a folder, as its manifest says.
 
-    Raises
-    ------
-    InputError
-        If what has the name of the manifest is none.
+    Raises:
+        InputError: If what has the name of the manifest is none.
     """
     content = _content(folder / MANIFEST)
     with _read_as_ours(folder / MANIFEST):
@@ -110,10 +88,8 @@ def sets_in(folder: Path) -> tuple[FileSet, ...]:
 def unfinished_in(folder: Path) -> Unfinished | None:
     """Return what a run that has not finished replaces in a folder; None if there is no such run.
 
-    Raises
-    ------
-    InputError
-        If what has the name of its mark is none.
+    Raises:
+        InputError: If what has the name of its mark is none.
     """
     content = _content(folder / UNFINISHED)
     if content is None:
@@ -128,10 +104,8 @@ def unfinished_in(folder: Path) -> Unfinished | None:
 def refuse_unfinished(path: Path) -> None:
     """Refuse to read one of several files that a run replaces and has not finished with.
 
-    Raises
-    ------
-    InputError
-        If it is one of them.
+    Raises:
+        InputError: If it is one of them.
     """
     for place in _places(path):
         for folder, run in unfinished_above(place):

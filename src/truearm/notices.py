@@ -13,24 +13,13 @@ LEVELS: Final[tuple[Level, ...]] = ("note", "warning", "error")
 
 @dataclass(frozen=True)
 class Notice:
-    """A warning in plain words.
+    """A warning in plain words."""
 
-    Attributes
-    ----------
-    code
-        Stable short name, for programs: ``redundant``, ``at-bound``.
-    message
-        What was noticed and what to do about it.
-    level
-        How bad it is.
-    at
-        The readings that it is about, where it is about single ones: label of the configuration and name of the
-        target, which is empty for all that were read there.
-    """
-
-    code: str
-    message: str
-    level: Level = "warning"
+    code: str  #: Stable short name, for programs: ``redundant``, ``at-bound``.
+    message: str  #: What was noticed and what to do about it.
+    level: Level = "warning"  #: How bad it is.
+    #: The readings that it is about, where it is about single ones: label of the configuration and name of the target,
+    #: which is empty for all that were read there.
     at: tuple[tuple[str, str], ...] = field(default=(), compare=False, repr=False)
 
     def summary(self) -> dict[str, str]:

@@ -140,10 +140,8 @@ def refuse_others(target: Path, known: str | None) -> None:
 def name_anew(source: Path, target: Path) -> None:
     """Give a file another name in its folder, at once and only if nothing has that name.
 
-    Raises
-    ------
-    FileExistsError
-        If something has.
+    Raises:
+        FileExistsError: If something has.
     """
     try:
         os.link(source, target, follow_symlinks=False)

@@ -177,14 +177,10 @@ def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], wher
 def refused_value(fault: Mapping[str, Any], where: str, *, is_name: bool = False) -> InputError:
     """Return what pydantic found wrong with one value as a refusal in plain words.
 
-    Parameters
-    ----------
-    fault
-        One of its errors.
-    where
-        What the refusal names.
-    is_name
-        Whether the value is the name of an entry.
+    Args:
+        fault: One of its errors.
+        where: What the refusal names.
+        is_name: Whether the value is the name of an entry.
     """
     kind, came, details = fault["type"], fault.get("input"), fault.get("ctx", {})
     cause = details.get("error")

@@ -82,14 +82,10 @@ def sized_si(
 ) -> float:
     """Convert one number to metres or radians, or refuse one that is out of all proportion.
 
-    Parameters
-    ----------
-    where, parameter
-        What the refusal names: a place in a file, or a parameter of a job.
-    came
-        The number as the file has it.
-    deviation
-        Whether it is a standard deviation, which can be too small as well.
+    Args:
+        where, parameter: What the refusal names: a place in a file, or a parameter of a job.
+        came: The number as the file has it.
+        deviation: Whether it is a standard deviation, which can be too small as well.
     """
     low, high = accepted_range(unit, deviation=deviation)
     if math.isnan(value):
@@ -117,21 +113,14 @@ def quantity_si(
 ) -> float:
     """Return a number that a text gives with its unit, such as ``50mm``, in SI units; zero needs none.
 
-    Parameters
-    ----------
-    units
-        Those that it may have.
-    parameter
-        What the refusal names.
-    number, whole
-        A number as an example, and an example of everything that the parameter takes.
-    deviation
-        Whether it is a standard deviation, which can be too small as well.
+    Args:
+        units: Those that it may have.
+        parameter: What the refusal names.
+        number, whole: A number as an example, and an example of everything that the parameter takes.
+        deviation: Whether it is a standard deviation, which can be too small as well.
 
-    Raises
-    ------
-    InputError
-        If it is no number, or has no unit that fits.
+    Raises:
+        InputError: If it is no number, or has no unit that fits.
     """
     match = re.fullmatch(r"\s*(?P<number>[^a-zA-Z]*(?:[eE][-+0-9]+)?)\s*(?P<unit>[a-zA-Z]*)\s*", text)
     found = None if match is None else as_number(match["number"].strip())

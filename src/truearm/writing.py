@@ -36,15 +36,11 @@ def output_folder(
 ) -> Path:
     """Return the folder that was given for files of some names, or refuse one that cannot be written to.
 
-    Parameters
-    ----------
-    names
-        Of the files.
-    read
-        None of these files may be overwritten.
-    ours
-        Whether a file of one of the names that stands there already has to be as the folder's manifest has it: then
-        truearm has written it, and nobody has changed it since.
+    Args:
+        names: Of the files.
+        read: None of these files may be overwritten.
+        ours: Whether a file of one of the names that stands there already has to be as the folder's manifest has it:
+            then truearm has written it, and nobody has changed it since.
     """
     with refusals_of(parameter):
         path = writable_folder(path_argument(folder, parameter))
@@ -99,10 +95,8 @@ def write_text(path: Path, text: str) -> None:
 def write_text_over(path: Path, text: str, known: str | None) -> None:
     """Write a whole file in place of the one that is known, and refuse to where another stands there by now.
 
-    Parameters
-    ----------
-    known
-        Hash of the file that is replaced (:func:`truearm.manifest.hash_of`); None if there shall be none.
+    Args:
+        known: Hash of the file that is replaced (:func:`truearm.manifest.hash_of`); None if there shall be none.
     """
     write_files(path.parent, {path.name: text}, standing={path.name: known})
 
@@ -118,10 +112,8 @@ def remove_known(path: Path, known: str | None) -> None:
 def put_in_place(source: Path, target: Path) -> None:
     """Give a file beside its place its name there, once it is on disk; nothing is overwritten.
 
-    Raises
-    ------
-    InputError
-        If something of that name stands there, or it cannot be moved.
+    Raises:
+        InputError: If something of that name stands there, or it cannot be moved.
     """
     new_file(target)
     put_back_old(target.parent)
@@ -230,22 +222,15 @@ def write_files(
 
     Where the file system knows no locks, two runs at the same time are not kept apart.
 
-    Parameters
-    ----------
-    files
-        What they hold, by name, in the order in which they are put in place. Names may begin with folders in that
-        folder, or be whole paths.
-    command
-        How to write them again, for the manifest.
-    standing
-        Hashes of files that must stand there as they are known, by name; None for one that must not be there.
-    inputs
-        Hashes of the files that they were made from, by parameter, for the manifest.
+    Args:
+        files: What they hold, by name, in the order in which they are put in place. Names may begin with folders in
+            that folder, or be whole paths.
+        command: How to write them again, for the manifest.
+        standing: Hashes of files that must stand there as they are known, by name; None for one that must not be there.
+        inputs: Hashes of the files that they were made from, by parameter, for the manifest.
 
-    Raises
-    ------
-    InputError
-        If one of them cannot be written, or another stands there than is known.
+    Raises:
+        InputError: If one of them cannot be written, or another stands there than is known.
     """
     contents: dict[Path, bytes] = {}
     for name, text in files.items():

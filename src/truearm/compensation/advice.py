@@ -40,14 +40,10 @@ def check_correction(
 ) -> tuple[Notice, ...]:
     """Say what is to be known about corrected programs before they run.
 
-    Parameters
-    ----------
-    robot
-        Calibrated, with the payload that holds.
-    result
-        The corrected programs.
-    splits
-        How their moves are split, one a program; empty if they are not.
+    Args:
+        robot: Calibrated, with the payload that holds.
+        result: The corrected programs.
+        splits: How their moves are split, one a program; empty if they are not.
     """
     corrections = result.corrections
     count = sum(int(one.corrected.sum()) for one in corrections)

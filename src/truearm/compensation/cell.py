@@ -158,18 +158,11 @@ class CellFile(_Entry):
 
 @dataclass(frozen=True)
 class Placed:
-    """A tool or a frame.
+    """A tool or a frame."""
 
-    Attributes
-    ----------
-    controller
-        What its controller has, in its flange or base frame; None if only the program can say.
-    identified
-        Where it really is, in the identified flange or base; None if it is not known.
-    """
-
+    #: What its controller has, in its flange or base frame; None if only the program can say.
     controller: Transform | None
-    identified: Transform | None
+    identified: Transform | None  #: Where it really is, in the identified flange or base; None if it is not known.
 
 
 @dataclass(frozen=True)
@@ -182,23 +175,14 @@ class Cell:
 
 @dataclass(frozen=True)
 class TargetWrench:
-    """What acts on the tool at some targets of programs.
+    """What acts on the tool at some targets of programs."""
 
-    Attributes
-    ----------
-    targets, tools
-        Names or patterns of targets, and names of tools at whose targets it acts; those of both if there are both, all
-        targets if there are none.
-    wrench
-        What acts, at the tool's point.
-    where
-        Where that was said, for messages.
-    """
-
+    #: targets, tools: names or patterns of targets, and names of tools at whose targets it acts; those of both if there
+    #: are both, all targets if there are none.
     targets: tuple[str, ...]
     tools: tuple[str, ...]
-    wrench: Wrench
-    where: str = ""
+    wrench: Wrench  #: What acts, at the tool's point.
+    where: str = ""  #: Where that was said, for messages.
 
 
 #: No tool and no frame was given.
@@ -208,19 +192,13 @@ EMPTY_CELL: Final = Cell({}, {})
 def read_tools(robot: Robot, path: Path | None, flange: Sequence[str] = ()) -> dict[str, Placed]:
     """Read where a program's tools are.
 
-    Parameters
-    ----------
-    robot
-        Calibrated; ``target`` refers to its targets.
-    path
-        File of the schema above, of which the tools are taken; None for none.
-    flange
-        What the language of the programs calls the robot's own flange, in small letters.
+    Args:
+        robot: Calibrated; ``target`` refers to its targets.
+        path: File of the schema above, of which the tools are taken; None for none.
+        flange: What the language of the programs calls the robot's own flange, in small letters.
 
-    Raises
-    ------
-    InputError
-        If the file is not of the schema, or has no tools.
+    Raises:
+        InputError: If the file is not of the schema, or has no tools.
     """
     return {} if path is None else _tools(robot, path, _file(path, "tools"), ("flange", *flange))
 
@@ -228,19 +206,13 @@ def read_tools(robot: Robot, path: Path | None, flange: Sequence[str] = ()) -> d
 def read_frames(robot: Robot, path: Path | None, base: Sequence[str] = ()) -> dict[str, Placed]:
     """Read where a program's frames are.
 
-    Parameters
-    ----------
-    robot
-        Calibrated; ``world`` refers to its base.
-    path
-        File of the schema above, of which the frames are taken; None for none.
-    base
-        What the language of the programs calls the robot's own base, in small letters.
+    Args:
+        robot: Calibrated; ``world`` refers to its base.
+        path: File of the schema above, of which the frames are taken; None for none.
+        base: What the language of the programs calls the robot's own base, in small letters.
 
-    Raises
-    ------
-    InputError
-        If the file is not of the schema, or has no frames.
+    Raises:
+        InputError: If the file is not of the schema, or has no frames.
     """
     return {} if path is None else _frames(robot, path, _file(path, "frames"), ("base", *base))
 
@@ -248,15 +220,12 @@ def read_frames(robot: Robot, path: Path | None, base: Sequence[str] = ()) -> di
 def read_wrenches(path: Path) -> tuple[TargetWrench, ...]:
     """Read what acts on the tool at targets.
 
-    Parameters
-    ----------
-    path
-        File of the schema above, of which the wrenches are taken.
+    Args:
+        path: File of the schema above, of which the wrenches are taken.
 
-    Raises
-    ------
-    InputError
-        If the file is not of the schema, or has no wrenches; one has no unit, acts nowhere, or is in no known frame.
+    Raises:
+        InputError: If the file is not of the schema, or has no wrenches; one has no unit, acts nowhere, or is in no
+            known frame.
     """
     content, made = _file(path, "wrenches"), []
     units = content.units
@@ -296,32 +265,21 @@ def refuse_wrenches_left_out(path: Path | None, parameter: str) -> None:
 
 @dataclass(frozen=True)
 class Answers:
-    """What cell files answer of the programs and their controller; None where they do not.
+    """What cell files answer of the programs and their controller; None where they do not."""
 
-    Attributes
-    ----------
-    taught
-        What was taught with the robot.
-    controller_kinematics
-        With what the controller computes poses: a word, or the path of its kinematics file.
-    """
-
-    taught: tuple[str, ...] | None = None
+    taught: tuple[str, ...] | None = None  #: What was taught with the robot.
+    #: With what the controller computes poses: a word, or the path of its kinematics file.
     controller_kinematics: str | None = None
 
 
 def read_answers(files: Mapping[str, Path | None]) -> Answers:
     """Read what cell files answer; a kinematics file is named from the folder of the file that names it.
 
-    Parameters
-    ----------
-    files
-        By the parameters that name them.
+    Args:
+        files: By the parameters that name them.
 
-    Raises
-    ------
-    InputError
-        If one is not of the schema, or two answer differently.
+    Raises:
+        InputError: If one is not of the schema, or two answer differently.
     """
     taught: dict[tuple[str, ...], Path] = {}
     kinematics: dict[str, Path] = {}
@@ -443,40 +401,23 @@ def _transform(place: _Place, units: _Units, where: str) -> Transform:
 
 @dataclass(frozen=True)
 class KnownPlace:
-    """Where something was found to be by whoever wrote the file.
+    """Where something was found to be by whoever wrote the file."""
 
-    Attributes
-    ----------
-    of
-        What the place is in: ``flange``, ``world`` or ``base``.
-    place
-        The place.
-    turned
-        Whether the entry says how it is turned; otherwise the rotation of `place` is none.
-    where
-        The entry, for messages.
-    """
-
-    of: str
-    place: Transform
-    turned: bool
-    where: str
+    of: str  #: What the place is in: ``flange``, ``world`` or ``base``.
+    place: Transform  #: The place.
+    turned: bool  #: Whether the entry says how it is turned; otherwise the rotation of `place` is none.
+    where: str  #: The entry, for messages.
 
 
 def read_known_places(robot: Robot, path: Path) -> tuple[dict[str, KnownPlace], dict[str, KnownPlace]]:
     """Read where tools and frames really are, by their names as the file has them.
 
-    Parameters
-    ----------
-    robot
-        ``target`` refers to its targets.
-    path
-        File of the schema above.
+    Args:
+        robot: ``target`` refers to its targets.
+        path: File of the schema above.
 
-    Raises
-    ------
-    InputError
-        If the file is not of the schema. What the controller has is no place: such entries are refused.
+    Raises:
+        InputError: If the file is not of the schema. What the controller has is no place: such entries are refused.
     """
     content = read_yaml(path, CellFile)
     tools: dict[str, KnownPlace] = {}

@@ -32,26 +32,14 @@ ALONE: Final[Kept] = "alone, with `frames` not given"
 
 @dataclass(frozen=True)
 class Choice:
-    """What the user says of the targets of programs.
+    """What the user says of the targets of programs."""
 
-    Attributes
-    ----------
-    joint_targets
-        Whether targets given by joints are corrected too. Those given in pulses always are: there every target is.
-    only
-        Names or patterns of the targets that are corrected; all if empty.
-    keep
-        Names or patterns of targets that stay.
-    taught
-        What was taught with this robot; None if that was not said.
-    every
-        Whether targets are corrected that would rather get worse, see :mod:`truearm.compensation.kept_targets`.
-    """
-
+    #: Whether targets given by joints are corrected too. Those given in pulses always are: there every target is.
     joint_targets: bool = False
-    only: tuple[str, ...] = ()
-    keep: tuple[str, ...] = ()
-    taught: frozenset[Taught] | None = None
+    only: tuple[str, ...] = ()  #: Names or patterns of the targets that are corrected; all if empty.
+    keep: tuple[str, ...] = ()  #: Names or patterns of targets that stay.
+    taught: frozenset[Taught] | None = None  #: What was taught with this robot; None if that was not said.
+    #: Whether targets are corrected that would rather get worse, see :mod:`truearm.compensation.kept_targets`.
     every: bool = False
 
     def was_taught(self, what: Taught) -> bool:
@@ -67,10 +55,8 @@ def kept_by_choice(programs: Sequence[Program], choice: Choice) -> list[dict[int
 
     Offsets from taught points are corrected: they have to be so far from where the real robot is at the point.
 
-    Raises
-    ------
-    InputError
-        If a name or pattern fits no target.
+    Raises:
+        InputError: If a name or pattern fits no target.
     """
     only, keep = (Patterns(programs, given, name) for given, name in ((choice.only, "only"), (choice.keep, "keep")))
     return [
@@ -114,19 +100,13 @@ def _why_kept(target: ProgramTarget, choice: Choice, only: Patterns, keep: Patte
 class Patterns:
     """Names and patterns of targets; ``*`` stands for any text, ``?`` for a character, capitals count as small.
 
-    Parameters
-    ----------
-    programs
-        Whose targets they are.
-    given
-        The names and patterns.
-    parameter, where
-        What a refusal names.
+    Args:
+        programs: Whose targets they are.
+        given: The names and patterns.
+        parameter, where: What a refusal names.
 
-    Raises
-    ------
-    InputError
-        If one fits no target.
+    Raises:
+        InputError: If one fits no target.
     """
 
     def __init__(

@@ -29,10 +29,8 @@ _KEPT: Final = (
 def refuse_proprietary_controller(robot: Robot, programs: Sequence[Program]) -> None:
     """Refuse to correct poses for a controller that computes them with a model which nobody else can read.
 
-    Raises
-    ------
-    InputError
-        With what to do instead.
+    Raises:
+        InputError: With what to do instead.
     """
     if robot.controller.kinematics.kind != "proprietary" or not _poses(programs):
         return
@@ -82,10 +80,8 @@ def refuse_kinematics_of_another_arm(robot: Robot, accepted: Collection[str]) ->
 
     What a factory measured of this arm is nearer to it than the data sheet is.
 
-    Raises
-    ------
-    InputError
-        With how far both are from the calibrated arm.
+    Raises:
+        InputError: With how far both are from the calibrated arm.
     """
     if robot.controller.kinematics.kind != "own" or OTHER_ARM in accepted:
         return

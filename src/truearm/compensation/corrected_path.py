@@ -42,37 +42,23 @@ KNOWLEDGE: Final[tuple[Knowledge, ...]] = ("nothing", "geometry", "deflection", 
 
 @dataclass(frozen=True, eq=False)
 class CorrectedPath:
-    """A path followed by the nominal robot, and corrected for the calibrated one.
+    """A path followed by the nominal robot, and corrected for the calibrated one."""
 
-    Attributes
-    ----------
-    planned
-        The path.
-    motion
-        What the controller would command: joint positions of the nominal robot.
-    joints
-        Joint positions to command, by what the correction knows, ``(n, joints)`` [rad or m]. ``nothing`` are those of
-        `motion`; ``geometry`` corrects the identified geometry alone, ``deflection`` also how the joints give way at
-        rest, ``motion`` also what velocities and accelerations add to the loads. What the robot's model does not have
-        is not there.
-    errors
-        For each of them the distance from the path that the calibrated robot predicts in motion [m], ``(n,)``.
-    tips
-        For each of them where the tip will be, in the frame of the path, ``(n, 3)`` [m].
-    loads
-        Force and moment of the load at every joint in the corrected motion, ``(joints, 6, n)`` [N, N m], as
-        :func:`truearm.modeling.loads.joint_loads` has them; None for a robot without masses.
-    nominal
-        The robot that the controller knows, with the tip as its target.
-    """
-
-    planned: PlannedPath
-    motion: JointMotion
+    planned: PlannedPath  #: The path.
+    motion: JointMotion  #: What the controller would command: joint positions of the nominal robot.
+    #: Joint positions to command, by what the correction knows, ``(n, joints)`` [rad or m]. ``nothing`` are those of
+    #: `motion`; ``geometry`` corrects the identified geometry alone, ``deflection`` also how the joints give way at
+    #: rest, ``motion`` also what velocities and accelerations add to the loads. What the robot's model does not have is
+    #: not there.
     joints: Mapping[Knowledge, Array]
+    #: For each of them the distance from the path that the calibrated robot predicts in motion [m], ``(n,)``.
     errors: Mapping[Knowledge, Array]
+    #: For each of them where the tip will be, in the frame of the path, ``(n, 3)`` [m].
     tips: Mapping[Knowledge, Array]
+    #: Force and moment of the load at every joint in the corrected motion, ``(joints, 6, n)`` [N, N m], as
+    #: :func:`truearm.modeling.loads.joint_loads` has them; None for a robot without masses.
     loads: Array | None
-    nominal: Robot
+    nominal: Robot  #: The robot that the controller knows, with the tip as its target.
 
     @property
     def best(self) -> Knowledge:
@@ -88,21 +74,15 @@ class CorrectedPath:
 def correct_path(robot: Robot, planned: PlannedPath, seed: ArrayLike | None = None) -> CorrectedPath:
     """Return the joint motion along a path, and what corrects it.
 
-    Parameters
-    ----------
-    robot
-        Calibrated, with what it carries and what acts on it, which then acts on the tip. For one that is nominal there
-        is no correction.
-    planned
-        The path.
-    seed
-        Joint positions ``(joints,)`` [rad or m] near which the motion shall begin; zero if None.
+    Args:
+        robot: Calibrated, with what it carries and what acts on it, which then acts on the tip. For one that is nominal
+            there is no correction.
+        planned: The path.
+        seed: Joint positions ``(joints,)`` [rad or m] near which the motion shall begin; zero if None.
 
-    Raises
-    ------
-    InputError
-        If the robot has no such target, cannot follow the path, goes too fast, or cannot be corrected along it: with
-        the place on the path.
+    Raises:
+        InputError: If the robot has no such target, cannot follow the path, goes too fast, or cannot be corrected along
+            it: with the place on the path.
     """
     try:
         nominal, known = nominal_robot(robot), True

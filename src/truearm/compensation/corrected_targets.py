@@ -97,10 +97,9 @@ def corrected_digests(original: Iterable[ProgramTarget], corrected: Iterable[Pro
 def refuse_corrected(corrections: Sequence[Correction], known: Sequence[KnownCorrection]) -> None:
     """Refuse programs of which targets would be corrected that are corrected already.
 
-    Raises
-    ------
-    InputError
-        If at least one of twenty targets that would be corrected in a file is among those of a known program.
+    Raises:
+        InputError: If at least one of twenty targets that would be corrected in a file is among those of a known
+            program.
     """
     entries = [(one, _unpacked(one.targets)) for one in known if one.targets]
     for correction in corrections if entries else ():
@@ -159,10 +158,8 @@ def ledger_beside(robot: Path) -> Path:
 def known_by_ledger(ledger: Path) -> list[KnownCorrection]:
     """Return what a ledger says, and those of the folders beside: there are other calibrations of the same robot.
 
-    Raises
-    ------
-    InputError
-        If what has the name of the ledger is none.
+    Raises:
+        InputError: If what has the name of the ledger is none.
     """
     found = [*_known(ledger)]
     beside = {other.resolve() for other in ledger.parent.parent.glob(f"*/{LEDGER}")}
@@ -180,10 +177,8 @@ def _known(ledger: Path) -> list[KnownCorrection]:
 def remember(ledger: Path, programs: Sequence[LedgerEntry]) -> None:
     """Add programs to a ledger, as a whole; what another run adds meanwhile stays.
 
-    Raises
-    ------
-    InputError
-        If what has its name is no ledger, or it cannot be written.
+    Raises:
+        InputError: If what has its name is no ledger, or it cannot be written.
     """
     while True:
         content = read_bytes(ledger) if exists(ledger) else None

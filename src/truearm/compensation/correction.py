@@ -23,12 +23,9 @@ _FEW_TARGETS: Final = 3
 def way_through(program: Program, tips: Array, most: int) -> Array:
     """Return tips ``(m, 3)`` in the order of the moves, with a row of NaN between routines.
 
-    Parameters
-    ----------
-    tips
-        Of the targets, ``(n, 4, 4)`` or ``(n, 3)`` [m].
-    most
-        So many moves at most.
+    Args:
+        tips: Of the targets, ``(n, 4, 4)`` or ``(n, 3)`` [m].
+        most: So many moves at most.
     """
     points = tips if tips.ndim == 2 else tips[:, :3, 3]
     parts: list[Array] = []
@@ -43,47 +40,27 @@ def way_through(program: Program, tips: Array, most: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """One program corrected.
+    """One program corrected."""
 
-    Attributes
-    ----------
-    program
-        As it was.
-    edits
-        What changes in its text.
-    corrected
-        Which targets, ``(n,)``.
-    skipped
-        What stays as it is, and why: what the reader could not use, and targets that cannot be computed.
-    before, after
-        Tips of the targets in their frames, ``(n, 4, 4)`` [m], before and after the correction.
-    tips
-        Tips of the targets in the controller's base frame, ``(n, 4, 4)`` [m].
-    joints
-        Joint positions of the model with which the real robot reaches the targets [rad or m], ``(n, joints)``.
-    on_edge
-        Corrected targets with a joint that leaves the ranges of its configuration, by less than controllers
-        refuse.
-    expected
-        How far the real robot is expected to miss the targets before and after; None if nothing is known of that.
-    not_better
-        Targets whose correction would rather do harm: they stay as they are, unless the path that they belong to is
-        better corrected as a whole, or all were asked for.
-    kept
-        Targets that stay because they shall, by their index, and why.
-    """
-
-    program: Program
-    edits: tuple[Edit, ...]
-    corrected: NDArray[np.bool_]
+    program: Program  #: As it was.
+    edits: tuple[Edit, ...]  #: What changes in its text.
+    corrected: NDArray[np.bool_]  #: Which targets, ``(n,)``.
+    #: What stays as it is, and why: what the reader could not use, and targets that cannot be computed.
     skipped: tuple[Skipped, ...]
+    #: before, after: tips of the targets in their frames, ``(n, 4, 4)`` [m], before and after the correction.
     before: Array
     after: Array
-    tips: Array
+    tips: Array  #: Tips of the targets in the controller's base frame, ``(n, 4, 4)`` [m].
+    #: Joint positions of the model with which the real robot reaches the targets [rad or m], ``(n, joints)``.
     joints: Array
+    #: Corrected targets with a joint that leaves the ranges of its configuration, by less than controllers refuse.
     on_edge: tuple[int, ...]
+    #: How far the real robot is expected to miss the targets before and after; None if nothing is known of that.
     expected: ExpectedErrors | None = None
+    #: Targets whose correction would rather do harm: they stay as they are, unless the path that they belong to is
+    #: better corrected as a whole, or all were asked for.
     not_better: tuple[int, ...] = ()
+    #: Targets that stay because they shall, by their index, and why.
     kept: Mapping[int, Kept] = field(default_factory=dict)
 
     @cached_property
@@ -106,21 +83,11 @@ class Correction:
 
 @dataclass(frozen=True)
 class Shared:
-    """The part of a correction that all targets have in common, as one rigid body, and what is left.
+    """The part of a correction that all targets have in common, as one rigid body, and what is left."""
 
-    Attributes
-    ----------
-    moved
-        By how much the middle of the targets is moved [m].
-    turned
-        By how much the body is turned [rad].
-    remainder
-        How far targets are moved beside that, on average [m].
-    """
-
-    moved: float
-    turned: float
-    remainder: float
+    moved: float  #: By how much the middle of the targets is moved [m].
+    turned: float  #: By how much the body is turned [rad].
+    remainder: float  #: How far targets are moved beside that, on average [m].
 
 
 def shared_motion(parts: Sequence[tuple[Array, Array, Array]]) -> Shared | None:

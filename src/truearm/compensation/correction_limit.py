@@ -34,30 +34,18 @@ _EXAMPLE: Final = "95mm,3deg"
 
 @dataclass(frozen=True)
 class CorrectionLimit:
-    """How far targets may be moved and turned.
+    """How far targets may be moved and turned."""
 
-    Attributes
-    ----------
-    moved
-        [m].
-    turned
-        [rad].
-    words
-        Where it comes from.
-    """
-
-    moved: float
-    turned: float
-    words: str = "as accepted"
+    moved: float  #: [m].
+    turned: float  #: [rad].
+    words: str = "as accepted"  #: Where it comes from.
 
     @classmethod
     def of(cls, text: object, parameter: str) -> CorrectionLimit:
         """Read a limit such as ``95mm,3deg``.
 
-        Raises
-        ------
-        InputError
-            If it is not a length and an angle, with their units and above zero.
+        Raises:
+            InputError: If it is not a length and an angle, with their units and above zero.
         """
         if not isinstance(text, str):
             raise wrong_kind("a length and an angle belong here", text, parameter, f'a text such as "{_EXAMPLE}"')
@@ -92,13 +80,11 @@ class CorrectionLimit:
 def correction_limit(robot: Robot) -> CorrectionLimit:
     """Return twice the largest deviation of a calibrated robot from the nominal one over the workspace.
 
-    Parameters
-    ----------
-    robot
-        Calibrated, as its calibration left it: with the payload that it carried there, and nothing that acts on its
-        tool. The deviation is that of its targets, or of its flange if there are none, in the identified base. An
-        angle that moves a point by as much at the length of the arm counts as much: frames that were located at points
-        turn by that, also where lengths alone are wrong.
+    Args:
+        robot: Calibrated, as its calibration left it: with the payload that it carried there, and nothing that acts on
+            its tool. The deviation is that of its targets, or of its flange if there are none, in the identified base.
+            An angle that moves a point by as much at the length of the arm counts as much: frames that were located at
+            points turn by that, also where lengths alone are wrong.
     """
     joints = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
     believed = nominal_robot(robot)
@@ -123,30 +109,19 @@ def check_size(
 ) -> list[Notice]:
     """Refuse a correction that is larger than the robot explains, or than was accepted in place of that.
 
-    Parameters
-    ----------
-    moved, turned
-        By how much it moves [m] and turns [rad] each target, ``(n,)``.
-    limit
-        Of the robot, :func:`correction_limit`.
-    accepted
-        What the user allows in its place; None if nothing was said.
-    where
-        Where the target of a number is written, for the message.
-    check
-        What to look at, in a sentence.
-    parameter
-        What is refused, of the job.
+    Args:
+        moved, turned: By how much it moves [m] and turns [rad] each target, ``(n,)``.
+        limit: Of the robot, :func:`correction_limit`.
+        accepted: What the user allows in its place; None if nothing was said.
+        where: Where the target of a number is written, for the message.
+        check: What to look at, in a sentence.
+        parameter: What is refused, of the job.
 
-    Returns
-    -------
-    Notice
-        What is said of a correction that was accepted and is beyond the limit of the robot; none otherwise.
+    Returns:
+        Notice: What is said of a correction that was accepted and is beyond the limit of the robot; none otherwise.
 
-    Raises
-    ------
-    InputError
-        With the largest move and turn, and both limits.
+    Raises:
+        InputError: With the largest move and turn, and both limits.
     """
     largest = CorrectionLimit(float(moved.max(initial=0.0)), float(turned.max(initial=0.0)))
     holds = limit if accepted is None else accepted

@@ -51,20 +51,11 @@ _NOTHING: Final = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Points that stay, and that some targets are offsets from.
+    """Points that stay, and that some targets are offsets from."""
 
-    Attributes
-    ----------
-    joints
-        Where the controller sends the joints there, as the model counts them, ``(n, joints)`` [rad or m].
-    turned
-        Whether the offset is in the axes of the tool, ``(n,)``.
-    anchored
-        Which targets are such offsets, ``(n,)``; the others have joints that mean nothing here.
-    """
-
-    joints: Array
-    turned: NDArray[np.bool_]
+    joints: Array  #: Where the controller sends the joints there, as the model counts them, ``(n, joints)`` [rad or m].
+    turned: NDArray[np.bool_]  #: Whether the offset is in the axes of the tool, ``(n,)``.
+    #: Which targets are such offsets, ``(n,)``; the others have joints that mean nothing here.
     anchored: NDArray[np.bool_]
 
     def some(self, rows: NDArray[np.intp]) -> Start:
@@ -74,34 +65,18 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class TargetsReached:
-    """Targets of a program as the real robot shall reach them.
+    """Targets of a program as the real robot shall reach them."""
 
-    Attributes
-    ----------
-    joints
-        Joint positions of the model, ``(n, joints)`` [rad or m].
-    tips
-        Where the tip of the tool is on the identified flange, ``(n, 3)`` [m].
-    shifts
-        By how much targets are moved, in the axes of the robot's base, ``(n, 3)`` [m].
-    groups
-        Number of the group that each target belongs to, ``(n,)``; groups are corrected together or not at all.
-    frames
-        Number of the frame, or of several together, that takes up what its targets share, ``(n,)``.
-    arms, arm
-        The robot with each load, and which of them it is at each target, ``(n,)``.
-    start
-        Points that stay and that some of them are offsets from; None if there are none.
-    """
-
-    joints: Array
-    tips: Array
-    shifts: Array
+    joints: Array  #: Joint positions of the model, ``(n, joints)`` [rad or m].
+    tips: Array  #: Where the tip of the tool is on the identified flange, ``(n, 3)`` [m].
+    shifts: Array  #: By how much targets are moved, in the axes of the robot's base, ``(n, 3)`` [m].
+    #: Number of the group that each target belongs to, ``(n,)``; groups are corrected together or not at all.
     groups: NDArray[np.intp]
+    #: Number of the frame, or of several together, that takes up what its targets share, ``(n,)``.
     frames: NDArray[np.intp]
-    arms: tuple[Robot, ...]
+    arms: tuple[Robot, ...]  #: arms, arm: the robot with each load, and which of them it is at each target, ``(n,)``.
     arm: NDArray[np.intp]
-    start: Start | None = None
+    start: Start | None = None  #: Points that stay and that some of them are offsets from; None if there are none.
 
     @property
     def alone(self) -> NDArray[np.bool_]:
@@ -118,29 +93,18 @@ class TargetsReached:
 
 @dataclass(frozen=True, eq=False)
 class DrawnErrors:
-    """Distances of the real robot from some targets, drawn from what is not known of it.
+    """Distances of the real robot from some targets, drawn from what is not known of it."""
 
-    Attributes
-    ----------
-    rows
-        Which targets, ``(m,)``.
-    before, after
-        Distances without and with the correction [m], ``(m, draws)``.
-    """
-
-    rows: NDArray[np.intp]
-    before: Array
+    rows: NDArray[np.intp]  #: Which targets, ``(m,)``.
+    before: Array  #: before, after: distances without and with the correction [m], ``(m, draws)``.
     after: Array
 
     def interval(self, corrected: NDArray[np.bool_], among: NDArray[np.bool_]) -> tuple[float, float] | None:
         """Return from where to where the mean distance lies with a probability of 90 % [m]; None of no targets.
 
-        Parameters
-        ----------
-        corrected
-            Which of all targets are, ``(n,)``.
-        among
-            Which of all targets count, ``(n,)``.
+        Args:
+            corrected: Which of all targets are, ``(n,)``.
+            among: Which of all targets count, ``(n,)``.
         """
         mine = among[self.rows]
         if not mine.any():
@@ -152,25 +116,15 @@ class DrawnErrors:
 
 @dataclass(frozen=True, eq=False)
 class ExpectedErrors:
-    """What is expected of the targets of a program; NaN where a target is not corrected.
+    """What is expected of the targets of a program; NaN where a target is not corrected."""
 
-    Attributes
-    ----------
-    before, after
-        Mean distance of the real robot from each target [m], ``(n,)``, without and with its correction.
-    worse
-        Probability that the correction makes the distance larger, ``(n,)``.
-    group_worse
-        Probability that it makes the sum of squares of the distances in the target's group larger, ``(n,)``.
-    drawn
-        Distances that the real robot may have from some of them.
-    """
-
+    #: before, after: mean distance of the real robot from each target [m], ``(n,)``, without and with its correction.
     before: Array
     after: Array
-    worse: Array
+    worse: Array  #: Probability that the correction makes the distance larger, ``(n,)``.
+    #: Probability that it makes the sum of squares of the distances in the target's group larger, ``(n,)``.
     group_worse: Array
-    drawn: DrawnErrors
+    drawn: DrawnErrors  #: Distances that the real robot may have from some of them.
 
     def at_least(self, least: float) -> ExpectedErrors:
         """Return it with no mean distance below one [m]."""
@@ -198,24 +152,18 @@ def expected_errors(
 ) -> tuple[ExpectedErrors, ...]:
     """Return what is expected of the targets of programs that are corrected together.
 
-    Parameters
-    ----------
-    robot
-        Calibrated.
-    proof
-        What is known of its parameters.
-    programs
-        Their targets.
-    frames
-        Whether the places of frames were given, or assumed. Those that were given are taken as exact in the world of
-        the calibration. A tool whose tip is a target of the calibration is known as well as that; any other only as
-        well as the real flange on the identified one (:func:`truearm.compensation.gauge.flange_spread`).
-    taught_tools
-        Whether the tools were found with this robot before its calibration.
+    Args:
+        robot: Calibrated.
+        proof: What is known of its parameters.
+        programs: Their targets.
+        frames: Whether the places of frames were given, or assumed. Those that were given are taken as exact in the
+            world of the calibration. A tool whose tip is a target of the calibration is known as well as that; any
+            other only as well as the real flange on the identified one
+            (:func:`truearm.compensation.gauge.flange_spread`).
+        taught_tools: Whether the tools were found with this robot before its calibration.
 
-    Notes
-    -----
-    No distance is below :data:`REPEATABILITY`.
+    Note:
+        No distance is below :data:`REPEATABILITY`.
     """
     model = _ModelErrors(robot, proof, frames == "assumed", taught_tools)
     if frames == "assumed":
@@ -286,22 +234,13 @@ def _mean_length(square: Array, variance: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _ModelErrors:
-    """What the error of a calibrated model does to tips: derivatives by independent numbers of deviation 1.
-
-    Attributes
-    ----------
-    assumed_frames
-        Whether the places of frames are assumed, and so take part of the errors up.
-    taught_tools
-        Whether tools were found with this robot.
-    shared
-        What each frame takes up, by its number; nothing where there is none.
-    """
+    """What the error of a calibrated model does to tips: derivatives by independent numbers of deviation 1."""
 
     robot: Robot
     proof: Proof
-    assumed_frames: bool
-    taught_tools: bool
+    assumed_frames: bool  #: Whether the places of frames are assumed, and so take part of the errors up.
+    taught_tools: bool  #: Whether tools were found with this robot.
+    #: What each frame takes up, by its number; nothing where there is none.
     shared: Mapping[int, CommonMotion] = field(default_factory=dict)
 
     @cached_property

@@ -31,10 +31,8 @@ def nominal_robot(robot: Robot) -> Robot:
     its parameters. A controller that computes with kinematics of its own, which are known, believes in those. The world
     of the nominal robot is its base frame.
 
-    Raises
-    ------
-    InputError
-        If the robot is its nominal self, so that there is nothing to correct.
+    Raises:
+        InputError: If the robot is its nominal self, so that there is nothing to correct.
     """
     nominal = _nominal(robot)
     controllers = controller_robot(nominal)
@@ -72,17 +70,10 @@ def _same_arm(robot: Robot, other: Robot) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class FakeTargets:
-    """Fake targets, one a pose.
+    """Fake targets, one a pose."""
 
-    Attributes
-    ----------
-    flange
-        Where the nominal robot would have its flange in its base frame, ``(n, 4, 4)``: what to write.
-    solutions
-        Joint positions of the calibrated robot for the wanted poses, one row a pose, and how each was found.
-    """
-
-    flange: Array
+    flange: Array  #: Where the nominal robot would have its flange in its base frame, ``(n, 4, 4)``: what to write.
+    #: Joint positions of the calibrated robot for the wanted poses, one row a pose, and how each was found.
     solutions: JointSolutions
 
     @property
@@ -94,20 +85,14 @@ class FakeTargets:
 def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     """Return the fake targets of wanted poses.
 
-    Parameters
-    ----------
-    robot
-        The calibrated robot, with its joint effects and payload.
-    flange
-        Wanted poses of the flange in the identified base frame, ``(n, 4, 4)`` [m], at least one.
-    near
-        Joint positions of the nominal robot at the wanted poses, ``(n, joints)`` [rad or m]: the answers are on the
-        same branch and in the same turns.
+    Args:
+        robot: The calibrated robot, with its joint effects and payload.
+        flange: Wanted poses of the flange in the identified base frame, ``(n, 4, 4)`` [m], at least one.
+        near: Joint positions of the nominal robot at the wanted poses, ``(n, joints)`` [rad or m]: the answers are on
+            the same branch and in the same turns.
 
-    Raises
-    ------
-    InputError
-        If the robot is not calibrated or an array has the wrong shape.
+    Raises:
+        InputError: If the robot is not calibrated or an array has the wrong shape.
     """
     nominal = nominal_robot(robot)
     rule = branch_rule(robot)
@@ -152,12 +137,9 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
 def fake_targets_of(robots: Sequence[Robot], which: NDArray[np.intp], flange: Array, near: Array) -> FakeTargets:
     """Return the fake targets of wanted poses, for one calibrated robot with several loads.
 
-    Parameters
-    ----------
-    robots
-        The robot with each load.
-    which
-        Index of the robot for each pose, ``(n,)``; `flange` and `near` as for :func:`fake_targets`.
+    Args:
+        robots: The robot with each load.
+        which: Index of the robot for each pose, ``(n,)``; `flange` and `near` as for :func:`fake_targets`.
     """
     if len(robots) == 1:
         return fake_targets(robots[0], flange, near)
@@ -175,16 +157,11 @@ def _better(
 ) -> JointSolutions:
     """Return solutions with others in their place that are on the branch where they are not, or can be used.
 
-    Parameters
-    ----------
-    found
-        One solution a pose.
-    again, rows
-        Others, and the pose of each.
-    near
-        Joints to be near to, of every pose.
-    on_branch
-        Whether solutions of poses are on the branch of these.
+    Args:
+        found: One solution a pose.
+        again, rows: Others, and the pose of each.
+        near: Joints to be near to, of every pose.
+        on_branch: Whether solutions of poses are on the branch of these.
     """
     agrees, usable = on_branch(again, rows), again.usable
     away = np.abs(again.joints - near[rows]).max(axis=1)

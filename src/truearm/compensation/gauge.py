@@ -54,15 +54,11 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
     The weighted squares of the differences of both robots' flange poses, at random configurations within the limits,
     are least; an angle counts as what it moves at the length of the arm.
 
-    Parameters
-    ----------
-    robot
-        Calibrated.
+    Args:
+        robot: Calibrated.
 
-    Returns
-    -------
-    base, flange
-        ``T_base_nominalbase`` and ``T_flange_nominalflange``, ``(4, 4)`` each [m].
+    Returns:
+        base, flange: ``T_base_nominalbase`` and ``T_flange_nominalflange``, ``(4, 4)`` each [m].
     """
     base, flange, _ = _agreement(robot, nominal_robot(robot), not base_is_held(robot), _flange_freedom(robot))
     return base, flange
@@ -114,12 +110,9 @@ def disagreement(robot: Robot, nominal: Robot) -> float:
 def _agreement(robot: Robot, nominal: Robot, base_moves: bool, freedom: Array) -> tuple[Array, Array, float]:
     """Return where base and flange of a nominal robot agree best with the identified ones, and what is left [m].
 
-    Parameters
-    ----------
-    base_moves
-        Whether the base may differ.
-    freedom
-        Motions by which the flange may, ``(6, k)``.
+    Args:
+        base_moves: Whether the base may differ.
+        freedom: Motions by which the flange may, ``(6, k)``.
     """
     joints = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
     nominal_poses, real_poses = matrices(nominal, joints), np.linalg.inv(robot.base.matrix) @ matrices(robot, joints)
@@ -145,15 +138,11 @@ def _agreement(robot: Robot, nominal: Robot, base_moves: bool, freedom: Array) -
 def flange_rates(robot: Robot, names: Sequence[str]) -> Array:
     """Return how the flange of :func:`best_agreement` moves with parameters of the identified robot.
 
-    Parameters
-    ----------
-    names
-        Of the parameters; those of the base count for nothing.
+    Args:
+        names: Of the parameters; those of the base count for nothing.
 
-    Returns
-    -------
-    rates
-        ``(6, parameters)``: translation and rotation vector of the flange in its own axes [m, rad per unit].
+    Returns:
+        rates: ``(6, parameters)``: translation and rotation vector of the flange in its own axes [m, rad per unit].
     """
     joints = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
     poses = matrices(robot, joints)
@@ -177,19 +166,14 @@ def flange_spread(robot: Robot, *, taught: bool = False) -> Array:
     the last axis the errors of two links add. Beside it, a flange that is turned on its bearings is where it should be:
     half of them are taken for such. Targets that were held on the flange leave what they do not determine.
 
-    Parameters
-    ----------
-    robot
-        Calibrated.
-    taught
-        Whether the tool was found with this robot before its calibration: what the robot missed then is as large, and
-        no target that was held says it.
+    Args:
+        robot: Calibrated.
+        taught: Whether the tool was found with this robot before its calibration: what the robot missed then is as
+            large, and no target that was held says it.
 
-    Returns
-    -------
-    spread
-        ``(6, 6)``: translation and rotation vector of the flange in its own axes [m, rad], by independent numbers of
-        deviation 1, one for each; see :func:`flange_draws`.
+    Returns:
+        spread: ``(6, 6)``: translation and rotation vector of the flange in its own axes [m, rad], by independent
+            numbers of deviation 1, one for each; see :func:`flange_draws`.
     """
     length, angle = _found_accuracy(robot, "geometry", "m"), _found_accuracy(robot, "geometry", "rad")
     zero = _found_accuracy(robot, "joint zero", "rad")
@@ -230,18 +214,13 @@ def _found_accuracy(robot: Robot, group: Group, unit: Unit) -> float:
 def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
     """Return where the nominal base has to be in the identified one for the corrections to have no common part.
 
-    Parameters
-    ----------
-    corrected
-        For a base ``(4, 4)`` the tips of targets before and after their correction, in the nominal base frame,
-        ``(n, 4, 4)`` each; of no targets at all if none can be corrected.
-    start
-        A base near to it.
+    Args:
+        corrected: For a base ``(4, 4)`` the tips of targets before and after their correction, in the nominal base
+            frame, ``(n, 4, 4)`` each; of no targets at all if none can be corrected.
+        start: A base near to it.
 
-    Returns
-    -------
-    base
-        ``T_base_nominalbase``, ``(4, 4)``. The :func:`common_motion` of the changes is zero.
+    Returns:
+        base: ``T_base_nominalbase``, ``(4, 4)``. The :func:`common_motion` of the changes is zero.
     """
     base = start
     for _ in range(_ROUNDS):
@@ -263,19 +242,11 @@ def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) 
 
 @dataclass(frozen=True, eq=False)
 class CommonMotion:
-    """The motions of one rigid body that are nearest to those of many targets.
+    """The motions of one rigid body that are nearest to those of many targets."""
 
-    Attributes
-    ----------
-    moved, turned
-        Motion of the middle [m], and rotation vector, ``(3, k)`` each.
-    middle
-        Of the targets, ``(3,)`` [m].
-    """
-
-    moved: Array
+    moved: Array  #: moved, turned: motion of the middle [m], and rotation vector, ``(3, k)`` each.
     turned: Array
-    middle: Array
+    middle: Array  #: Of the targets, ``(3,)`` [m].
 
     def of(self, places: Array) -> Array:
         """Return what it does to places ``(n, 3)``: ``(n, 3, k)`` [m]."""
@@ -285,11 +256,9 @@ class CommonMotion:
 def common_motion(parts: Iterable[tuple[Array, Array, Array]]) -> CommonMotion:
     """Return the motions that all targets have in common, by least squares.
 
-    Parameters
-    ----------
-    parts
-        Of the targets: places ``(n, 3)`` [m], motions [m] and rotation vectors [rad], ``(n, 3, k)`` each. Targets of
-        all parts together share the motions.
+    Args:
+        parts: Of the targets: places ``(n, 3)`` [m], motions [m] and rotation vectors [rad], ``(n, 3, k)`` each.
+            Targets of all parts together share the motions.
     """
     count, place, moments = 0, np.zeros(3), np.zeros((3, 3))
     moved: Array | float = 0.0

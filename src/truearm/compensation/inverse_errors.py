@@ -29,28 +29,18 @@ CONVENTION: Final = "joint-errors"
 
 @dataclass(frozen=True, eq=False)
 class FakeTargets:
-    """What to command so that the real robot reaches wanted poses.
+    """What to command so that the real robot reaches wanted poses."""
 
-    Attributes
-    ----------
-    position, rotation
-        The fake targets in the base frame, ``(n, 3)`` [m] and ``(n, 3, 3)``.
-    solutions
-        The nominal robot's joint positions for them, with a status each.
-    """
-
-    position: Array
+    position: Array  #: position, rotation: the fake targets in the base frame, ``(n, 3)`` [m] and ``(n, 3, 3)``.
     rotation: Array
-    solutions: JointSolutions
+    solutions: JointSolutions  #: The nominal robot's joint positions for them, with a status each.
 
 
 def design(robot: Robot) -> Robot:
     """Return the robot without joint errors, in its own base frame.
 
-    Raises
-    ------
-    InputError
-        If it is not described by joint errors.
+    Raises:
+        InputError: If it is not described by joint errors.
     """
     return replace(_checked(robot).with_frames(IDENTITY, {}), known={}, effect_names=())
 
@@ -60,10 +50,8 @@ def inverted(robot: Robot) -> Robot:
 
     Calibrated joint zeros count as errors too.
 
-    Raises
-    ------
-    InputError
-        If the robot is not described by joint errors.
+    Raises:
+        InputError: If the robot is not described by joint errors.
     """
     joints = []
     for number, (joint, link) in enumerate(zip(_checked(robot).joints, robot.link_elements, strict=True), 1):
@@ -84,12 +72,9 @@ def inverted(robot: Robot) -> Robot:
 def fake_targets(robot: Robot, joints: Array) -> FakeTargets:
     """Return fake targets, and the joint positions to command, for nominal joint positions ``(n, joints)`` [rad].
 
-    Parameters
-    ----------
-    robot
-        With identified joint errors.
-    joints
-        Joint positions at which the nominal robot is at the wanted poses.
+    Args:
+        robot: With identified joint errors.
+        joints: Joint positions at which the nominal robot is at the wanted poses.
     """
     position, rotation = inverted(robot).world_poses(joints)
     return FakeTargets(position, rotation, inverse(design(robot), position, rotation, seed=joints))

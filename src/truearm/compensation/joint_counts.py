@@ -21,10 +21,8 @@ ASSUMED: Final = ("Joint counting is not known:", "compare joints with the penda
 def refuse_unknown_counts(robot: Robot, language: str) -> None:
     """Refuse a program with joint positions for controllers that are known to count otherwise than a model can.
 
-    Raises
-    ------
-    InputError
-        If the robot file does not say how its controller counts, and the language is of such controllers.
+    Raises:
+        InputError: If the robot file does not say how its controller counts, and the language is of such controllers.
     """
     if robot.controller.counts_known or language not in _COUNTED_TOGETHER:
         return

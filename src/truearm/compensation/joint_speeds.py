@@ -84,18 +84,12 @@ def joint_shares(
 
     That is higher than was asked for where the language has no share low enough for the fastest joints.
 
-    Parameters
-    ----------
-    language
-        Its name; languages say speeds in different ways.
-    ways
-        Joint positions of the model at both ends ``(2, joints)`` [rad or m].
-    shown
-        The same as the controller shows them.
-    share
-        Of the joints' speed, at most.
-    speed
-        Of no target and of the flange is higher [m/s].
+    Args:
+        language: Its name; languages say speeds in different ways.
+        ways: Joint positions of the model at both ends ``(2, joints)`` [rad or m].
+        shown: The same as the controller shows them.
+        share: Of the joints' speed, at most.
+        speed: Of no target and of the flange is higher [m/s].
     """
     along = fastest_point(robot, ways)
     least, most = turned(ways, shown)
@@ -155,10 +149,8 @@ def fastest_point(robot: Robot, ways: Array) -> float:
     step is that in its middle to within ``h^2 / 24`` of the largest third derivative of the position, where h is the
     step, and so is what lies between two middles to within ``h^2 / 8`` of that of the straight line between theirs.
 
-    Parameters
-    ----------
-    ways
-        Joint positions at both ends ``(2, joints)`` [rad or m].
+    Args:
+        ways: Joint positions at both ends ``(2, joints)`` [rad or m].
     """
     return max(_fastest_of(robot, ways, name) for name in (None, *(target.name for target in robot.targets)))
 
@@ -207,10 +199,8 @@ def speed_words(speeds: Sequence[float], robot: Robot) -> str:
 def speed_notices(robot: Robot, assumed: str) -> list[Notice]:
     """Return what is to be said of the joints' speed.
 
-    Parameters
-    ----------
-    assumed
-        What was taken where it is not known, in words.
+    Args:
+        assumed: What was taken where it is not known, in words.
     """
     stated = zip(robot.joints, stated_speeds(robot), strict=True)
     unknown = [joint.name for joint, speed in stated if speed is None]

@@ -51,12 +51,9 @@ def paths_of(program: Program) -> NDArray[np.intp]:
 def kept_targets(program: Program, moved: Array, expected: ExpectedErrors) -> NDArray[np.bool_]:
     """Return which targets of a program stay as they are, ``(n,)``.
 
-    Parameters
-    ----------
-    moved
-        By how much their correction would move them [m], ``(n,)``.
-    expected
-        What is expected of them.
+    Args:
+        moved: By how much their correction would move them [m], ``(n,)``.
+        expected: What is expected of them.
     """
     paths = paths_of(program)
     count = int(paths.max(initial=-1)) + 1

@@ -19,10 +19,8 @@ def beyond_measured(robot: Robot, joints: Array) -> NDArray[np.bool_]:
 
     A turn more or less is the same posture.
 
-    Parameters
-    ----------
-    joints
-        Joint positions of the model, ``(n, joints)`` [rad or m].
+    Args:
+        joints: Joint positions of the model, ``(n, joints)`` [rad or m].
     """
     region = () if robot.proof is None else robot.proof.region
     if len(region) != len(robot.joints):

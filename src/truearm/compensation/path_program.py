@@ -33,24 +33,16 @@ _AXES: Final = 6
 def path_program(path: CorrectedPath, robot: Robot, name: str, *, targets: TargetKind, spacing: float) -> NewProgram:
     """Return the targets of a program that follows a corrected path.
 
-    Parameters
-    ----------
-    path
-        With its corrected joint positions.
-    robot
-        For whom it is.
-    name
-        Of the program.
-    targets
-        ``joints``, or ``poses``: those that the controller's robot has with the corrected joint positions.
-    spacing
-        Time from one target to the next [s], or a little less; that of the samples at the least.
+    Args:
+        path: With its corrected joint positions.
+        robot: For whom it is.
+        name: Of the program.
+        targets: ``joints``, or ``poses``: those that the controller's robot has with the corrected joint positions.
+        spacing: Time from one target to the next [s], or a little less; that of the samples at the least.
 
-    Raises
-    ------
-    InputError
-        If the name cannot be one in every language, or the arm has more or fewer than six joints and poses are wanted,
-        or more than six.
+    Raises:
+        InputError: If the name cannot be one in every language, or the arm has more or fewer than six joints and poses
+            are wanted, or more than six.
     """
     if not re.fullmatch(NAME, name):
         raise InputError(
@@ -111,12 +103,9 @@ def _chosen(time: Array, section: NDArray[np.intp], spacing: float) -> NDArray[n
 def _beside(path: CorrectedPath, rows: NDArray[np.intp], *, straight: bool) -> float:
     """Return how far a program leaves the path between its targets [m], its corners not rounded off.
 
-    Parameters
-    ----------
-    rows
-        The samples that are targets.
-    straight
-        Whether the tip goes straight from one to the next, or all joints evenly.
+    Args:
+        rows: The samples that are targets.
+        straight: Whether the tip goes straight from one to the next, or all joints evenly.
     """
     travelled, position = path.planned.trajectory.distance, path.planned.trajectory.position
 

@@ -52,30 +52,15 @@ _Pace = tuple[float, float, float | None, float]
 
 @dataclass(frozen=True)
 class Driving:
-    """How a program drives through a plan.
+    """How a program drives through a plan."""
 
-    Attributes
-    ----------
-    speed
-        Of no target and of the flange is higher [m/s].
-    share
-        Of the fastest that the joints go, at most.
-    dwell
-        How long the robot stands in each configuration [s].
-    wait
-        What it waits for after that: nothing more (``time``), a digital ``input``, or the ``operator``.
-    input
-        Number or name of the digital input.
-    longest
-        How long it is waited for [s].
-    """
-
-    speed: float = 0.25
-    share: float = 0.1
-    dwell: float = 2.0
+    speed: float = 0.25  #: Of no target and of the flange is higher [m/s].
+    share: float = 0.1  #: Of the fastest that the joints go, at most.
+    dwell: float = 2.0  #: How long the robot stands in each configuration [s].
+    #: What it waits for after that: nothing more (``time``), a digital ``input``, or the ``operator``.
     wait: Literal["time", "input", "operator"] = "time"
-    input: str = ""
-    longest: float = 300.0
+    input: str = ""  #: Number or name of the digital input.
+    longest: float = 300.0  #: How long it is waited for [s].
 
     @property
     def words(self) -> str:
@@ -90,18 +75,12 @@ def plan_program(tour: Tour, robot: Robot, language: str, driving: Driving, mark
 
     That is higher than was asked for where a language has no share low enough for the fastest joints.
 
-    Parameters
-    ----------
-    tour
-        Whose ways were checked.
-    robot
-        With its targets and what it carries.
-    language
-        Its name; languages say speeds in different ways.
-    driving
-        How fast, and for what it waits.
-    mark
-        By which the plan is known, for a comment.
+    Args:
+        tour: Whose ways were checked.
+        robot: With its targets and what it carries.
+        language: Its name; languages say speeds in different ways.
+        driving: How fast, and for what it waits.
+        mark: By which the plan is known, for a comment.
     """
     shown = robot.controller.from_model(tour.joints)
     first, speed = _first_move(robot, language, driving)

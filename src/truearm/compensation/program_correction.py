@@ -40,23 +40,16 @@ _MORE_THAN_ONE: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """What was taken for the real base and flange.
+    """What was taken for the real base and flange."""
 
-    Attributes
-    ----------
-    tools, frames
-        Whether the places of tools and frames were given, or assumed, or follow from a flange or base that were held.
-    bases
-        ``T_base_nominalbase``, ``(4, 4)`` [m], as assumed, by the name of the frame for whose targets it is: one for
-        all, but where frames were taught. Where frames are identified, it is that of the first of them.
-    flange
-        ``T_flange_nominalflange``, ``(4, 4)`` [m], as assumed.
-    """
-
+    #: tools, frames: whether the places of tools and frames were given, or assumed, or follow from a flange or base
+    #: that were held.
     tools: Provenance
     frames: Provenance
+    #: ``T_base_nominalbase``, ``(4, 4)`` [m], as assumed, by the name of the frame for whose targets it is: one for
+    #: all, but where frames were taught. Where frames are identified, it is that of the first of them.
     bases: Mapping[str, Array]
-    flange: Array
+    flange: Array  #: ``T_flange_nominalflange``, ``(4, 4)`` [m], as assumed.
 
     @property
     def base(self) -> Array:
@@ -66,38 +59,19 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class CorrectedPrograms:
-    """Programs corrected together, with one base and one flange.
+    """Programs corrected together, with one base and one flange."""
 
-    Attributes
-    ----------
-    corrections
-        One a program.
-    frames
-        What they refer to.
-    guessed
-        Where the posture of a first pose was guessed, in words; empty if nowhere.
-    between
-        One a program: how poses between its targets are corrected.
-    real_tips
-        One a program: where tips shall be, and where the real robot takes them.
-    choice
-        What was said of the targets.
-    loads
-        What the robot carries with each tool in use, by the name of the tool; None where the programs do not say it.
-    tools_apart
-        How far the tip of each tool that was measured is from where the program has it [m], by the name of the tool.
-    pushed
-        The robot with what acts on its tool, and joint positions ``(n, joints)`` at which it does.
-    """
-
-    corrections: tuple[Correction, ...]
-    frames: Frames
-    guessed: tuple[str, ...]
-    between: tuple[Between, ...]
-    real_tips: tuple[RealTips, ...]
-    choice: Choice
+    corrections: tuple[Correction, ...]  #: One a program.
+    frames: Frames  #: What they refer to.
+    guessed: tuple[str, ...]  #: Where the posture of a first pose was guessed, in words; empty if nowhere.
+    between: tuple[Between, ...]  #: One a program: how poses between its targets are corrected.
+    real_tips: tuple[RealTips, ...]  #: One a program: where tips shall be, and where the real robot takes them.
+    choice: Choice  #: What was said of the targets.
+    #: What the robot carries with each tool in use, by the name of the tool; None where the programs do not say it.
     loads: Mapping[str, Payload | None]
+    #: How far the tip of each tool that was measured is from where the program has it [m], by the name of the tool.
     tools_apart: Mapping[str, float]
+    #: The robot with what acts on its tool, and joint positions ``(n, joints)`` at which it does.
     pushed: tuple[tuple[Robot, Array], ...] = ()
 
     @property
@@ -118,28 +92,19 @@ def corrected_programs(
 ) -> CorrectedPrograms:
     """Correct programs.
 
-    Parameters
-    ----------
-    robot
-        Calibrated, with the payload of the production tool.
-    programs
-        They share what has to be assumed of base and flange, and so stay together.
-    cell
-        Tools and frames, as far as they were given.
-    progress
-        Called with what is being done.
-    choice
-        Which targets are corrected.
-    weigh_tools
-        Whether the robot carries what the programs say of each tool, where they do.
-    wrenches
-        What acts on the tool at which targets. The base is found without it: no frame was located under a force.
+    Args:
+        robot: Calibrated, with the payload of the production tool.
+        programs: They share what has to be assumed of base and flange, and so stay together.
+        cell: Tools and frames, as far as they were given.
+        progress: Called with what is being done.
+        choice: Which targets are corrected.
+        weigh_tools: Whether the robot carries what the programs say of each tool, where they do.
+        wrenches: What acts on the tool at which targets. The base is found without it: no frame was located under a
+            force.
 
-    Raises
-    ------
-    InputError
-        If the robot is not calibrated or has fewer than six joints, a tool or frame is not defined, only some of
-        them have a real place, or a name in `choice` fits no target.
+    Raises:
+        InputError: If the robot is not calibrated or has fewer than six joints, a tool or frame is not defined, only
+            some of them have a real place, or a name in `choice` fits no target.
     """
     if len(robot.joints) < _JOINTS:
         raise InputError(

@@ -68,21 +68,11 @@ class CorrectionRecord(BaseModel):
 
 @dataclass(frozen=True)
 class ProgramFile:
-    """A program file as it was found.
+    """A program file as it was found."""
 
-    Attributes
-    ----------
-    path
-        Where it was found.
-    name
-        What it is called in the folder of results: its name, with folders where two would have the same.
-    original
-        Its bytes before any correction.
-    """
-
-    path: Path
-    name: str
-    original: bytes = field(repr=False)
+    path: Path  #: Where it was found.
+    name: str  #: What it is called in the folder of results: its name, with folders where two would have the same.
+    original: bytes = field(repr=False)  #: Its bytes before any correction.
 
 
 def record_path(program: Path) -> Path:
@@ -93,15 +83,11 @@ def record_path(program: Path) -> Path:
 def program_files(paths: Sequence[Path], *, again: bool = False) -> tuple[ProgramFile, ...]:
     """Read program files, and those that belong to them.
 
-    Parameters
-    ----------
-    again
-        Take the original of a program that was corrected already, out of its record.
+    Args:
+        again: Take the original of a program that was corrected already, out of its record.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be read, is no text or too large, is given twice, or was corrected already.
+    Raises:
+        InputError: If a file cannot be read, is no text or too large, is given twice, or was corrected already.
     """
     every = [*paths]
     for path in paths:
@@ -120,10 +106,8 @@ def _refuse_twice(paths: Sequence[Path]) -> None:
 def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
     """Return the originals of corrected programs, out of their records.
 
-    Raises
-    ------
-    InputError
-        If a program has no record, was changed after it was written, or is given twice.
+    Raises:
+        InputError: If a program has no record, was changed after it was written, or is given twice.
     """
     _refuse_twice(paths)
     made = []
@@ -142,10 +126,8 @@ def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
 def read_programs(files: Sequence[ProgramFile]) -> tuple[Program, ...]:
     """Find targets and moves in program files of one language.
 
-    Raises
-    ------
-    InputError
-        If the files are of several languages or of none, or one of them is malformed.
+    Raises:
+        InputError: If the files are of several languages or of none, or one of them is malformed.
     """
     languages = [_language(file) for file in files]
     other = next((i for i, language in enumerate(languages) if language is not languages[0]), None)
@@ -164,10 +146,8 @@ def read_programs(files: Sequence[ProgramFile]) -> tuple[Program, ...]:
 def read_sources(language: Language, sources: Sequence[Source]) -> tuple[Program, ...]:
     """Find targets and moves in the texts of programs of a language.
 
-    Raises
-    ------
-    InputError
-        If one of them is malformed.
+    Raises:
+        InputError: If one of them is malformed.
     """
     # Hundreds of thousands of targets are made that all stay: the collector would look through them again and again.
     collecting = gc.isenabled()
@@ -235,11 +215,9 @@ def write_programs(
     The ledger is written first, then records are put in place: there is never a corrected program that they do not
     know, and which could be corrected once more.
 
-    Raises
-    ------
-    InputError
-        If a program would be overwritten that was read, or that truearm has not written itself, or one without a
-        record would be written beside the record of another.
+    Raises:
+        InputError: If a program would be overwritten that was read, or that truearm has not written itself, or one
+            without a record would be written beside the record of another.
     """
     read = [*inputs, *map(record_path, inputs)]
     for name, content in files.items():
@@ -350,10 +328,8 @@ def _unpacked(packed: str, record: Path) -> bytes:
 def correction_record(path: Path) -> CorrectionRecord | None:
     """Return the record beside a program; None if there is none, so that nobody has corrected it.
 
-    Raises
-    ------
-    InputError
-        If the program is a folder, or the record cannot be read.
+    Raises:
+        InputError: If the program is a folder, or the record cannot be read.
     """
     if path.is_dir():
         raise InputError("this is a folder, a program is needed", where=str(path), cure="Name the files in it.")

@@ -27,15 +27,11 @@ def provenance(
 ) -> Provenance:
     """Return whether the real places of all tools or frames in use were given, or of none.
 
-    Parameters
-    ----------
-    kept
-        Of each program the targets that stay, by their index: where their tools and frames are does not count.
+    Args:
+        kept: Of each program the targets that stay, by their index: where their tools and frames are does not count.
 
-    Raises
-    ------
-    InputError
-        If only some of them were given, or none that the programs use.
+    Raises:
+        InputError: If only some of them were given, or none that the programs use.
     """
     given = cell.tools if kind == "tool" else cell.frames
     used: set[str] = set()

@@ -35,10 +35,8 @@ def poses_of(program: Program) -> Array:
 def joints_of(robot: Robot, program: Program) -> Array:
     """Return the joint positions of the model for targets given by joints, ``(n, joints)`` [rad or m]; else NaN.
 
-    Raises
-    ------
-    InputError
-        If a target has not as many joints as the robot, or its pulses are not known.
+    Raises:
+        InputError: If a target has not as many joints as the robot, or its pulses are not known.
     """
     targets = program.targets
     joints = np.full((len(targets), len(robot.joints)), np.nan)
@@ -76,12 +74,9 @@ def place(program: Program, target: ProgramTarget) -> str:
 def pose_numbers(program: Program, before: Array, after: Array, rows: NDArray[np.intp]) -> dict[int, Array]:
     """Return new numbers of some targets given by poses, by their index, in the units of their forms.
 
-    Parameters
-    ----------
-    before, after
-        Poses of all targets in their frames, ``(n, 4, 4)`` [m], as the program has them and as it shall.
-    rows
-        Which targets.
+    Args:
+        before, after: Poses of all targets in their frames, ``(n, 4, 4)`` [m], as the program has them and as it shall.
+        rows: Which targets.
     """
     targets = program.targets
     offsets = after.copy()

@@ -10,33 +10,19 @@ from truearm.errors import InputError
 
 @dataclass(frozen=True)
 class Question:
-    """A question whose answer decides whether a correction helps or harms.
+    """A question whose answer decides whether a correction helps or harms."""
 
-    Attributes
-    ----------
-    parameter
-        Of the job, which answers it.
-    text
-        The question, and why it is asked.
-    answers
-        How the parameter answers it.
-    kept
-        Where an answer can be kept, in a sentence.
-    """
-
-    parameter: str
-    text: str
-    answers: str
-    kept: str
+    parameter: str  #: Of the job, which answers it.
+    text: str  #: The question, and why it is asked.
+    answers: str  #: How the parameter answers it.
+    kept: str  #: Where an answer can be kept, in a sentence.
 
 
 def refuse_unanswered(questions: Iterable[Question | None]) -> None:
     """Ask all that was not answered, in one message.
 
-    Raises
-    ------
-    InputError
-        If there is a question.
+    Raises:
+        InputError: If there is a question.
     """
     asked = [question for question in questions if question is not None]
     if not asked:

@@ -43,21 +43,12 @@ _WORDS: Final = (
 
 @dataclass(frozen=True, eq=False)
 class ResolvedConfigurations:
-    """Joints of the nominal robot at poses.
+    """Joints of the nominal robot at poses."""
 
-    Attributes
-    ----------
-    joints
-        [rad or m], ``(n, joints)``; NaN where there are none.
-    reachable
-        Whether the nominal robot reaches the pose at all, ``(n,)``.
-    guessed
-        Index of the first pose whose posture is not known, neither by its configuration nor by where the robot comes
-        from; None if there is none.
-    """
-
-    joints: Array
-    reachable: NDArray[np.bool_]
+    joints: Array  #: [rad or m], ``(n, joints)``; NaN where there are none.
+    reachable: NDArray[np.bool_]  #: Whether the nominal robot reaches the pose at all, ``(n,)``.
+    #: Index of the first pose whose posture is not known, neither by its configuration nor by where the robot comes
+    #: from; None if there is none.
     guessed: int | None
 
 
@@ -99,24 +90,17 @@ def resolved_configurations(
 ) -> ResolvedConfigurations:
     """Return the joints at a program's targets.
 
-    Parameters
-    ----------
-    nominal
-        The robot that its controller knows, of six joints or more.
-    flange
-        Poses of the flange in its base frame, ``(n, 4, 4)`` [m].
-    configurations
-        What the program says of each.
-    known
-        Joint positions ``(n, joints)`` [rad or m] of the model where the program gives joints, else NaN.
-    order
-        Indices in the order in which the robot goes from one to the next; none of them need be there.
-    parents
-        For each the index of the pose that it is an offset from, None for none; empty if none is an offset. An offset
-        without a configuration is in the posture nearest to that of the pose it is an offset from, where that has one.
-    straight
-        The poses that the robot comes to on a line or a circle. On its way it stays on the branch where it was, unless
-        its wrist was stretched.
+    Args:
+        nominal: The robot that its controller knows, of six joints or more.
+        flange: Poses of the flange in its base frame, ``(n, 4, 4)`` [m].
+        configurations: What the program says of each.
+        known: Joint positions ``(n, joints)`` [rad or m] of the model where the program gives joints, else NaN.
+        order: Indices in the order in which the robot goes from one to the next; none of them need be there.
+        parents: For each the index of the pose that it is an offset from, None for none; empty if none is an offset. An
+            offset without a configuration is in the posture nearest to that of the pose it is an offset from, where
+            that has one.
+        straight: The poses that the robot comes to on a line or a circle. On its way it stays on the branch where it
+            was, unless its wrist was stretched.
     """
     joints = known.copy()
     reachable: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
@@ -191,18 +175,12 @@ def _every_posture(nominal: Robot, flange: Array, form: ClosedForm) -> tuple[Arr
 class _Candidates:
     """The candidates for each pose that its configuration allows, and the choice among them along the way.
 
-    Parameters
-    ----------
-    nominal
-        The robot that the controller knows.
-    joints
-        Candidates, eight a pose, ``(m, 8, joints)`` [rad or m].
-    possible
-        Which of them reach the pose, ``(m, 8)``.
-    number
-        Number of the branch of each, ``(m, 8)``.
-    configurations
-        What the program says of each pose.
+    Args:
+        nominal: The robot that the controller knows.
+        joints: Candidates, eight a pose, ``(m, 8, joints)`` [rad or m].
+        possible: Which of them reach the pose, ``(m, 8)``.
+        number: Number of the branch of each, ``(m, 8)``.
+        configurations: What the program says of each pose.
     """
 
     def __init__(

@@ -63,20 +63,11 @@ def _straight(program: Program) -> frozenset[int]:
 
 @dataclass(frozen=True, eq=False)
 class TipsFound:
-    """Tips of targets for which joint positions were found.
+    """Tips of targets for which joint positions were found."""
 
-    Attributes
-    ----------
-    rows
-        Of the targets, ``(n,)``.
-    joints
-        The joint positions, ``(n, joints)`` [rad or m].
-    before, after
-        Tips without and with the correction, in the controller's base frame, ``(n, 4, 4)``.
-    """
-
-    rows: NDArray[np.intp]
-    joints: Array
+    rows: NDArray[np.intp]  #: Of the targets, ``(n,)``.
+    joints: Array  #: The joint positions, ``(n, joints)`` [rad or m].
+    #: before, after: tips without and with the correction, in the controller's base frame, ``(n, 4, 4)``.
     before: Array
     after: Array
 
@@ -84,21 +75,14 @@ class TipsFound:
 class ResolvedProgram:
     """A program whose targets are poses and joints of the nominal robot.
 
-    Parameters
-    ----------
-    robot
-        Calibrated.
-    nominal
-        What the controller computes with.
-    arms
-        The calibrated robot as it carries each tool, by the tool's name.
-    kept
-        Targets that stay, by their index. Those that are offsets from them go along with the real robot.
-    wrenches
-        What acts on the tool at each target; None of nothing.
-    flange
-        Where the nominal flange is in the identified one: there are the points of tools that were not measured, on
-        which it acts.
+    Args:
+        robot: Calibrated.
+        nominal: What the controller computes with.
+        arms: The calibrated robot as it carries each tool, by the tool's name.
+        kept: Targets that stay, by their index. Those that are offsets from them go along with the real robot.
+        wrenches: What acts on the tool at each target; None of nothing.
+        flange: Where the nominal flange is in the identified one: there are the points of tools that were not measured,
+            on which it acts.
     """
 
     def __init__(
@@ -186,10 +170,8 @@ class ResolvedProgram:
     def tools_apart(self, flange: Array) -> dict[str, float]:
         """Return how far tools that were measured are from where the program has them [m], by their names.
 
-        Parameters
-        ----------
-        flange
-            Where the nominal flange agrees best with the identified one.
+        Args:
+            flange: Where the nominal flange agrees best with the identified one.
         """
         return self._tool.apart(flange)
 
@@ -216,10 +198,8 @@ class ResolvedProgram:
     def tips_with(self, rows: NDArray[np.intp], near: Array, base: Shift, flange: Array) -> TipsFound:
         """Return tips of targets in the controller's base frame, before and after correction, where found.
 
-        Parameters
-        ----------
-        near
-            Joint positions that the answers are near to, on their branch, ``(n, joints)`` [rad or m].
+        Args:
+            near: Joint positions that the answers are near to, on their branch, ``(n, joints)`` [rad or m].
         """
         if not len(rows):
             return TipsFound(rows, near, np.zeros((0, 4, 4)), np.zeros((0, 4, 4)))
@@ -237,11 +217,9 @@ class ResolvedProgram:
     def real_tips(self, base: Shift, flange: Array, joints: Array | None = None) -> tuple[Array, Array]:
         """Return where tips shall be and where the real robot takes them, in its base frame, ``(n, 3)`` [m] each.
 
-        Parameters
-        ----------
-        joints
-            Joint positions that the controller commands ``(n, joints)`` [rad or m]; None for those of the program as
-            it is. Where they are NaN, so is the tip.
+        Args:
+            joints: Joint positions that the controller commands ``(n, joints)`` [rad or m]; None for those of the
+                program as it is. Where they are NaN, so is the tip.
         """
         rows = np.arange(len(self._program.targets))
         at = self._resolved.joints if joints is None else joints

@@ -34,46 +34,28 @@ _TOLERANCES: Final = (1e-6, 0.1)
 
 @dataclass(frozen=True, eq=False)
 class ProgramSplit:
-    """How the moves of a program are split.
+    """How the moves of a program are split."""
 
-    Attributes
-    ----------
-    edits
-        What changes in the text.
-    moves
-        How many moves are split.
-    added
-        How many targets are added.
-    unsplit
-        Lines of straight and circular moves that stay whole: of those whose start is not sure, or one of
-        their targets was not corrected or is no pose of its own; of those that need more segments than allowed; and of
-        those with options that segments cannot have.
-    """
-
-    edits: tuple[Edit, ...]
-    moves: int
-    added: int
+    edits: tuple[Edit, ...]  #: What changes in the text.
+    moves: int  #: How many moves are split.
+    added: int  #: How many targets are added.
+    #: Lines of straight and circular moves that stay whole: of those whose start is not sure, or one of their targets
+    #: was not corrected or is no pose of its own; of those that need more segments than allowed; and of those with
+    #: options that segments cannot have.
     unsplit: tuple[int, ...]
 
 
 def split_program(language: Language, correction: Correction, between: Between, tolerance: float) -> ProgramSplit:
     """Split the moves of a program.
 
-    Parameters
-    ----------
-    language
-        Of the program.
-    correction
-        Of the program.
-    between
-        What finds fake targets between those of the program.
-    tolerance
-        How far the correction between targets may deviate [m].
+    Args:
+        language: Of the program.
+        correction: Of the program.
+        between: What finds fake targets between those of the program.
+        tolerance: How far the correction between targets may deviate [m].
 
-    Raises
-    ------
-    InputError
-        If moves in this language cannot be split, or the tolerance is out of range.
+    Raises:
+        InputError: If moves in this language cannot be split, or the tolerance is out of range.
     """
     if language.split is None:
         raise InputError(
@@ -132,14 +114,10 @@ def check_tolerance(tolerance: float) -> None:
 class _SplitMove:
     """A move that is split into more segments until they are straight or round enough.
 
-    Parameters
-    ----------
-    correction
-        Of the program.
-    index
-        Of the move.
-    before
-        Index of the target that it starts from.
+    Args:
+        correction: Of the program.
+        index: Of the move.
+        before: Index of the target that it starts from.
     """
 
     def __init__(self, correction: Correction, index: int, before: int) -> None:

@@ -20,10 +20,8 @@ def wrenches_of_targets(programs: Sequence[Program], given: Sequence[TargetWrenc
 
     What names a target holds before what names its tool alone, and that before what names neither.
 
-    Raises
-    ------
-    InputError
-        If a name fits no target or no tool of the programs, or two entries of one kind fit one target.
+    Raises:
+        InputError: If a name fits no target or no tool of the programs, or two entries of one kind fit one target.
     """
     fits = [Patterns(programs, one.targets, "wrench", one.where or None) for one in given]
     used = {target.tool.lower() for program in programs for target in program.targets}

@@ -37,46 +37,29 @@ _LARGEST_CHANGE: Final = math.radians(10.0)
 
 @dataclass(frozen=True, eq=False)
 class JointCorrection:
-    """Corrected joint positions, and what the calibrated robot predicts of them.
+    """Corrected joint positions, and what the calibrated robot predicts of them."""
 
-    Attributes
-    ----------
-    joints
-        Joint positions to command [rad or m], ``(n, joints)``.
-    change
-        What was added to the joint positions of the nominal motion, ``(n, joints)``.
-    before, after
-        Predicted distance from the path without and with the correction [m], ``(n,)``. After is zero within 1e-9
-        unless an effect jumps (backlash where the moment changes its sign) and no joint position gives the point.
-    rounds
-        How often the prediction was made again.
-    """
-
-    joints: Array
-    change: Array
+    joints: Array  #: Joint positions to command [rad or m], ``(n, joints)``.
+    change: Array  #: What was added to the joint positions of the nominal motion, ``(n, joints)``.
+    #: before, after: predicted distance from the path without and with the correction [m], ``(n,)``. After is zero
+    #: within 1e-9 unless an effect jumps (backlash where the moment changes its sign) and no joint position gives the
+    #: point.
     before: Array
     after: Array
-    rounds: int
+    rounds: int  #: How often the prediction was made again.
 
 
 def path_error(robot: Robot, motion: JointMotion, desired: Array, target: str | None = None) -> Array:
     """Return where the robot will be beside the path (Patel, equation 5.21).
 
-    Parameters
-    ----------
-    robot
-        Calibrated, or with the effects alone whose part is wanted.
-    motion
-        What is commanded.
-    desired
-        The path in the robot's base frame, ``(n, 3)`` [m].
-    target
-        Name of the target that follows the path; the flange if None.
+    Args:
+        robot: Calibrated, or with the effects alone whose part is wanted.
+        motion: What is commanded.
+        desired: The path in the robot's base frame, ``(n, 3)`` [m].
+        target: Name of the target that follows the path; the flange if None.
 
-    Returns
-    -------
-    error
-        Predicted less desired position, in the base frame, ``(n, 3)`` [m].
+    Returns:
+        error: Predicted less desired position, in the base frame, ``(n, 3)`` [m].
     """
     return Tip(robot, target).positions(motion.postures()) - _desired(motion, desired)
 
@@ -92,24 +75,16 @@ def corrected(
 ) -> JointCorrection:
     """Return joint positions with which the calibrated robot keeps to the path.
 
-    Parameters
-    ----------
-    robot
-        The calibrated robot, with its effects.
-    motion
-        From :func:`truearm.planning.paths.joint_motion.joint_motion` of the nominal robot.
-    desired
-        The path in the base frame, ``(n, 3)`` [m].
-    target
-        Name of the target that follows the path; the flange if None.
-    orientation, rotation
-        How much of the tip's orientation is kept beside its position, and which, ``(3, 3)``. The document corrects the
-        position alone.
+    Args:
+        robot: The calibrated robot, with its effects.
+        motion: From :func:`truearm.planning.paths.joint_motion.joint_motion` of the nominal robot.
+        desired: The path in the base frame, ``(n, 3)`` [m].
+        target: Name of the target that follows the path; the flange if None.
+        orientation, rotation: How much of the tip's orientation is kept beside its position, and which, ``(3, 3)``. The
+            document corrects the position alone.
 
-    Raises
-    ------
-    InputError
-        If the arm is singular, has to turn by more than 10 deg, or beyond its limits: with time and joint.
+    Raises:
+        InputError: If the arm is singular, has to turn by more than 10 deg, or beyond its limits: with time and joint.
     """
     tip, wanted = Tip(robot, target), _desired(motion, desired)
     length = reach(robot, target)

@@ -50,18 +50,13 @@ _RUN_AGAIN: Final = "Run this again when it is there: what is on disk is not com
 class Cluster:
     """Parts are done by the workers of a Dask scheduler.
 
-    Parameters
-    ----------
-    address
-        Of the scheduler, ``tcp://HOST:PORT`` or ``tls://HOST:PORT``.
-    insecure
-        Whether a scheduler on another machine may be reached without TLS.
+    Args:
+        address: Of the scheduler, ``tcp://HOST:PORT`` or ``tls://HOST:PORT``.
+        insecure: Whether a scheduler on another machine may be reached without TLS.
 
-    Raises
-    ------
-    InputError
-        If Dask is not installed, the address is none or is another machine's without TLS, the scheduler cannot be
-        reached or has no workers, or a worker has another version of truearm.
+    Raises:
+        InputError: If Dask is not installed, the address is none or is another machine's without TLS, the scheduler
+            cannot be reached or has no workers, or a worker has another version of truearm.
     """
 
     def __init__(self, address: str, *, insecure: bool) -> None:
@@ -226,10 +221,8 @@ class Cluster:
     def news(self) -> list[str]:
         """Return which workers have gone and come.
 
-        Raises
-        ------
-        InputError
-            If there was none for a minute, or a new one has another version of truearm.
+        Raises:
+            InputError: If there was none for a minute, or a new one has another version of truearm.
         """
         now = time.monotonic()
         if now - self._looked < _LOOK or self._client.status != "running":
@@ -262,10 +255,8 @@ class Cluster:
 def checked_address(address: str, *, insecure: bool) -> str:
     """Return the address of a scheduler with its protocol, or refuse one that somebody else could listen to.
 
-    Raises
-    ------
-    InputError
-        For no address, and for another machine's without TLS unless `insecure`.
+    Raises:
+        InputError: For no address, and for another machine's without TLS unless `insecure`.
     """
     full = address if "://" in address else f"tcp://{address}"
     try:
@@ -315,10 +306,8 @@ def _is_here(host: str) -> bool:
 def _within(seconds: float, work: Callable[[], R]) -> R:
     """Return what a function returns.
 
-    Raises
-    ------
-    TimeoutError
-        If it takes longer. What it does is then nobody's, and ends with this process.
+    Raises:
+        TimeoutError: If it takes longer. What it does is then nobody's, and ends with this process.
     """
     done = Future[R]()
 

@@ -43,21 +43,14 @@ def done_parts(
     Where a worker dies, new ones are started. Nobody knows of which of the parts that were being done it died, so they
     are repeated one by one; one that kills its worker again and again is given up.
 
-    Parameters
-    ----------
-    work
-        A function of a module; it and the parts go to other processes.
-    parts
-        Taken as workers ask for them.
-    workers
-        Who does them.
-    tell
-        Called with what happened to workers.
+    Args:
+        work: A function of a module; it and the parts go to other processes.
+        parts: Taken as workers ask for them.
+        workers: Who does them.
+        tell: Called with what happened to workers.
 
-    Raises
-    ------
-    InputError
-        If the workers are gone and cannot be replaced, or all end before they have done anything.
+    Raises:
+        InputError: If the workers are gone and cannot be replaced, or all end before they have done anything.
     """
     run = _Run(work, iter(parts), workers, tell)
     try:

@@ -38,10 +38,8 @@ class Workers(Protocol):
     def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
         """Hand out a part; None if workers have just died.
 
-        Raises
-        ------
-        InputError
-            If nobody takes it.
+        Raises:
+            InputError: If nobody takes it.
         """
 
     def refusal(self, error: Exception) -> InputError | None:
@@ -50,19 +48,15 @@ class Workers(Protocol):
     def renew(self) -> None:
         """Put new workers in the place of those that died.
 
-        Raises
-        ------
-        InputError
-            If that cannot be done.
+        Raises:
+            InputError: If that cannot be done.
         """
 
     def news(self) -> list[str]:
         """Return what has happened to workers since the last time, in plain words.
 
-        Raises
-        ------
-        InputError
-            If nobody is left who could do the work.
+        Raises:
+            InputError: If nobody is left who could do the work.
         """
 
     def close(self, *, finish: bool) -> None:
@@ -105,10 +99,8 @@ class Processes:
     They are started anew and not copied (``spawn``), so that threads and locks of this process do them no harm; they
     end with this process, however that ends; and they leave Ctrl-C to it.
 
-    Parameters
-    ----------
-    workers
-        How many.
+    Args:
+        workers: How many.
     """
 
     lost: tuple[type[BaseException], ...] = ()
@@ -180,12 +172,9 @@ def _end_with(sentinel: int) -> None:
 class Given:
     """Parts are done by an executor that somebody else has made, and closes.
 
-    Parameters
-    ----------
-    executor
-        Any :class:`concurrent.futures.Executor`.
-    in_flight
-        How many parts it is handed at once.
+    Args:
+        executor: Any :class:`concurrent.futures.Executor`.
+        in_flight: How many parts it is handed at once.
     """
 
     lost: tuple[type[BaseException], ...] = ()

@@ -54,35 +54,17 @@ class _Entry(BaseModel):
 
 @dataclass(frozen=True)
 class RobotEntry:
-    """A robot that was measured.
+    """A robot that was measured."""
 
-    Attributes
-    ----------
-    name
-        In the fleet, and of its folder.
-    robot
-        What :func:`truearm.load_robot` takes.
-    data
-        Canonical CSV file.
-    options
-        Keywords of :func:`truearm.calibrate`.
-    of
-        Serial number or name of the machine, where it was measured several times.
-    date
-        When (ISO 8601).
-    hashes
-        SHA-256 of the files that are read for it, by their paths.
-    places
-        Where ``robot`` and each option stand, by their names.
-    """
-
-    name: str
-    robot: str
-    data: Path
-    options: Mapping[str, Any] = field(default_factory=dict)
-    of: str | None = None
-    date: str | None = None
+    name: str  #: In the fleet, and of its folder.
+    robot: str  #: What :func:`truearm.load_robot` takes.
+    data: Path  #: Canonical CSV file.
+    options: Mapping[str, Any] = field(default_factory=dict)  #: Keywords of :func:`truearm.calibrate`.
+    of: str | None = None  #: Serial number or name of the machine, where it was measured several times.
+    date: str | None = None  #: When (ISO 8601).
+    #: SHA-256 of the files that are read for it, by their paths.
     hashes: Mapping[Path, str] = field(default_factory=dict, repr=False)
+    #: Where ``robot`` and each option stand, by their names.
     places: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -93,21 +75,11 @@ class RobotEntry:
 
 @dataclass(frozen=True)
 class Robots:
-    """The robots that a manifest names.
+    """The robots that a manifest names."""
 
-    Attributes
-    ----------
-    entries
-        One each.
-    hashes
-        SHA-256 of all files that are read, by the names that manifest and table give them.
-    content
-        What is said, as JSON holds it, without where the manifest stands.
-    """
-
-    entries: tuple[RobotEntry, ...]
-    hashes: dict[str, str]
-    content: list[dict[str, Any]]
+    entries: tuple[RobotEntry, ...]  #: One each.
+    hashes: dict[str, str]  #: SHA-256 of all files that are read, by the names that manifest and table give them.
+    content: list[dict[str, Any]]  #: What is said, as JSON holds it, without where the manifest stands.
 
 
 @dataclass(frozen=True)
@@ -122,18 +94,13 @@ class _Said:
 def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path) -> Robots:
     """Return the robots that a manifest names.
 
-    Parameters
-    ----------
-    said
-        A list of entries, or the name of a table.
-    options
-        Of all robots that do not say others.
+    Args:
+        said: A list of entries, or the name of a table.
+        options: Of all robots that do not say others.
 
-    Raises
-    ------
-    InputError
-        Naming file and entry, or file, line and column: for two robots of one name or with the same readings, a file
-        that is not there, columns and options that are not known, and a date that is none.
+    Raises:
+        InputError: Naming file and entry, or file, line and column: for two robots of one name or with the same
+            readings, a file that is not there, columns and options that are not known, and a date that is none.
     """
     folder, hashes = manifest.parent.absolute(), dict[str, str]()  # workers may stand elsewhere
     if isinstance(said, str):
@@ -202,10 +169,8 @@ def _check_readings(robot: RobotEntry, data: str, where: str, seen: dict[str, tu
 def refuse_respelled(said: list[Any], manifest: Path) -> None:
     """Refuse names and serial numbers of a list that YAML takes for numbers and writes otherwise, as 0123.
 
-    Raises
-    ------
-    InputError
-        Naming the entry.
+    Raises:
+        InputError: Naming the entry.
     """
     names = ("name", "of")
     if not any(isinstance(one.get(name), int) for one in said if isinstance(one, dict) for name in names):

@@ -19,10 +19,9 @@ from truearm.simulation.truths import carrying_targets
 def experiment(asked: ExperimentEntry, where: str = "experiment") -> Experiment:
     """Prepare an experiment; refusals name `where` it stands.
 
-    Raises
-    ------
-    InputError
-        For a robot or configurations that cannot be read, a model that is not known, and targets that are not there.
+    Raises:
+        InputError: For a robot or configurations that cannot be read, a model that is not known, and targets that are
+            not there.
     """
     with _refusals_at(f"{where}.robot"):
         nominal = load_robot(asked.robot)

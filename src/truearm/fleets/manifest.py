@@ -94,30 +94,14 @@ class ManifestFile(BaseModel):
 
 @dataclass(frozen=True)
 class Manifest:
-    """What is asked of a fleet.
+    """What is asked of a fleet."""
 
-    Attributes
-    ----------
-    file
-        Where it stands.
-    experiment
-        The experiment; None where robots were measured.
-    robots
-        The robots that were measured; empty for an experiment.
-    chunk
-        Robots of a part.
-    content
-        What it says, as JSON holds it.
-    hashes
-        SHA-256 of the files that it names, by their names there.
-    """
-
-    file: Path
-    experiment: ExperimentEntry | None
-    robots: tuple[RobotEntry, ...]
-    chunk: int
-    content: Mapping[str, Any] = field(repr=False)
-    hashes: Mapping[str, str] = field(repr=False)
+    file: Path  #: Where it stands.
+    experiment: ExperimentEntry | None  #: The experiment; None where robots were measured.
+    robots: tuple[RobotEntry, ...]  #: The robots that were measured; empty for an experiment.
+    chunk: int  #: Robots of a part.
+    content: Mapping[str, Any] = field(repr=False)  #: What it says, as JSON holds it.
+    hashes: Mapping[str, str] = field(repr=False)  #: SHA-256 of the files that it names, by their names there.
 
     @property
     def count(self) -> int:
@@ -168,10 +152,9 @@ class Manifest:
 def read_manifest(path: Path) -> Manifest:
     """Read a manifest, and look whether the files that it names are there.
 
-    Raises
-    ------
-    InputError
-        For what cannot be meant, naming the entry: no robots or both kinds, two robots of one name, a missing file.
+    Raises:
+        InputError: For what cannot be meant, naming the entry: no robots or both kinds, two robots of one name, a
+            missing file.
     """
     said = read_yaml(path, ManifestFile)
     if (said.experiment is None) == (said.robots is None):

@@ -86,10 +86,8 @@ _KINDS: Final[Mapping[str, tuple[tuple[type, ...], str]]] = {
 def of_cells(cells: Mapping[str, str], place: Callable[[str], str]) -> dict[str, Any]:
     """Return the options in the cells of a row, of columns that are options; empty cells are none.
 
-    Parameters
-    ----------
-    place
-        The file, line and column of a cell by its column.
+    Args:
+        place: The file, line and column of a cell by its column.
     """
     found = {}
     for name, cell in cells.items():
@@ -102,17 +100,12 @@ def of_cells(cells: Mapping[str, str], place: Callable[[str], str]) -> dict[str,
 def checked_options(options: Mapping[str, Any], folder: Path, place: Callable[[str], str]) -> dict[str, Any]:
     """Return options with whole paths, or refuse what no calibration takes, before any robot is calibrated.
 
-    Parameters
-    ----------
-    folder
-        That files are named from.
-    place
-        Where an option stands, by its name.
+    Args:
+        folder: That files are named from.
+        place: Where an option stands, by its name.
 
-    Raises
-    ------
-    InputError
-        For an option or a name that is not known, a value of another kind, and a file that is not there.
+    Raises:
+        InputError: For an option or a name that is not known, a value of another kind, and a file that is not there.
     """
     return {name: _checked(name, value, folder, place(name)) for name, value in options.items()}
 

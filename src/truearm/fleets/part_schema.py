@@ -101,10 +101,8 @@ _HEAD: Final[TypeAdapter[Any]] = TypeAdapter(_Head)
 def head_of(line: bytes) -> dict[str, Any]:
     """Return the first line of a part on disk.
 
-    Raises
-    ------
-    ValueError
-        If it is none, or somebody has changed the kind or the range of an entry.
+    Raises:
+        ValueError: If it is none, or somebody has changed the kind or the range of an entry.
     """
     return dict(_HEAD.validate_json(line))
 

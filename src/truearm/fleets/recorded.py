@@ -40,34 +40,18 @@ _TOGETHER: Final = 1000
 
 @dataclass(frozen=True)
 class Known:
-    """Which parts of a fleet are on disk.
+    """Which parts of a fleet are on disk."""
 
-    Attributes
-    ----------
-    done
-        Numbers of those that are not computed again, counted from 0.
-    again
-        Why others are, in plain words.
-    """
-
-    done: frozenset[int]
-    again: tuple[str, ...] = ()
+    done: frozenset[int]  #: Numbers of those that are not computed again, counted from 0.
+    again: tuple[str, ...] = ()  #: Why others are, in plain words.
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """The parts of a fleet in a folder.
+    """The parts of a fleet in a folder."""
 
-    Attributes
-    ----------
-    folder
-        Where they are.
-    manifest
-        What is asked.
-    """
-
-    folder: Path
-    manifest: Manifest
+    folder: Path  #: Where they are.
+    manifest: Manifest  #: What is asked.
     _keys: dict[int, str] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def file(self, part: int) -> Path:
@@ -177,10 +161,8 @@ class Recorded:
         What is asked is written down where nothing stands there yet. Where entries of the manifest have been mended,
         the parts that they are in are removed.
 
-        Raises
-        ------
-        InputError
-            If another run works there, something else was asked there, or somebody has changed a part.
+        Raises:
+            InputError: If another run works there, something else was asked there, or somebody has changed a part.
         """
         self._refuse_links()
         try:
@@ -246,10 +228,8 @@ class Recorded:
 
         A part of which files have been removed, or whose data changed while it was computed, is computed again.
 
-        Raises
-        ------
-        InputError
-            Naming a part that somebody has changed.
+        Raises:
+            InputError: Naming a part that somebody has changed.
         """
         done, again = set[int](), list[str]()
         for part in self.on_disk():
@@ -268,10 +248,8 @@ class Recorded:
     def missing(self) -> int:
         """Return how many parts are to be computed; all of them where another manifest goes on.
 
-        Raises
-        ------
-        InputError
-            As :meth:`alone`, and for other files that stand there.
+        Raises:
+            InputError: As :meth:`alone`, and for other files that stand there.
         """
         self._refuse_links()
         if not exists(self.folder / PARTS):
@@ -290,15 +268,11 @@ class Recorded:
     def write(self, part: int, text: str) -> None:
         """Write a part that is done, as a whole or not at all.
 
-        Parameters
-        ----------
-        text
-            As of :func:`truearm.fleets.rows.part_text`.
+        Args:
+            text: As of :func:`truearm.fleets.rows.part_text`.
 
-        Raises
-        ------
-        ValueError
-            If it is not what belongs to the robots of this part: then nothing is written.
+        Raises:
+            ValueError: If it is not what belongs to the robots of this part: then nothing is written.
         """
         first, _, rest = text.encode().partition(b"\n")
         said = said_of(first)
@@ -317,10 +291,8 @@ class Recorded:
     def rows(self) -> Iterator[Row]:
         """Read the robots of all parts that are on disk, in their order, a part at a time.
 
-        Raises
-        ------
-        InputError
-            Naming the part that somebody has changed.
+        Raises:
+            InputError: Naming the part that somebody has changed.
         """
         for part in self.on_disk():
             yield from self._rows(part)

@@ -20,20 +20,12 @@ _SHARED: Final = ("name", "unit", "nominal", "prior")
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Position errors of a robot at configurations that its calibration has not seen [m].
+    """Position errors of a robot at configurations that its calibration has not seen [m]."""
 
-    Attributes
-    ----------
-    mean, rms, max
-        Of their lengths.
-    n
-        How many.
-    """
-
-    mean: float
+    mean: float  #: mean, rms, max: of their lengths.
     rms: float
     max: float
-    n: int
+    n: int  #: How many.
 
     @classmethod
     def of_each(cls, errors: Array) -> list[Accuracy]:
@@ -59,49 +51,28 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class FoundParameter:
-    """A parameter of one robot of a fleet, in SI units.
+    """A parameter of one robot of a fleet, in SI units."""
 
-    Attributes
-    ----------
-    unit
-        Of all its values.
-    value, deviation
-        As it was identified, and the standard deviation of that.
-    nominal, prior
-        Value before, and the standard deviation of that.
-    truth
-        True value of a simulated robot; None of others.
-    """
-
-    unit: str
-    value: float
+    unit: str  #: Of all its values.
+    value: float  #: value, deviation: as it was identified, and the standard deviation of that.
     deviation: float
-    nominal: float
+    nominal: float  #: nominal, prior: value before, and the standard deviation of that.
     prior: float
-    truth: float | None = None
+    truth: float | None = None  #: True value of a simulated robot; None of others.
 
 
 @dataclass(frozen=True)
 class FoundParameters(Mapping[str, FoundParameter]):
-    """The parameters of one robot by their names, kept as columns: of ten thousand robots no object each is made.
+    """The parameters of one robot by their names, kept as columns: of ten thousand robots no object each is made."""
 
-    Attributes
-    ----------
-    name, unit
-        Of each.
-    nominal, prior, value, deviation
-        Of each, in SI units, see :class:`FoundParameter`.
-    truth
-        True values of a simulated robot; None of others.
-    """
-
-    name: tuple[str, ...] = ()
+    name: tuple[str, ...] = ()  #: name, unit: of each.
     unit: tuple[str, ...] = ()
+    #: nominal, prior, value, deviation: of each, in SI units, see :class:`FoundParameter`.
     nominal: tuple[float, ...] = ()
     prior: tuple[float, ...] = ()
     value: tuple[float, ...] = ()
     deviation: tuple[float, ...] = ()
-    truth: tuple[float, ...] | None = None
+    truth: tuple[float, ...] | None = None  #: True values of a simulated robot; None of others.
 
     @classmethod
     def of(cls, parameters: Mapping[str, FoundParameter]) -> FoundParameters:
@@ -150,10 +121,8 @@ class FoundParameters(Mapping[str, FoundParameter]):
     def read(cls, content: Mapping[str, Any], shared: Mapping[str, Any]) -> FoundParameters:
         """Read what :meth:`content` returned.
 
-        Raises
-        ------
-        ValueError
-            If columns are missing or not equally long, or a name is there twice.
+        Raises:
+            ValueError: If columns are missing or not equally long, or a name is there twice.
         """
         if not content:  # of a robot that could not be calibrated
             return cls()
@@ -168,61 +137,30 @@ class FoundParameters(Mapping[str, FoundParameter]):
 
 @dataclass(frozen=True)
 class Row:
-    """One robot of a fleet.
+    """One robot of a fleet."""
 
-    Attributes
-    ----------
-    name
-        Of the robot in the fleet.
-    status
-        Whether it was calibrated.
-    message
-        Why not; empty if it was.
-    of
-        Serial number or name of the machine: rows of one machine are measurements of it at several times.
-    date
-        When it was measured (ISO 8601).
-    held_out, nominal
-        Errors of the calibrated and of the nominal robot at configurations not seen, as an instrument reads them.
-    truth
-        Errors of the calibrated robot there without the instrument's noise; None of measured robots.
-    parameters
-        Those identified, by name.
-    fit_status
-        How the fit ended.
-    notices
-        Codes of what there is to know about it.
-    seconds
-        How long it took; no result depends on it.
-    robot
-        Name of the robot: robots of one name are compared with one another.
-    errors
-        Those of `notices` that are of the level error.
-    drawn
-        Whether priors drew the parameters towards nominal.
-    covariance
-        Of the parameters, in priors: the rows of the lower triangle one after the other; empty where it is not kept.
-    simulated
-        Whether its measurements are marked as those of a virtual instrument.
-    """
-
-    name: str
-    status: Status
-    message: str = ""
+    name: str  #: Of the robot in the fleet.
+    status: Status  #: Whether it was calibrated.
+    message: str = ""  #: Why not; empty if it was.
+    #: Serial number or name of the machine: rows of one machine are measurements of it at several times.
     of: str | None = None
-    date: str | None = None
+    date: str | None = None  #: When it was measured (ISO 8601).
+    #: held_out, nominal: errors of the calibrated and of the nominal robot at configurations not seen, as an instrument
+    #: reads them.
     held_out: Accuracy | None = None
     nominal: Accuracy | None = None
+    #: Errors of the calibrated robot there without the instrument's noise; None of measured robots.
     truth: Accuracy | None = None
-    parameters: FoundParameters = field(default_factory=FoundParameters)
-    fit_status: str | None = None
-    notices: tuple[str, ...] = ()
-    seconds: float = 0.0
-    robot: str = ""
-    errors: tuple[str, ...] = ()
-    drawn: bool = True
+    parameters: FoundParameters = field(default_factory=FoundParameters)  #: Those identified, by name.
+    fit_status: str | None = None  #: How the fit ended.
+    notices: tuple[str, ...] = ()  #: Codes of what there is to know about it.
+    seconds: float = 0.0  #: How long it took; no result depends on it.
+    robot: str = ""  #: Name of the robot: robots of one name are compared with one another.
+    errors: tuple[str, ...] = ()  #: Those of `notices` that are of the level error.
+    drawn: bool = True  #: Whether priors drew the parameters towards nominal.
+    #: Of the parameters, in priors: the rows of the lower triangle one after the other; empty where it is not kept.
     covariance: tuple[float, ...] = ()
-    simulated: bool = False
+    simulated: bool = False  #: Whether its measurements are marked as those of a virtual instrument.
 
     @property
     def machine(self) -> str:
@@ -284,14 +222,10 @@ def part_text(
 ) -> str:
     """Return robots as a part holds them, behind its first line and before its hash.
 
-    Parameters
-    ----------
-    shared
-        Columns that the parameters of all robots have, see :attr:`FoundParameters.shared`.
-    written
-        Files that were written of them, from the folder of the fleet.
-    changed
-        Robots whose files changed while they were computed: they are computed again by the next run.
+    Args:
+        shared: Columns that the parameters of all robots have, see :attr:`FoundParameters.shared`.
+        written: Files that were written of them, from the folder of the fleet.
+        changed: Robots whose files changed while they were computed: they are computed again by the next run.
     """
     first = to_json({"shared": shared, "written": [*written], "changed": [*changed]})
     lines = [first, *(to_json(row.content(shared)) for row in rows)]

@@ -30,36 +30,17 @@ _TOGETHER: Final = 9_000
 
 @dataclass(frozen=True)
 class ExperimentEntry:
-    """The experiment that is asked for: many robots simulated, calibrated and judged.
+    """The experiment that is asked for: many robots simulated, calibrated and judged."""
 
-    Attributes
-    ----------
-    robot
-        What :func:`truearm.load_robot` takes, files from the manifest's folder.
-    count
-        Simulated robots.
-    configurations
-        How many configurations each is measured at, drawn within the limits; or the file of them.
-    targets
-        How many targets the instrument sees.
-    model
-        Which parameters are drawn and identified.
-    noise
-        Standard deviation of each coordinate [m].
-    held_out
-        Configurations that judge.
-    seed
-        Of everything.
-    """
-
-    robot: str
-    count: int
+    robot: str  #: What :func:`truearm.load_robot` takes, files from the manifest's folder.
+    count: int  #: Simulated robots.
+    #: How many configurations each is measured at, drawn within the limits; or the file of them.
     configurations: int | Path
-    targets: int
-    model: str
-    noise: float
-    held_out: int
-    seed: int
+    targets: int  #: How many targets the instrument sees.
+    model: str  #: Which parameters are drawn and identified.
+    noise: float  #: Standard deviation of each coordinate [m].
+    held_out: int  #: Configurations that judge.
+    seed: int  #: Of everything.
 
     def name(self, number: int) -> str:
         """Return the name of a simulated robot, counted from 0."""
@@ -68,24 +49,12 @@ class ExperimentEntry:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """An experiment that is ready to be done, here or elsewhere.
+    """An experiment that is ready to be done, here or elsewhere."""
 
-    Attributes
-    ----------
-    asked
-        What the manifest says.
-    robot
-        The nominal robot with its targets.
-    joints
-        Joint positions at which each robot is measured, ``(configurations, joints)`` [rad or m].
-    held_out
-        Joint positions at which it is judged, likewise.
-    """
-
-    asked: ExperimentEntry
-    robot: Robot
-    joints: Array
-    held_out: Array
+    asked: ExperimentEntry  #: What the manifest says.
+    robot: Robot  #: The nominal robot with its targets.
+    joints: Array  #: Joint positions at which each robot is measured, ``(configurations, joints)`` [rad or m].
+    held_out: Array  #: Joint positions at which it is judged, likewise.
 
 
 class Series:

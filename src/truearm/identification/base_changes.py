@@ -46,15 +46,11 @@ Motion = tuple[Array, Array]
 def parts_of(data: Dataset, labels: Sequence[str]) -> NDArray[np.intp]:
     """Return the part that each configuration belongs to, ``(configurations,)``, 0 before the first change.
 
-    Parameters
-    ----------
-    labels
-        The configuration from which on, in the order of measurement, each next base holds.
+    Args:
+        labels: The configuration from which on, in the order of measurement, each next base holds.
 
-    Raises
-    ------
-    InputError
-        For a configuration that the data do not have, the first one, or data whose order is not known.
+    Raises:
+        InputError: For a configuration that the data do not have, the first one, or data whose order is not known.
     """
     if data.fixture is not None:
         raise InputError(
@@ -120,23 +116,15 @@ def with_one_base(
 ) -> tuple[Dataset, list[Notice]]:
     """Return the data with all readings in the frame of the first part, and how far each part was moved.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot.
-    training
-        Configurations from which the motions are found.
-    labels
-        See :func:`parts_of`.
-    model
-        What is identified along with the motions.
-    held
-        Places that are known; the base is that of the first part, and found here all the same.
+    Args:
+        robot: The nominal robot.
+        training: Configurations from which the motions are found.
+        labels: See :func:`parts_of`.
+        model: What is identified along with the motions.
+        held: Places that are known; the base is that of the first part, and found here all the same.
 
-    Raises
-    ------
-    InputError
-        As :func:`parts_of`, and for a part with fewer than five training configurations.
+    Raises:
+        InputError: As :func:`parts_of`, and for a part with fewer than five training configurations.
     """
     part = checked_parts(data, training, labels)
     moved, tools = data, Held(targets=held.targets)

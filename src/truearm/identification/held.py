@@ -21,20 +21,12 @@ from truearm.modeling.transform import Transform
 
 @dataclass(frozen=True)
 class Held:
-    """What is known of base, targets and fixtures, and held while the rest is found.
+    """What is known of base, targets and fixtures, and held while the rest is found."""
 
-    Attributes
-    ----------
-    base
-        ``T_world_base``; None if it is found.
-    targets
-        Where targets are on the flange, by name; of a point the rotation counts for nothing.
-    fixtures
-        ``T_world_fixture`` by name; of a plane its origin is in the plane and its z axis is the normal.
-    """
-
-    base: Transform | None = None
+    base: Transform | None = None  #: ``T_world_base``; None if it is found.
+    #: Where targets are on the flange, by name; of a point the rotation counts for nothing.
     targets: Mapping[str, Transform] = field(default_factory=dict)
+    #: ``T_world_fixture`` by name; of a plane its origin is in the plane and its z axis is the normal.
     fixtures: Mapping[str, Transform] = field(default_factory=dict)
 
     def __bool__(self) -> bool:

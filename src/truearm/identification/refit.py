@@ -47,56 +47,32 @@ Places = dict[str, Transform | tuple[float, float, float]]
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """What moved, and how well the robot agrees with readings from there.
+    """What moved, and how well the robot agrees with readings from there."""
 
-    Attributes
-    ----------
-    moved
-        What was found anew.
-    robot
-        The robot with it.
-    errors
-        Of every configuration, by what is found without it.
-    parameters
-        How many numbers were found.
-    readings
-        From how many readings.
-    shift
-        By how much it moved [m]: the base at the middle of the readings, a tool at the middle of its targets, of
-        targets and fixtures the one that moved farthest.
-    turn
-        By how much it turned [rad]; None where only positions were found.
-    shifts
-        By how much each target moved on the flange, or each fixture [m]; empty for base and tool.
-    """
-
-    moved: Moved
-    robot: Robot
-    errors: Errors
-    parameters: int
-    readings: int
+    moved: Moved  #: What was found anew.
+    robot: Robot  #: The robot with it.
+    errors: Errors  #: Of every configuration, by what is found without it.
+    parameters: int  #: How many numbers were found.
+    readings: int  #: From how many readings.
+    #: By how much it moved [m]: the base at the middle of the readings, a tool at the middle of its targets, of targets
+    #: and fixtures the one that moved farthest.
     shift: float
-    turn: float | None
+    turn: float | None  #: By how much it turned [rad]; None where only positions were found.
+    #: By how much each target moved on the flange, or each fixture [m]; empty for base and tool.
     shifts: Mapping[str, float]
 
 
 def refit(robot: Robot, data: Dataset, moved: Moved) -> Refit:
     """Find from readings where base, targets or tool are, and judge the robot there.
 
-    Parameters
-    ----------
-    robot
-        With base and targets; its other parameters stay.
-    data
-        Readings of those.
-    moved
-        ``base``: where the robot stands before the instrument, and the fixtures that readings are measured against;
-        ``targets``: each target on the flange; ``tool``: all targets together, as a rigid body.
+    Args:
+        robot: With base and targets; its other parameters stay.
+        data: Readings of those.
+        moved: ``base``: where the robot stands before the instrument, and the fixtures that readings are measured
+            against; ``targets``: each target on the flange; ``tool``: all targets together, as a rigid body.
 
-    Raises
-    ------
-    InputError
-        If the readings are too few to find it and to judge it.
+    Raises:
+        InputError: If the readings are too few to find it and to judge it.
     """
     data = _comparable(robot, data)
     here = _referenced(robot.marked(data.simulated))

@@ -28,18 +28,10 @@ _IN_REGION, _DRAWN, _AT_ONCE = 200, 400_000, 20_000
 
 @dataclass(frozen=True, eq=False)
 class AccuracyGoal:
-    """Where a robot shall be accurate.
+    """Where a robot shall be accurate."""
 
-    Attributes
-    ----------
-    postures
-        The configurations there.
-    words
-        What that is: ``at the 40 targets of part.mod``.
-    """
-
-    postures: Postures
-    words: str
+    postures: Postures  #: The configurations there.
+    words: str  #: What that is: ``at the 40 targets of part.mod``.
 
 
 def accuracy_goal(
@@ -52,20 +44,14 @@ def accuracy_goal(
 ) -> AccuracyGoal | None:
     """Return where a robot shall be accurate, None if nothing was said of that.
 
-    Parameters
-    ----------
-    accurate_at
-        A program, a CSV file of poses of the flange in the base frame, or joint positions of the model
-        ``(n, joints)`` [rad or m].
-    region
-        Lowest and highest x, y and z of the flange in the base frame [m].
-    tools, frames
-        Where tools and frames of a program are, see :mod:`truearm.compensation.cell`.
+    Args:
+        accurate_at: A program, a CSV file of poses of the flange in the base frame, or joint positions of the model
+            ``(n, joints)`` [rad or m].
+        region: Lowest and highest x, y and z of the flange in the base frame [m].
+        tools, frames: Where tools and frames of a program are, see :mod:`truearm.compensation.cell`.
 
-    Raises
-    ------
-    InputError
-        If both are given, a file cannot be read, or the robot reaches none of it.
+    Raises:
+        InputError: If both are given, a file cannot be read, or the robot reaches none of it.
     """
     if accurate_at is not None and region is not None:
         raise InputError(

@@ -59,10 +59,8 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
 def refuse_swapped(robot: object, data: object, job: str) -> None:
     """Refuse a robot where measurements belong, and measurements in its place.
 
-    Parameters
-    ----------
-    job
-        Named with both in their order.
+    Args:
+        job: Named with both in their order.
     """
     if not (isinstance(robot, str | Path) and isinstance(data, str | Path)):
         return
@@ -134,12 +132,9 @@ def joints_argument(joints: object, robot: Robot, parameter: str = "joints") -> 
 def folder_for(names: Iterable[str], out: object, *read: object, parameter: str = "out", ours: bool = False) -> Path:
     """Return the folder for files of some names, or refuse one that cannot be written to, before any long work.
 
-    Parameters
-    ----------
-    read
-        What the job was given: none of these, as far as they are files, may be overwritten.
-    ours
-        Whether only files may be overwritten that truearm has written there and nobody has changed since.
+    Args:
+        read: What the job was given: none of these, as far as they are files, may be overwritten.
+        ours: Whether only files may be overwritten that truearm has written there and nobody has changed since.
     """
     return output_folder(out, names, files_of(*read), parameter, ours=ours)
 
@@ -147,10 +142,8 @@ def folder_for(names: Iterable[str], out: object, *read: object, parameter: str 
 def folder_beside(names: Iterable[str], mark: str, out: object, *read: object) -> Path:
     """Return the folder for files as :func:`folder_for` does, but refuse the folder of another kind of result.
 
-    Parameters
-    ----------
-    mark
-        The file by which a result of this kind is known.
+    Args:
+        mark: The file by which a result of this kind is known.
     """
     wanted = tuple(names)
     folder = folder_for(wanted, out, *read, ours=True)
@@ -240,10 +233,8 @@ def pushed_argument(robot: Robot, wrench: Wrench | None, tool: Transform | str |
 def pushed_at_argument(robot: Robot, wrench: Wrench | None, at: object) -> Robot:
     """Return a robot with what acts on one of its targets, or on its flange, by name.
 
-    Raises
-    ------
-    InputError
-        If there is no such target, or several and none is named.
+    Raises:
+        InputError: If there is no such target, or several and none is named.
     """
     names = [target.name for target in robot.targets]
     if wrench is None:
@@ -339,10 +330,8 @@ def lengths_argument(
 ) -> tuple[float, ...]:
     """Return `count` lengths [m], each `lowest` or more.
 
-    Parameters
-    ----------
-    one_for_all
-        Whether a single number may stand for all of them.
+    Args:
+        one_for_all: Whether a single number may stand for all of them.
     """
     if one_for_all and isinstance(values, Real):
         return (length_argument(values, parameter, lowest),) * count
@@ -399,10 +388,8 @@ def executor_argument(executor: object) -> Executor | None:
 def choice_argument(value: object, parameter: str, known: Mapping[str, T], what: str | None = None) -> T:
     """Return what a name stands for, of those that are known.
 
-    Parameters
-    ----------
-    what
-        What it is the name of, for the message; the parameter if None.
+    Args:
+        what: What it is the name of, for the message; the parameter if None.
     """
     if not isinstance(value, str):
         raise wrong_kind("a name belongs here", value, parameter, ", ".join(known))

@@ -404,12 +404,9 @@ def _beside_nominal(
 
     Where single readings are doubted, they pull base and targets of the nominal robot too, unless the loss is robust.
 
-    Parameters
-    ----------
-    placed
-        The nominal robot, base and targets found as the fit finds them.
-    noticed
-        What was said of the data.
+    Args:
+        placed: The nominal robot, base and targets found as the fit finds them.
+        noticed: What was said of the data.
     """
     if held_out is None:
         return [nothing_held_out()]

@@ -75,12 +75,9 @@ def notices_of(
 ) -> tuple[Notice, ...]:
     """Return one notice for each kind of fault; none for believable data.
 
-    Parameters
-    ----------
-    steady
-        The same data without the motion of the table.
-    excluded
-        How many readings of each target were excluded.
+    Args:
+        steady: The same data without the motion of the table.
+        excluded: How many readings of each target were excluded.
     """
     return _compared(data, robot, steady=steady, excluded=excluded)[0]
 
@@ -95,12 +92,9 @@ def _compared(
 ) -> tuple[tuple[Notice, ...], Fit | None, Dataset | None]:
     """Return one notice for each kind of fault, a robust fit of the robot, and what is believed of its readings.
 
-    Parameters
-    ----------
-    steady
-        The same data without the motion of the table, where that has been removed already.
-    excluded
-        How many readings of each target were excluded.
+    Args:
+        steady: The same data without the motion of the table, where that has been removed already.
+        excluded: How many readings of each target were excluded.
     """
     ranged: tuple[Notice, ...] = ()
     if device is not None:

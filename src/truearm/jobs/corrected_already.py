@@ -22,10 +22,8 @@ def refuse_corrected_already(
 
     Records are looked for beside the programs and in the folder of results, whatever programs are called there.
 
-    Raises
-    ------
-    InputError
-        If there are such targets, or the ledger cannot be read.
+    Raises:
+        InputError: If there are such targets, or the ledger cannot be read.
     """
     folders = {*(path.parent for path in paths), *([] if folder is None else [folder])}
     with refusals_of("robot"):

@@ -45,26 +45,18 @@ def cell_argument(
 ) -> Cell:
     """Return what stands around an arm.
 
-    Parameters
-    ----------
-    robot
-        Whether it stands, hangs or is on a wall follows from its gravity.
-    constraints, where
-        With boxes to keep out of, and the file that says so, for messages. Its floor, if it has one below the base,
-        is the floor unless `floor` says another.
-    floor
-        Height in the base frame [m]; None for 0: where the robot hangs or is on a wall, that is the surface
-        on which it is mounted, and no other height is one of a floor.
-    no_floor
-        Whether there is no floor and no mounting surface to keep clear of.
-    clearance
-        Room to keep [m]; None for 50 mm.
+    Args:
+        robot: Whether it stands, hangs or is on a wall follows from its gravity.
+        constraints, where: With boxes to keep out of, and the file that says so, for messages. Its floor, if it has one
+            below the base, is the floor unless `floor` says another.
+        floor: Height in the base frame [m]; None for 0: where the robot hangs or is on a wall, that is the surface on
+            which it is mounted, and no other height is one of a floor.
+        no_floor: Whether there is no floor and no mounting surface to keep clear of.
+        clearance: Room to keep [m]; None for 50 mm.
 
-    Raises
-    ------
-    InputError
-        If the floor is above the base, or is none, as the robot does not stand, or both given and denied, or a
-        length is none, or the clearance above 0 and below 1 mm.
+    Raises:
+        InputError: If the floor is above the base, or is none, as the robot does not stand, or both given and denied,
+            or a length is none, or the clearance above 0 and below 1 mm.
     """
     without = flag_argument(no_floor, "no_floor")
     height = None if floor is None else length_argument(floor, "floor")
@@ -104,22 +96,15 @@ def finder_argument(
 ) -> WayFinder:
     """Return what finds the ways of an arm in a cell.
 
-    Parameters
-    ----------
-    robot
-        With its targets.
-    constraints, where
-        With limits, and the file that says so, for messages.
-    cell
-        What is kept clear.
-    home
-        The safe configuration by the model [rad or m]; None to find one.
+    Args:
+        robot: With its targets.
+        constraints, where: With limits, and the file that says so, for messages.
+        cell: What is kept clear.
+        home: The safe configuration by the model [rad or m]; None to find one.
 
-    Raises
-    ------
-    InputError
-        If a box holds the base or the safe configuration, that has not as many numbers as joints or lies beyond the
-        limits, or none was found.
+    Raises:
+        InputError: If a box holds the base or the safe configuration, that has not as many numbers as joints or lies
+            beyond the limits, or none was found.
     """
     low, high = joint_window(robot, constraints, where)
     given = None

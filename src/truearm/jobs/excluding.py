@@ -26,10 +26,8 @@ _RULE: Final = (
 def without_excluded(data: Dataset, exclude: str | Path | None) -> tuple[Dataset, tuple[Excluded, ...]]:
     """Return data in which the readings that a file excludes are missing, and these, all of them as of training.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be used, or excludes what was not read.
+    Raises:
+        InputError: If the file cannot be used, or excludes what was not read.
     """
     if exclude is None:
         return data, ()
@@ -43,10 +41,8 @@ def without_excluded(data: Dataset, exclude: str | Path | None) -> tuple[Dataset
 def in_parts(excluded: tuple[Excluded, ...], split: Dataset, held_out: IntArray) -> tuple[Excluded, ...]:
     """Return excluded readings with the part of a split that they would belong to.
 
-    Parameters
-    ----------
-    split
-        The data that were split.
+    Args:
+        split: The data that were split.
     """
     judging, known = {split.labels[c] for c in held_out.tolist()}, set(split.labels)
 
@@ -85,14 +81,10 @@ def check_excluded(
 ) -> list[Notice]:
     """Say if readings are excluded by which a fit would be judged, and what the errors are with them.
 
-    Parameters
-    ----------
-    robot
-        The calibrated one.
-    as_read
-        The data that were split, with the excluded readings; None if they cannot be compared.
-    without
-        Errors on the held-out part as it judges; None if there is none.
+    Args:
+        robot: The calibrated one.
+        as_read: The data that were split, with the excluded readings; None if they cannot be compared.
+        without: Errors on the held-out part as it judges; None if there is none.
     """
     mine = tuple(one for one in excluded if one.part == "held out")
     count = sum(one.readings for one in mine)

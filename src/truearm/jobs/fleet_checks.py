@@ -33,10 +33,8 @@ def check_options(asked: Manifest) -> None:
     Robots with the same options are tried one after the other until one can be calibrated: data of a single robot may
     be wrong, and that is its own failure.
 
-    Raises
-    ------
-    InputError
-        Naming where the option stands, or the robot that is not known.
+    Raises:
+        InputError: Naming where the option stands, or the robot that is not known.
     """
     groups: dict[str, list[RobotEntry]] = {}
     for robot in asked.robots:
@@ -106,10 +104,8 @@ def _place_of(error: InputError, robot: RobotEntry) -> str | None:
 def check_folders(asked: Manifest, folder: Path) -> None:
     """Refuse folders of robots that hold what is not truearm's, and files in them that this fleet reads.
 
-    Raises
-    ------
-    InputError
-        Naming the file.
+    Raises:
+        InputError: Naming the file.
     """
     within = folder / ROBOTS
     for robot in asked.robots:

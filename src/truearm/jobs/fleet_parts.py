@@ -19,55 +19,29 @@ if TYPE_CHECKING:  # with all that a calibration needs
 
 @dataclass(frozen=True)
 class Task:
-    """A part that somebody shall do.
+    """A part that somebody shall do."""
 
-    Attributes
-    ----------
-    part
-        Its number, counted from 0.
-    version
-        Of truearm that asks.
-    experiment
-        The pickled experiment of simulated robots; None of measured ones.
-    numbers
-        Which simulated robots, counted from 0.
-    robots
-        Or which measured ones.
-    folder
-        Of the fleet, for what is written of each robot that was measured.
-    """
-
-    part: int
-    version: str
-    experiment: bytes | None = None
-    numbers: tuple[int, ...] = ()
-    robots: tuple[RobotEntry, ...] = ()
-    folder: Path | None = None
+    part: int  #: Its number, counted from 0.
+    version: str  #: Of truearm that asks.
+    experiment: bytes | None = None  #: The pickled experiment of simulated robots; None of measured ones.
+    numbers: tuple[int, ...] = ()  #: Which simulated robots, counted from 0.
+    robots: tuple[RobotEntry, ...] = ()  #: Or which measured ones.
+    folder: Path | None = None  #: Of the fleet, for what is written of each robot that was measured.
 
 
 @dataclass(frozen=True)
 class Finished:
-    """A part that is done.
+    """A part that is done."""
 
-    Attributes
-    ----------
-    text
-        Its robots, as the file of the part holds them.
-    failed
-        How many of them could not be calibrated.
-    """
-
-    text: str
-    failed: int
+    text: str  #: Its robots, as the file of the part holds them.
+    failed: int  #: How many of them could not be calibrated.
 
 
 def finished(task: Task) -> Finished:
     """Do a part.
 
-    Raises
-    ------
-    InputError
-        If this process has another version of truearm than the one that asks.
+    Raises:
+        InputError: If this process has another version of truearm than the one that asks.
     """
     if task.version != __version__:
         raise InputError(

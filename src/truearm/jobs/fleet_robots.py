@@ -33,36 +33,23 @@ _OF_CAMPAIGN: Final = (*PLACES, SCALE_GROUP)
 
 @dataclass(frozen=True)
 class Done:
-    """What was done with a robot that was measured.
+    """What was done with a robot that was measured."""
 
-    Attributes
-    ----------
-    row
-        What was found.
-    written
-        Files that were written, from the folder of the fleet.
-    changed
-        Whether its files are others than those that the manifest meant: then the row says nothing but that.
-    """
-
-    row: Row
-    written: tuple[str, ...] = ()
+    row: Row  #: What was found.
+    written: tuple[str, ...] = ()  #: Files that were written, from the folder of the fleet.
+    #: Whether its files are others than those that the manifest meant: then the row says nothing but that.
     changed: bool = False
 
 
 def calibrated_robot(entry: RobotEntry, folder: Path | None = None) -> Done:
     """Calibrate a robot that was measured; what cannot be calibrated is a row too, with the reason.
 
-    Parameters
-    ----------
-    folder
-        Of the fleet: the robot's report and calibrated robot are written into ``robots/NAME`` there; None writes
-        nothing.
+    Args:
+        folder: Of the fleet: the robot's report and calibrated robot are written into ``robots/NAME`` there; None
+            writes nothing.
 
-    Raises
-    ------
-    InputError
-        If that cannot be written.
+    Raises:
+        InputError: If that cannot be written.
     """
     began = time.perf_counter()
     said = {"date": entry.date, "serial": entry.of}

@@ -23,21 +23,11 @@ _SHARE: Final = 0.05
 
 
 class FitStep(str):
-    """A step of a fit in words.
+    """A step of a fit in words."""
 
-    Attributes
-    ----------
-    number
-        Of the step, from 1, over all rounds.
-    cost
-        The sum of squares that is made small; each round weighs the readings anew.
-    error
-        Mean error on the configurations that judge [m].
-    """
-
-    number: int
-    cost: float
-    error: float
+    number: int  #: Of the step, from 1, over all rounds.
+    cost: float  #: The sum of squares that is made small; each round weighs the readings anew.
+    error: float  #: Mean error on the configurations that judge [m].
 
     @classmethod
     def of(cls, number: int, cost: float, error: float, judges: str) -> Self:
@@ -51,12 +41,9 @@ class FitStep(str):
 def followed(progress: Callable[[str], None], judging: Dataset, *, held_out: bool) -> Iterator[None]:
     """Tell of the steps of the fits in this block, as far as that costs next to nothing.
 
-    Parameters
-    ----------
-    judging
-        What the fit is judged on.
-    held_out
-        Whether the fit does not see it.
+    Args:
+        judging: What the fit is judged on.
+        held_out: Whether the fit does not see it.
     """
     number, spent, start = 0, 0.0, time.process_time()
 

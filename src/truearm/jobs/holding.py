@@ -25,19 +25,13 @@ _AS_BASE: Final = "quaternion: [1, 0, 0, 0]"
 def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Dataset) -> Held:
     """Return what is held, with its places from a file.
 
-    Parameters
-    ----------
-    hold
-        ``base``, ``targets``, ``fixtures``, or targets and fixtures by name.
-    frames
-        A file of the schema ``truearm-cell/1``: targets are its tools; base and fixtures its frames.
-    robot, data
-        Of the calibration.
+    Args:
+        hold: ``base``, ``targets``, ``fixtures``, or targets and fixtures by name.
+        frames: A file of the schema ``truearm-cell/1``: targets are its tools; base and fixtures its frames.
+        robot, data: Of the calibration.
 
-    Raises
-    ------
-    InputError
-        If numbers are missing, if something is held that the readings do not have or do not see, or twice.
+    Raises:
+        InputError: If numbers are missing, if something is held that the readings do not have or do not see, or twice.
     """
     if not hold and frames is None:
         return NOTHING_HELD

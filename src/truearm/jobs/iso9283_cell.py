@@ -29,23 +29,12 @@ _MOST_NAMED: Final = 3
 
 @dataclass(frozen=True, eq=False)
 class StatedCell:
-    """A cell in which tests are driven.
+    """A cell in which tests are driven."""
 
-    Attributes
-    ----------
-    robot
-        With its target, within the limits of the constraints.
-    cell
-        Floor, boxes, and the room to keep.
-    check
-        Of that room.
-    rules, where
-        What else holds at every pose and on every path, and the file that says so.
-    """
-
-    robot: Robot
-    cell: Cell
-    check: CollisionCheck
+    robot: Robot  #: With its target, within the limits of the constraints.
+    cell: Cell  #: Floor, boxes, and the room to keep.
+    check: CollisionCheck  #: Of that room.
+    #: rules, where: what else holds at every pose and on every path, and the file that says so.
     rules: Constraints | None
     where: str
 
@@ -98,19 +87,13 @@ class StatedCell:
 def stated_cell(robot: Robot, rules: Constraints | None, where: str, clearance: float | None) -> StatedCell | None:
     """Return the cell that was stated; None if none was.
 
-    Parameters
-    ----------
-    robot
-        With the target that is measured.
-    rules, where
-        Constraints as for plans of measurements, and the file that says so.
-    clearance
-        Room to keep [m]; None for 50 mm.
+    Args:
+        robot: With the target that is measured.
+        rules, where: Constraints as for plans of measurements, and the file that says so.
+        clearance: Room to keep [m]; None for 50 mm.
 
-    Raises
-    ------
-    InputError
-        If a box holds the base, limits leave a joint nothing, or a length cannot be.
+    Raises:
+        InputError: If a box holds the base, limits leave a joint nothing, or a length cannot be.
     """
     if rules is None and clearance is None:
         return None

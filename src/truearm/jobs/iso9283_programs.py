@@ -141,12 +141,9 @@ def refuse_losing_slow_run(folder: Path, slow_run: Path | None) -> None:
 def refuse_stale(folder: Path, names: Collection[str], slow_run: Path | None) -> None:
     """Refuse a folder with programs or a record of another plan, that would stay beside this one.
 
-    Parameters
-    ----------
-    names
-        Of the files that are written.
-    slow_run
-        The record that was given: it may be there.
+    Args:
+        names: Of the files that are written.
+        slow_run: The record that was given: it may be there.
     """
     written = [name for one in sets_in(folder) for name in one.files]
     for name in written:

@@ -354,12 +354,9 @@ def _read(joints: Array, true: TrueRobot, tracker: Tracker, rng: np.random.Gener
 def _located(at: Array, turned: Array, position: Array, rotation: Array) -> tuple[Transform, float]:
     """Return where the tip is on a flange, and by how much readings of it are off, as a root mean square [m].
 
-    Parameters
-    ----------
-    at, turned
-        The flange in the instrument's frame: ``(n, 3)`` [m] and ``(n, 3, 3)``.
-    position, rotation
-        Readings of the tip.
+    Args:
+        at, turned: The flange in the instrument's frame: ``(n, 3)`` [m] and ``(n, 3, 3)``.
+        position, rotation: Readings of the tip.
     """
     across = turned.transpose(0, 2, 1)
     offset = np.einsum("nij,nj->i", across, position - at) / len(at)

@@ -20,10 +20,8 @@ def extent_notices(session: Session, flange: Array) -> list[Notice]:
 
     That is no word on how well a reading fits.
 
-    Parameters
-    ----------
-    flange
-        Where the nominal flange is at the configurations of the plan [m], ``(n, 3)``.
+    Args:
+        flange: Where the nominal flange is at the configurations of the plan [m], ``(n, 3)``.
     """
     places = {label: number for number, label in enumerate(session.labels)}
     for name in session.targets:

@@ -16,17 +16,13 @@ from truearm.simulation.devices.device import Device
 def sight_notices(session: Session, device: Device, placed: Robot, joints: Array) -> tuple[Notice, ...]:
     """Return what to know where a device cannot read all targets that are asked for.
 
-    Parameters
-    ----------
-    placed
-        The nominal robot where the device sees it.
-    joints
-        Of the plan, as the model counts them [rad or m], ``(n, joints)``.
+    Args:
+        placed: The nominal robot where the device sees it.
+        joints: Of the plan, as the model counts them [rad or m], ``(n, joints)``.
 
-    Raises
-    ------
-    InputError
-        If it can read none of them at any configuration: a log of missed readings would be all that comes of it.
+    Raises:
+        InputError: If it can read none of them at any configuration: a log of missed readings would be all that comes
+            of it.
     """
     asked = np.array([[target.name in names for target in placed.targets] for names in session.asked])
     seen = asked & device.visible(placed, joints)

@@ -30,17 +30,12 @@ def begin(
 ) -> None:
     """Write down what is fixed from now on, or refuse what is not as it was when the measuring began.
 
-    Parameters
-    ----------
-    plan
-        What it holds, as JSON writes it.
-    virtual
-        The virtual instrument and its twin; None for a real instrument.
+    Args:
+        plan: What it holds, as JSON writes it.
+        virtual: The virtual instrument and its twin; None for a real instrument.
 
-    Raises
-    ------
-    InputError
-        If the folder holds the measuring of another plan or robot, or one that began otherwise.
+    Raises:
+        InputError: If the folder holds the measuring of another plan or robot, or one that began otherwise.
     """
     now: dict[str, Any] = {
         "truearm": _SCHEMA,

@@ -67,10 +67,8 @@ _CALLED: Final[Mapping[Kind, str]] = {"device": "virtual device", "watch": "fold
 def source_kind(asked: Mapping[str, object]) -> Kind:
     """Return which source is asked for.
 
-    Raises
-    ------
-    InputError
-        If it is none, or more than one, or something is asked for that belongs to another one.
+    Raises:
+        InputError: If it is none, or more than one, or something is asked for that belongs to another one.
     """
     given = [kind for kind in _OF if asked.get(kind) is not None]
     for of, names in _OF.items() if not given else ():
@@ -100,21 +98,11 @@ def source_kind(asked: Mapping[str, object]) -> Kind:
 
 @dataclass(frozen=True, eq=False)
 class VirtualSource:
-    """A virtual instrument, and what must be the same when the measuring goes on.
+    """A virtual instrument, and what must be the same when the measuring goes on."""
 
-    Attributes
-    ----------
-    source
-        The instrument.
-    placed
-        The nominal robot where it sees it.
-    entries
-        What the readings depend on.
-    """
-
-    source: VirtualInstrument
-    placed: Robot
-    entries: dict[str, Any]
+    source: VirtualInstrument  #: The instrument.
+    placed: Robot  #: The nominal robot where it sees it.
+    entries: dict[str, Any]  #: What the readings depend on.
 
 
 def virtual_source(
@@ -122,19 +110,13 @@ def virtual_source(
 ) -> VirtualSource:
     """Return a virtual instrument that measures a twin.
 
-    Parameters
-    ----------
-    joints
-        Of the plan, as the model counts them [rad or m], ``(n, joints)``.
-    before
-        Where the arm stops right before each of them, as `joints`; None if it comes from the one before.
-    nests
-        Their names.
+    Args:
+        joints: Of the plan, as the model counts them [rad or m], ``(n, joints)``.
+        before: Where the arm stops right before each of them, as `joints`; None if it comes from the one before.
+        nests: Their names.
 
-    Raises
-    ------
-    InputError
-        If there is no such device, or it cannot measure a plan, or a number cannot be meant.
+    Raises:
+        InputError: If there is no such device, or it cannot measure a plan, or a number cannot be meant.
     """
     from truearm.simulation.devices import seen_by
     from truearm.simulation.truths import truth_twin

@@ -27,10 +27,8 @@ _BAR: Final = 20
 def trials_argument(value: object, loss: Loss, bounds: object) -> int | None:
     """Return how many calibrations shall be simulated; None for None.
 
-    Raises
-    ------
-    InputError
-        For too few or too many of them, and for fits that are no plain least squares.
+    Raises:
+        InputError: For too few or too many of them, and for fits that are no plain least squares.
     """
     if value is None:
         return None

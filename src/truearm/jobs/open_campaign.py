@@ -71,42 +71,23 @@ class Asked(AskedOfSource, total=False):
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """Lines of sight at the configuration that is measured next: to the targets, or to the nests in their round.
+    """Lines of sight at the configuration that is measured next: to the targets, or to the nests in their round."""
 
-    Attributes
-    ----------
-    names
-        Of the targets or nests.
-    origin
-        Where the instrument is, in the world [m], ``(3,)``.
-    targets
-        Where the nominal robot has them, or where the nests stand [m], ``(k, 3)``.
-    visible
-        Which the instrument can read, ``(k,)``.
-    outstanding
-        Which are still to be measured, ``(k,)``.
-    """
-
-    names: tuple[str, ...]
-    origin: Array
-    targets: Array
-    visible: NDArray[np.bool_]
-    outstanding: NDArray[np.bool_]
+    names: tuple[str, ...]  #: Of the targets or nests.
+    origin: Array  #: Where the instrument is, in the world [m], ``(3,)``.
+    targets: Array  #: Where the nominal robot has them, or where the nests stand [m], ``(k, 3)``.
+    visible: NDArray[np.bool_]  #: Which the instrument can read, ``(k,)``.
+    outstanding: NDArray[np.bool_]  #: Which are still to be measured, ``(k,)``.
 
 
 class OpenCampaign(Campaign):
     """A campaign that knows its robot and plan, and writes what came of it.
 
-    Attributes
-    ----------
-    robot
-        The nominal robot.
-    placed
-        The same where a virtual instrument sees it; None for a real instrument, which nobody has placed.
-    joints
-        Of the plan, as the model counts them [rad or m], ``(n, joints)``.
-    sighted
-        What a virtual instrument cannot read of the plan, known before the first reading.
+    Attributes:
+        robot: The nominal robot.
+        placed: The same where a virtual instrument sees it; None for a real instrument, which nobody has placed.
+        joints: Of the plan, as the model counts them [rad or m], ``(n, joints)``.
+        sighted: What a virtual instrument cannot read of the plan, known before the first reading.
     """
 
     def __init__(
@@ -202,10 +183,8 @@ def open_campaign(
 ) -> OpenCampaign:
     """Open the measuring of a plan; keywords as for :func:`truearm.measure`.
 
-    Raises
-    ------
-    InputError
-        If anything cannot be used, or the folder holds the measuring of another plan.
+    Raises:
+        InputError: If anything cannot be used, or the folder holds the measuring of another plan.
     """
     if unknown := {*asked} - {*Asked.__annotations__, *AskedOfSource.__annotations__}:
         raise TypeError(f"open_campaign() takes no keyword {sorted(unknown)[0]!r}")

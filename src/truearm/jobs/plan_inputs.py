@@ -23,10 +23,8 @@ def plan_inputs(
 
     Of a program in several files all count.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be read; one that is not there has no hash.
+    Raises:
+        InputError: If a file cannot be read; one that is not there has no hash.
     """
     found = hashes_of(
         robot=robot,

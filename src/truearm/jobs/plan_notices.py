@@ -40,14 +40,10 @@ def load_notices(robot: Robot) -> list[Notice]:
 def targets_notices(robot: Robot, given: Robot, device: str = "") -> list[Notice]:
     """Return what to know of targets that a plan without a program has assumed.
 
-    Parameters
-    ----------
-    robot
-        With the targets.
-    given
-        The robot as the user has it.
-    device
-        What measures, where that was said.
+    Args:
+        robot: With the targets.
+        given: The robot as the user has it.
+        device: What measures, where that was said.
     """
     if given.targets:
         return []
@@ -64,16 +60,11 @@ def targets_notices(robot: Robot, given: Robot, device: str = "") -> list[Notice
 def assumed_notices(robot: Robot, given: Robot, device: str = "", *, weighed: bool) -> list[Notice]:
     """Return what to know of the load and the targets that a program has taken for those that nobody said.
 
-    Parameters
-    ----------
-    robot
-        With the targets, and what it carries.
-    given
-        The robot as the user has it.
-    device
-        What measures, where that was said.
-    weighed
-        Whether the user said what it carries.
+    Args:
+        robot: With the targets, and what it carries.
+        given: The robot as the user has it.
+        device: What measures, where that was said.
+        weighed: Whether the user said what it carries.
     """
     unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
     if not unsaid:

@@ -62,33 +62,19 @@ _LABEL: Final = re.compile(r"[A-Za-z0-9_.+-]([A-Za-z0-9 _.+-]*[A-Za-z0-9_.+-])?"
 
 @dataclass(frozen=True)
 class ProgramWanted:
-    """A measuring program that was asked for.
+    """A measuring program that was asked for."""
 
-    Attributes
-    ----------
-    name
-        What the language is called as an argument.
-    language
-        In which it is written.
-    driving
-        How fast it goes, and for what it waits.
-    approach
-        Whether every joint comes to each configuration from one side.
-    """
-
-    name: str
-    language: Language
-    driving: Driving
-    approach: bool
+    name: str  #: What the language is called as an argument.
+    language: Language  #: In which it is written.
+    driving: Driving  #: How fast it goes, and for what it waits.
+    approach: bool  #: Whether every joint comes to each configuration from one side.
 
     def check(self, robot: Robot, device: str | None = None) -> None:
         """Refuse a robot that this language's programs cannot drive, and a device to which it is not driven.
 
-        Raises
-        ------
-        InputError
-            If the maker's controllers do not speak it, the arm has more than six joints, its controller is known to
-            count them otherwise and the robot file does not say how, or the device is touched.
+        Raises:
+            InputError: If the maker's controllers do not speak it, the arm has more than six joints, its controller is
+                known to count them otherwise and the robot file does not say how, or the device is touched.
         """
         if robot.maker and not self.language.runs_on(robot.maker):
             known = [name for name in _NAMES if PROGRAM_LANGUAGES[name].runs_on(robot.maker)]
@@ -145,10 +131,8 @@ class ProgramWanted:
 def program_wanted(program: object, approach: object, speed: Any, dwell: object, wait: object) -> ProgramWanted | None:
     """Return the program that was asked for; None for none.
 
-    Raises
-    ------
-    InputError
-        If an argument is none, or is given and no program is asked for.
+    Raises:
+        InputError: If an argument is none, or is given and no program is asked for.
     """
     from_below = flag_argument(approach, "approach")
     if program is None:
@@ -171,18 +155,12 @@ def program_wanted(program: object, approach: object, speed: Any, dwell: object,
 def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str = "", *, weighed: bool) -> Plan:
     """Return a plan with the program that drives it.
 
-    Parameters
-    ----------
-    planned
-        Whose ways were checked; its robot has targets and what it carries, maybe assumed.
-    wanted
-        What was asked for.
-    given
-        The robot as the user has it.
-    device
-        What measures, where that was said.
-    weighed
-        Whether the user said what it carries.
+    Args:
+        planned: Whose ways were checked; its robot has targets and what it carries, maybe assumed.
+        wanted: What was asked for.
+        given: The robot as the user has it.
+        device: What measures, where that was said.
+        weighed: Whether the user said what it carries.
     """
     language, robot, tour = wanted.language, planned.made.robot, planned.tour
     assert tour is not None
@@ -221,14 +199,10 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str
 def refuse_other_programs(folder: Path, names: Collection[str], *read: object) -> None:
     """Refuse a folder with programs that are not of this plan: they would be lost, or stay beside it.
 
-    Parameters
-    ----------
-    folder
-        In which the plan is written.
-    names
-        Of the files of its program.
-    read
-        What the job was given.
+    Args:
+        folder: In which the plan is written.
+        names: Of the files of its program.
+        read: What the job was given.
     """
     folder_for(names, folder, *read, ours=True)
     for one in sets_in(folder):

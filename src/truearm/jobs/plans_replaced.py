@@ -15,14 +15,10 @@ from truearm.notices import Notice
 def plan_files_for(names: Collection[str], out: Path, *read: object) -> None:
     """Refuse places of files beside each other that cannot be, that others wrote or changed, or of another result.
 
-    Parameters
-    ----------
-    names
-        Of all files that a plan of this kind has.
-    out
-        One of them: the others stand beside it.
-    read
-        What the job was given: none of these, as far as they are files, may be overwritten.
+    Args:
+        names: Of all files that a plan of this kind has.
+        out: One of them: the others stand beside it.
+        read: What the job was given: none of these, as far as they are files, may be overwritten.
     """
     for name in names:
         file_for(out.with_name(name), *read, ours=True)
@@ -52,14 +48,10 @@ def refuse_ways_of_another(ways: Path) -> None:
 def replaced_notices(folder: Path, name: str, text: str) -> tuple[Notice, ...]:
     """Return what to know of a plan that truearm wrote earlier, nobody changed, and another is written over.
 
-    Parameters
-    ----------
-    folder
-        In which it stands.
-    name
-        Of the file that holds the plan itself.
-    text
-        What that file will hold.
+    Args:
+        folder: In which it stands.
+        name: Of the file that holds the plan itself.
+        text: What that file will hold.
     """
     for one in sets_in(folder):
         if name in one.files and exists(folder / name) and one.files[name] != hash_of(text.encode()):

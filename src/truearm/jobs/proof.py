@@ -44,10 +44,8 @@ def accept_argument(accept: object, robot: Robot) -> tuple[str, ...]:
 def refuse_unaccepted(robot: Robot, accept: tuple[str, ...]) -> None:
     """Refuse a robot whose calibration ended badly, or with an error, that is not accepted.
 
-    Raises
-    ------
-    InputError
-        With what the calibration said.
+    Raises:
+        InputError: With what the calibration said.
     """
     judged = (_ELSEWHERE,) if arm_is_known(robot) else ()
     against = {name: said for name, said in _against(robot).items() if name not in (*accept, *judged)}
@@ -67,10 +65,8 @@ def refuse_unaccepted(robot: Robot, accept: tuple[str, ...]) -> None:
 def check_maker(robot: Robot, language: Language, accept: tuple[str, ...]) -> list[Notice]:
     """Return what is to be said of programs in the language of another maker's robots, if that is accepted.
 
-    Raises
-    ------
-    InputError
-        If it is not. A robot whose maker is not known may be anyone's.
+    Raises:
+        InputError: If it is not. A robot whose maker is not known may be anyone's.
     """
     if not robot.maker or language.runs_on(robot.maker):
         return []

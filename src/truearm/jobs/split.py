@@ -23,10 +23,8 @@ _LEFT_OUT: Final = re.compile(r"; ([0-9a-f]{8})\),")
 def left_out(data: Dataset, labels: Sequence[str]) -> Dataset:
     """Return the data without some configurations.
 
-    Raises
-    ------
-    InputError
-        For a configuration that the data do not have, or if none would be left.
+    Raises:
+        InputError: For a configuration that the data do not have, or if none would be left.
     """
     if not labels:
         return data
@@ -91,10 +89,8 @@ def check_split(training: Dataset, held_out: Dataset) -> None:
 def train_count(train: object, n: int, where: str) -> int:
     """Return how many of n configurations train.
 
-    Raises
-    ------
-    InputError
-        For a number that leaves none to train on or none to judge by.
+    Raises:
+        InputError: For a number that leaves none to train on or none to judge by.
     """
     if isinstance(train, str) and train == "all":
         return n
@@ -155,16 +151,11 @@ def check_trained_before(
 ) -> list[Notice]:
     """Say if the robot to begin with has been trained on what is held out now.
 
-    Parameters
-    ----------
-    data
-        As they were read.
-    sha256
-        Of their file; None if they are in none.
-    split
-        How many configurations are trained on, of how many, and the seed.
-    without
-        What the history says of those left out.
+    Args:
+        data: As they were read.
+        sha256: Of their file; None if they are in none.
+        split: How many configurations are trained on, of how many, and the seed.
+        without: What the history says of those left out.
     """
     before = training_of(robot, data, sha256)
     if before is None or split[0] == split[1]:

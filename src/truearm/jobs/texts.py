@@ -55,10 +55,8 @@ def read_numbers(text: str, parameter: str, allowed: str) -> list[float]:
 def read_poses(text: str) -> int | Literal["auto"]:
     """Return how many poses a text names, or ``auto``.
 
-    Raises
-    ------
-    InputError
-        If it is neither, or there cannot be so many.
+    Raises:
+        InputError: If it is neither, or there cannot be so many.
     """
     from truearm.jobs.arguments import count_argument
     from truearm.units import as_number

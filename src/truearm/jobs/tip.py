@@ -16,17 +16,13 @@ TIP: Final = "tip"
 def tip_argument(arm: Robot, target: str | None, tip: Sequence[float] | None, what: str) -> tuple[Robot, str | None]:
     """Return the robot with what goes to poses, and its name; None for the flange.
 
-    Parameters
-    ----------
-    target, tip
-        As the job was given them: the name of a target, or a place in the flange frame [m]; None for neither.
-    what
-        What one of them alone can do, for the refusal.
+    Args:
+        target, tip: As the job was given them: the name of a target, or a place in the flange frame [m]; None for
+            neither.
+        what: What one of them alone can do, for the refusal.
 
-    Raises
-    ------
-    InputError
-        If both are given, or there is no such target.
+    Raises:
+        InputError: If both are given, or there is no such target.
     """
     if target is not None and tip is not None:
         raise InputError(f"only one of them can {what}", parameter="target, tip", came=target, cure="Leave one out.")

@@ -242,32 +242,19 @@ _TRAINED: Final = re.compile(
 
 @dataclass(frozen=True)
 class Training:
-    """What the history of a robot says of a calibration.
+    """What the history of a robot says of a calibration."""
 
-    Attributes
-    ----------
-    split
-        How many configurations it was trained on, of how many, and the seed.
-    left_out
-        How many were left out before.
-    line
-        The line of the history.
-    """
-
-    split: tuple[int, int, int]
-    left_out: int
-    line: str
+    split: tuple[int, int, int]  #: How many configurations it was trained on, of how many, and the seed.
+    left_out: int  #: How many were left out before.
+    line: str  #: The line of the history.
 
 
 def training_of(robot: Robot, data: Dataset, digest: str | None) -> Training | None:
     """Return how a robot was trained on data; None if it was not.
 
-    Parameters
-    ----------
-    data
-        As they were read.
-    digest
-        SHA-256 of their file, by which older calibrations know them; None if they are in none.
+    Args:
+        data: As they were read.
+        digest: SHA-256 of their file, by which older calibrations know them; None if they are in none.
     """
     readings = readings_digest(data)
     for line in robot.history:

@@ -42,10 +42,8 @@ _OVERLAP: Final = 0.05
 def zones_argument(value: object, *, held_out: bool) -> int | tuple[tuple[Box, ...], float] | None:
     """Return how many zones are to be cut, or the boxes of a file with their overlap [m]; None for None.
 
-    Parameters
-    ----------
-    held_out
-        Whether anything is held out to judge zones by.
+    Args:
+        held_out: Whether anything is held out to judge zones by.
     """
     if value is None:
         return None
@@ -100,21 +98,11 @@ def choose_zones(
 
 @dataclass(frozen=True, eq=False)
 class ZonedRobot:
-    """A robot with other models in zones, as a calibration wrote it.
+    """A robot with other models in zones, as a calibration wrote it."""
 
-    Attributes
-    ----------
-    whole
-        The robot elsewhere, which says where the nominal flange is.
-    file
-        Of it.
-    zones
-        Boxes with their robots.
-    """
-
-    whole: Robot
-    file: Path
-    zones: tuple[tuple[Box, Robot], ...]
+    whole: Robot  #: The robot elsewhere, which says where the nominal flange is.
+    file: Path  #: Of it.
+    zones: tuple[tuple[Box, Robot], ...]  #: Boxes with their robots.
 
     def configurations(self, postures: Array | Postures) -> list[IntArray]:
         """Return the indices of the configurations in each zone."""
@@ -124,10 +112,8 @@ class ZonedRobot:
     def errors(self, whole: Robot, data: Dataset) -> Errors:
         """Return errors on data, each configuration by the robot of its zone.
 
-        Parameters
-        ----------
-        whole
-            The robot elsewhere, with what it carried.
+        Args:
+            whole: The robot elsewhere, with what it carried.
         """
         found = errors_of(whole, data)
         position = found.position_errors.copy()
@@ -161,10 +147,8 @@ class ZonedRobot:
 def zoned_robot(robot: object) -> ZonedRobot | None:
     """Return the robot of a file of zones that a calibration wrote; None for any other robot.
 
-    Raises
-    ------
-    InputError
-        For a file that only says where zones are, or robots of another calibration.
+    Raises:
+        InputError: For a file that only says where zones are, or robots of another calibration.
     """
     if not isinstance(robot, str | Path) or not is_zones(robot):
         return None

@@ -47,14 +47,11 @@ def check_data(
 ) -> list[Notice]:
     """Return what is wrong with a dataset without asking a robot.
 
-    Parameters
-    ----------
-    suspects
-        Readings that a robot doubts. At their configurations it tells which reading is wrong better than distances do.
-    excluded
-        How many readings of each target are missing because they were excluded: nobody need be told that.
-    scaled
-        Configuration and target of readings in another unit of length: nothing more is said of these.
+    Args:
+        suspects: Readings that a robot doubts. At their configurations it tells which reading is wrong better than
+            distances do.
+        excluded: How many readings of each target are missing because they were excluded: nobody need be told that.
+        scaled: Configuration and target of readings in another unit of length: nothing more is said of these.
     """
     found = [*_misnamed(data), *_missing(data, excluded or {}), *check_duplicates(data)]
     data = _without(data, scaled)
@@ -75,10 +72,8 @@ def check_data(
 def _without(data: Dataset, rows: Collection[tuple[str, str]]) -> Dataset:
     """Return data without the positions of some readings, and of the reference points at their configurations.
 
-    Parameters
-    ----------
-    rows
-        Configuration and target of each.
+    Args:
+        rows: Configuration and target of each.
     """
     if not rows:
         return data
@@ -161,10 +156,8 @@ def check_range(data: Dataset, device: Ranged) -> list[Notice]:
 def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
     """Return one notice for each kind of suspicion; of a reading the one that says most.
 
-    Parameters
-    ----------
-    suspects
-        What was found, of some readings more than once.
+    Args:
+        suspects: What was found, of some readings more than once.
     """
     advice = {
         "outliers": (
@@ -276,10 +269,8 @@ def _moved(data: Dataset) -> list[Notice]:
 def check_joints(robot: Robot, data: Dataset | Inclinations) -> None:
     """Refuse data whose joints are not the robot's.
 
-    Raises
-    ------
-    InputError
-        Naming the counts, or the joint whose unit does not fit.
+    Raises:
+        InputError: Naming the counts, or the joint whose unit does not fit.
     """
     column = COLUMN["model" if data.joints_are == "model" else "controller"]
     if data.joints.shape[1] != len(robot.joints):

@@ -33,39 +33,20 @@ _SAME_POINT: Final = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Circle:
-    """A circle through measured points.
+    """A circle through measured points."""
 
-    Attributes
-    ----------
-    centre
-        [m], ``(3,)``.
-    x, y, normal
-        Axes of the circle's own frame, unit vectors ``(3,)``; the normal is the axis.
-    radius
-        [m].
-    radial, axial
-        Distance of each point from the circle outwards and along the normal [m], ``(n,)``.
-    angle
-        Of each point about the normal, from `x` towards `y` [rad], ``(n,)``, -pi to pi.
-    sigma
-        Standard deviation of a coordinate of the points [m], declared or from `radial` and `axial`.
-    shares
-        Covariance of centre along x and y and of the radius ``(3, 3)``, if that deviation were 1.
-    tilts
-        Variance of the normal's tilt towards x and towards y ``(2,)``, which have no covariance, if that deviation
-        were 1.
-    """
-
-    centre: Array
-    x: Array
+    centre: Array  #: [m], ``(3,)``.
+    x: Array  #: x, y, normal: axes of the circle's own frame, unit vectors ``(3,)``; the normal is the axis.
     y: Array
     normal: Array
-    radius: float
-    radial: Array
+    radius: float  #: [m].
+    radial: Array  #: radial, axial: distance of each point from the circle outwards and along the normal [m], ``(n,)``.
     axial: Array
-    angle: Array
-    sigma: float
-    shares: Array
+    angle: Array  #: Of each point about the normal, from `x` towards `y` [rad], ``(n,)``, -pi to pi.
+    sigma: float  #: Standard deviation of a coordinate of the points [m], declared or from `radial` and `axial`.
+    shares: Array  #: Covariance of centre along x and y and of the radius ``(3, 3)``, if that deviation were 1.
+    #: Variance of the normal's tilt towards x and towards y ``(2,)``, which have no covariance, if that deviation were
+    #: 1.
     tilts: Array
 
     @property
@@ -119,18 +100,13 @@ class Circle:
 def fit_circle(points: Array, sigma: float | None = None, where: str = "circle") -> Circle:
     """Fit a circle to points ``(n, 3)`` [m].
 
-    Parameters
-    ----------
-    sigma
-        Declared standard deviation of a coordinate [m]; estimated from what the circle leaves if None.
-    where
-        The points' origin, for messages.
+    Args:
+        sigma: Declared standard deviation of a coordinate [m]; estimated from what the circle leaves if None.
+        where: The points' origin, for messages.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than four points, they lie on a line, or the arc is too short: the axis would be uncertain
-        by more than 50 mrad or the radius by more than a tenth.
+    Raises:
+        InputError: If there are fewer than four points, they lie on a line, or the arc is too short: the axis would be
+            uncertain by more than 50 mrad or the radius by more than a tenth.
     """
     if len(points) < FEWEST:
         raise InputError(

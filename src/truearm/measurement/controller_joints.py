@@ -18,10 +18,9 @@ def in_model_joints(robot: Robot, data: Dataset) -> Dataset:
 
     Every job that compares a robot with measurements takes them through here.
 
-    Raises
-    ------
-    InputError
-        If the joints are not the robot's, or are its controller's and its file does not say how that counts them.
+    Raises:
+        InputError: If the joints are not the robot's, or are its controller's and its file does not say how that counts
+            them.
     """
     check_joints(robot, data)
     if data.joints_are != "controller":
@@ -33,10 +32,8 @@ def in_model_joints(robot: Robot, data: Dataset) -> Dataset:
 def in_controller_joints(robot: Robot, data: Dataset) -> Dataset:
     """Return data of a robot with the joint positions that its controller shows.
 
-    Raises
-    ------
-    InputError
-        If the joints are not the robot's, or its file does not say how its controller counts them.
+    Raises:
+        InputError: If the joints are not the robot's, or its file does not say how its controller counts them.
     """
     check_joints(robot, data)
     if data.joints_are == "controller":

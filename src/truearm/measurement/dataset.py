@@ -36,97 +36,62 @@ class Dataset:
 
     It checks itself when it is made: a field of the wrong shape, or with numbers that cannot be, is refused by name.
     :meth:`of` makes one from plain arrays.
-
-    Attributes
-    ----------
-    source
-        The file, for messages.
-    labels
-        Name of each configuration, in file order.
-    joints
-        Joint positions [rad; m for prismatic joints], ``(configurations, joints)``.
-    joint_kinds
-        ``revolute`` or ``prismatic`` for each joint, as the units of the file say.
-    joints_are
-        ``model``: the joints are those of the robot's model. ``controller``: they are what its controller shows, and no
-        robot can be compared with them before :func:`~truearm.measurement.controller_joints.in_model_joints` has made
-        them the model's; they are ``converted`` then.
-    targets
-        Names of the targets, in order of first appearance.
-    configuration, target
-        Index of the configuration and of the target of each reading, ``(readings,)``.
-    position
-        Measured position in the instrument's frame, or counted from the reading's fixture [m], ``(readings, 3)``; NaN
-        where it is missing.
-    quaternion
-        Measured orientation (w, x, y, z), ``(readings, 4)``, NaN where it is missing; None if nothing has one.
-    distance
-        Measured distance from the origin of the reading's fixture [m], ``(readings,)``, NaN where none was measured;
-        None if nothing has one.
-    height
-        Measured height over the plane of the reading's fixture [m], ``(readings,)``, likewise.
-    fixtures
-        Names of the fixtures, in order of first appearance.
-    fixture
-        Index of the fixture that each reading is measured against, ``(readings,)``, -1 for the instrument's own frame;
-        None if that is all of them.
-    setup
-        What is known of the fixtures themselves: readings whose targets are fixtures, all at one configuration that
-        says nothing, with their deviations; None if nothing is.
-    sigma
-        Declared standard deviation per coordinate, or of a distance or height [m], ``(readings,)``; None if the file
-        declares none.
-    sigma_rot
-        Declared standard deviation per rotation axis [rad], ``(readings,)``; None if the file declares none.
-    scale_sigma
-        Standard deviation of how much longer than it reads the instrument's unit of length is, one number for all
-        readings; None if it is exact.
-    visit
-        Which visit of its configuration each reading was taken on, whole numbers, ``(readings,)``: the robot came anew
-        for each. None if it came once.
-    approach
-        Sign of the last move of each joint, ``(configurations, joints)``: 1, -1, or 0 where it is not known; None if
-        the order of measurement is not known.
-    number
-        How many configurations of the campaign were measured before each, ``(configurations,)``; None if that is not
-        known.
-    temperature
-        Of the arm [degC], ``(configurations,)``; None if it was not recorded.
-    wrench
-        External force [N] and moment [N m] on the flange, about its origin, in the axes of the base,
-        ``(configurations, 6)``; None without any.
-    references
-        Fixed points beside the robot that were measured along with the targets, with the same fields; None if
-        there are none.
-    simulated
-        Whether a virtual instrument read any of it.
     """
 
-    source: str
-    labels: tuple[str, ...]
-    joints: Array
-    joint_kinds: tuple[str, ...]
-    targets: tuple[str, ...]
+    source: str  #: The file, for messages.
+    labels: tuple[str, ...]  #: Name of each configuration, in file order.
+    joints: Array  #: Joint positions [rad; m for prismatic joints], ``(configurations, joints)``.
+    joint_kinds: tuple[str, ...]  #: ``revolute`` or ``prismatic`` for each joint, as the units of the file say.
+    targets: tuple[str, ...]  #: Names of the targets, in order of first appearance.
+    #: configuration, target: index of the configuration and of the target of each reading, ``(readings,)``.
     configuration: IntArray
     target: IntArray
+    #: Measured position in the instrument's frame, or counted from the reading's fixture [m], ``(readings, 3)``; NaN
+    #: where it is missing.
     position: Array
+    #: Measured orientation (w, x, y, z), ``(readings, 4)``, NaN where it is missing; None if nothing has one.
     quaternion: Array | None = None
+    #: Measured distance from the origin of the reading's fixture [m], ``(readings,)``, NaN where none was measured;
+    #: None if nothing has one.
     distance: Array | None = None
+    #: Measured height over the plane of the reading's fixture [m], ``(readings,)``, likewise.
     height: Array | None = None
-    fixtures: tuple[str, ...] = ()
+    fixtures: tuple[str, ...] = ()  #: Names of the fixtures, in order of first appearance.
+    #: Index of the fixture that each reading is measured against, ``(readings,)``, -1 for the instrument's own frame;
+    #: None if that is all of them.
     fixture: IntArray | None = None
+    #: What is known of the fixtures themselves: readings whose targets are fixtures, all at one configuration that says
+    #: nothing, with their deviations; None if nothing is.
     setup: Dataset | None = None
+    #: Declared standard deviation per coordinate, or of a distance or height [m], ``(readings,)``; None if the file
+    #: declares none.
     sigma: Array | None = None
+    #: Declared standard deviation per rotation axis [rad], ``(readings,)``; None if the file declares none.
     sigma_rot: Array | None = None
+    #: Standard deviation of how much longer than it reads the instrument's unit of length is, one number for all
+    #: readings; None if it is exact.
     scale_sigma: float | None = None
+    #: Which visit of its configuration each reading was taken on, whole numbers, ``(readings,)``: the robot came anew
+    #: for each. None if it came once.
     visit: IntArray | None = None
+    #: Sign of the last move of each joint, ``(configurations, joints)``: 1, -1, or 0 where it is not known; None if the
+    #: order of measurement is not known.
     approach: Array | None = None
+    #: How many configurations of the campaign were measured before each, ``(configurations,)``; None if that is not
+    #: known.
     number: Array | None = None
-    temperature: Array | None = None
+    temperature: Array | None = None  #: Of the arm [degC], ``(configurations,)``; None if it was not recorded.
+    #: External force [N] and moment [N m] on the flange, about its origin, in the axes of the base, ``(configurations,
+    #: 6)``; None without any.
     wrench: Array | None = None
+    #: Fixed points beside the robot that were measured along with the targets, with the same fields; None if there are
+    #: none.
     references: Dataset | None = None
+    #: ``model``: the joints are those of the robot's model. ``controller``: they are what its controller shows, and no
+    #: robot can be compared with them before :func:`~truearm.measurement.controller_joints.in_model_joints` has made
+    #: them the model's; they are ``converted`` then.
     joints_are: str = "model"
-    simulated: bool = False
+    simulated: bool = False  #: Whether a virtual instrument read any of it.
 
     def __post_init__(self) -> None:
         """Refuse fields that do not fit together."""

@@ -45,38 +45,23 @@ Read = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Exclusion:
-    """A reading that is excluded.
+    """A reading that is excluded."""
 
-    Attributes
-    ----------
-    configuration, target
-        Label and name; a target may be a reference point.
-    reason
-        Why.
-    visit, fixture
-        Which of several readings, as the measurements have it; empty for all.
-    read
-        What the excluded readings were; empty where that is not said.
-    where
-        File and line, for messages.
-    """
-
-    configuration: str
+    configuration: str  #: configuration, target: label and name; a target may be a reference point.
     target: str
-    reason: str
-    visit: str = ""
+    reason: str  #: Why.
+    visit: str = ""  #: visit, fixture: which of several readings, as the measurements have it; empty for all.
     fixture: str = ""
-    read: tuple[Read, ...] = ()
-    where: str | None = None
+    read: tuple[Read, ...] = ()  #: What the excluded readings were; empty where that is not said.
+    where: str | None = None  #: File and line, for messages.
 
 
 def read_exclusions(path: Path) -> tuple[Exclusion, ...]:
     """Read a file of excluded readings; one that has a header alone excludes none.
 
-    Raises
-    ------
-    InputError
-        For other columns, a reading that has no reason, or one that stands twice, and numbers that cannot be.
+    Raises:
+        InputError: For other columns, a reading that has no reason, or one that stands twice, and numbers that cannot
+            be.
     """
     text = read_text(path)
     if [line.strip() for line in lines_of(text) if line.strip()] == [",".join(_COLUMNS)]:
@@ -141,10 +126,8 @@ def numbers_read(part: Dataset) -> list[Read]:
 def without_readings(data: Dataset, exclusions: Sequence[Exclusion]) -> tuple[Dataset, tuple[int, ...]]:
     """Return data in which the excluded readings are missing, and how many each exclusion means.
 
-    Raises
-    ------
-    InputError
-        If nothing was read where something is excluded, or something else than what was excluded.
+    Raises:
+        InputError: If nothing was read where something is excluded, or something else than what was excluded.
     """
     labels = {label: number for number, label in enumerate(data.labels)}
     parts = [data] if data.references is None else [data, data.references]

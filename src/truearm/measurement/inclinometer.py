@@ -19,15 +19,9 @@ from truearm.simulated import Marked
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Postures in pairs, whose readings are compared.
+    """Postures in pairs, whose readings are compared."""
 
-    Attributes
-    ----------
-    first, second
-        ``n`` postures each, with their wrenches.
-    """
-
-    first: Postures
+    first: Postures  #: first, second: ``n`` postures each, with their wrenches.
     second: Postures
 
     def __len__(self) -> int:
@@ -52,20 +46,11 @@ class Pairs:
 
 @dataclass(frozen=True, eq=False)
 class Instruments:
-    """Inclinometers, and on which links they sit.
+    """Inclinometers, and on which links they sit."""
 
-    Attributes
-    ----------
-    names
-        Of each, for messages.
-    links
-        Link that each sits on, from 0.
-    mounts
-        Rotation from the link's frame to the instrument's, ``(instruments, 3, 3)``, as far as it is known.
-    """
-
-    names: tuple[str, ...]
-    links: tuple[int, ...]
+    names: tuple[str, ...]  #: Of each, for messages.
+    links: tuple[int, ...]  #: Link that each sits on, from 0.
+    #: Rotation from the link's frame to the instrument's, ``(instruments, 3, 3)``, as far as it is known.
     mounts: Array
 
     @classmethod
@@ -80,50 +65,24 @@ class Instruments:
 
 @dataclass(frozen=True, eq=False)
 class Inclinations:
-    """What inclinometers read, configuration by configuration, as a file has it.
+    """What inclinometers read, configuration by configuration, as a file has it."""
 
-    Attributes
-    ----------
-    source
-        The file, for messages.
-    labels
-        Name of each configuration.
-    joints
-        Joint positions [rad; m for prismatic joints], ``(n, joints)``.
-    joint_kinds
-        ``revolute`` or ``prismatic`` for each joint.
-    instruments
-        That were read.
-    angle
-        Of the axes x, y and z of each instrument above the horizontal plane [rad], ``(n, instruments, 3)``, up is
-        positive; NaN where none was read.
-    sigma
-        Standard deviation of each reading [rad], ``(n, instruments)``; NaN where none was read.
-    order
-        Number of each configuration in the sequence of measurement, from 1, ``(n,)``.
-    wrench
-        External force [N] and moment [N m] on the flange, about its origin, in the axes of the base, ``(n, 6)``.
-    payload
-        Mass [kg] beside what the robot carries already and its centre of gravity in the flange's frame [m],
-        ``(n, 4)``.
-    joints_are
-        ``model``, or ``controller`` if it shows these joint positions.
-    simulated
-        Whether virtual instruments read any of it.
-    """
-
-    source: str
-    labels: tuple[str, ...]
-    joints: Array
-    joint_kinds: tuple[str, ...]
-    instruments: Instruments
+    source: str  #: The file, for messages.
+    labels: tuple[str, ...]  #: Name of each configuration.
+    joints: Array  #: Joint positions [rad; m for prismatic joints], ``(n, joints)``.
+    joint_kinds: tuple[str, ...]  #: ``revolute`` or ``prismatic`` for each joint.
+    instruments: Instruments  #: That were read.
+    #: Of the axes x, y and z of each instrument above the horizontal plane [rad], ``(n, instruments, 3)``, up is
+    #: positive; NaN where none was read.
     angle: Array
-    sigma: Array
-    order: NDArray[np.intp]
+    sigma: Array  #: Standard deviation of each reading [rad], ``(n, instruments)``; NaN where none was read.
+    order: NDArray[np.intp]  #: Number of each configuration in the sequence of measurement, from 1, ``(n,)``.
+    #: External force [N] and moment [N m] on the flange, about its origin, in the axes of the base, ``(n, 6)``.
     wrench: Array
+    #: Mass [kg] beside what the robot carries already and its centre of gravity in the flange's frame [m], ``(n, 4)``.
     payload: Array
-    joints_are: str = "model"
-    simulated: bool = False
+    joints_are: str = "model"  #: ``model``, or ``controller`` if it shows these joint positions.
+    simulated: bool = False  #: Whether virtual instruments read any of it.
 
     def __post_init__(self) -> None:
         """Refuse fields that do not fit together, and angles that are none."""
@@ -187,10 +146,8 @@ class Inclinations:
     def changes(self, robot: Robot, mounts: Array | None = None) -> InclinometerReadings:
         """Return by how much readings changed within pairs.
 
-        Parameters
-        ----------
-        mounts
-            Of the instruments, as they were found; as they are stated if None.
+        Args:
+            mounts: Of the instruments, as they were found; as they are stated if None.
         """
         first, second = self.pairs.T
         at = self.postures(robot)
@@ -205,26 +162,16 @@ class Inclinations:
 
 @dataclass(frozen=True, eq=False)
 class InclinometerReadings:
-    """By how much the readings of inclinometers changed from one posture to another.
+    """By how much the readings of inclinometers changed from one posture to another."""
 
-    Attributes
-    ----------
-    pairs
-        The postures.
-    change
-        Second reading less first of each axis of each instrument ``(n, instruments, 3)`` [rad]; NaN where there is
-        none. Axes and readings are those of :func:`truearm.simulation.inclinometer.inclinations`.
-    sigma
-        Standard deviation of one change [rad], one for all or ``(n, instruments, 1)``; :func:`deviation_of_change`
-        finds it for an instrument.
-    instruments
-        That were read; None for one on each link, aligned with the link's frame.
-    """
-
-    pairs: Pairs
+    pairs: Pairs  #: The postures.
+    #: Second reading less first of each axis of each instrument ``(n, instruments, 3)`` [rad]; NaN where there is none.
+    #: Axes and readings are those of :func:`truearm.simulation.inclinometer.inclinations`.
     change: Array
+    #: Standard deviation of one change [rad], one for all or ``(n, instruments, 1)``; :func:`deviation_of_change` finds
+    #: it for an instrument.
     sigma: float | Array
-    instruments: Instruments | None = None
+    instruments: Instruments | None = None  #: That were read; None for one on each link, aligned with the link's frame.
 
     def __post_init__(self) -> None:
         shape = (len(self.pairs), len(self.mounted), 3)

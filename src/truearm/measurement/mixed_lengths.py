@@ -33,12 +33,9 @@ _LEAST_RUN: Final = 3
 def factors_of(position: Array, predicted: Array, allowed: float) -> Array:
     """Return what makes positions in another unit right, 1 where no other unit explains them, ``(readings,)``.
 
-    Parameters
-    ----------
-    position, predicted
-        What was read, and what must have been [m], ``(readings, 3)``; NaN where it is not known.
-    allowed
-        How far off a position may be that is explained [m].
+    Args:
+        position, predicted: What was read, and what must have been [m], ``(readings, 3)``; NaN where it is not known.
+        allowed: How far off a position may be that is explained [m].
     """
     off = np.linalg.norm(position - predicted, axis=1)
     factor = np.ones(len(position))
@@ -53,10 +50,8 @@ def factors_of(position: Array, predicted: Array, allowed: float) -> Array:
 def lengths_noticed(data: Dataset, factor: Array) -> tuple[str, tuple[tuple[str, str], ...]]:
     """Return in words which readings are in another unit, without a full stop, and which they are.
 
-    Parameters
-    ----------
-    factor
-        What makes each reading right, ``(readings,)``; one of those of `LENGTH_FACTORS` somewhere.
+    Args:
+        factor: What makes each reading right, ``(readings,)``; one of those of `LENGTH_FACTORS` somewhere.
     """
     said = []
     for by, words in LENGTH_FACTORS:

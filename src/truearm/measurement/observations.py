@@ -19,21 +19,12 @@ from truearm.modeling.transform import rotation_from_quaternion, rotation_vector
 
 
 class Observation(ABC):
-    """A kind of reading.
+    """A kind of reading."""
 
-    Attributes
-    ----------
-    name, unit
-        As reports spell them.
-    components
-        How many numbers a reading has.
-    velocity
-        What moves it: the ``linear`` velocity of the target or its ``angular`` one.
-    """
-
-    name: ClassVar[str]
+    name: ClassVar[str]  #: name, unit: as reports spell them.
     unit: ClassVar[Literal["m", "rad"]]
-    components: ClassVar[int]
+    components: ClassVar[int]  #: How many numbers a reading has.
+    #: What moves it: the ``linear`` velocity of the target or its ``angular`` one.
     velocity: ClassVar[Literal["linear", "angular"]]
 
     @abstractmethod
@@ -48,25 +39,19 @@ class Observation(ABC):
     def residual(self, seen: Sighting, data: Dataset, readings: NDArray[np.intp]) -> Array:
         """Return prediction minus measurement, ``(..., k, components)``.
 
-        Parameters
-        ----------
-        seen
-            One target from one fixture, at the configurations of the readings.
-        readings
-            Indices of these k readings.
+        Args:
+            seen: One target from one fixture, at the configurations of the readings.
+            readings: Indices of these k readings.
         """
 
     @abstractmethod
     def jacobian(self, seen: Sighting, residual: Array, velocity: Array) -> Array:
         """Return the derivative of the residual, ``(parameters, ..., k, components)``.
 
-        Parameters
-        ----------
-        residual
-            From :meth:`residual`.
-        velocity
-            How the target, seen from there, moves with each parameter, linear or angular,
-            ``(parameters, 3, ..., k)``.
+        Args:
+            residual: From :meth:`residual`.
+            velocity: How the target, seen from there, moves with each parameter, linear or angular, ``(parameters, 3,
+                ..., k)``.
         """
 
 
@@ -189,10 +174,9 @@ OBSERVATIONS: Final = (Position(), Orientation(), Distance(), Height())
 def compared(data: Dataset) -> Iterator[tuple[str, str | None, Observation, NDArray[np.intp]]]:
     """Go through the readings by target, fixture and observation.
 
-    Yields
-    ------
-    Name of the target, name of the fixture or None for the instrument's own frame, what is compared, and the indices
-    of the readings that hold it, at least one.
+    Yields:
+        Name of the target, name of the fixture or None for the instrument's own frame, what is compared, and the
+        indices of the readings that hold it, at least one.
     """
     against = data.against
     for index, name in enumerate(data.targets):

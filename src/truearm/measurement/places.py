@@ -13,22 +13,12 @@ from truearm.modeling.chain import Array
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Positions in the order of their configurations, and in each of them in that of their targets.
+    """Positions in the order of their configurations, and in each of them in that of their targets."""
 
-    Attributes
-    ----------
-    configuration, target
-        Index of both, ``(places,)``; no two places have both alike.
-    position
-        Of a target that was read more than once at a configuration, the mean [m], ``(places, 3)``.
-    targets
-        How many targets there are, read or not.
-    """
-
-    configuration: IntArray
+    configuration: IntArray  #: configuration, target: index of both, ``(places,)``; no two places have both alike.
     target: IntArray
-    position: Array
-    targets: int
+    position: Array  #: Of a target that was read more than once at a configuration, the mean [m], ``(places, 3)``.
+    targets: int  #: How many targets there are, read or not.
 
     def at(self, configuration: int) -> slice:
         """Return which places are of a configuration."""
@@ -67,10 +57,8 @@ def constellation(data: Dataset) -> Array:
 
     Of a target that was read more than once at a configuration, the mean.
 
-    Raises
-    ------
-    InputError
-        If there are too many of both: they are a table, however few of its cells are read.
+    Raises:
+        InputError: If there are too many of both: they are a table, however few of its cells are read.
     """
     refuse_beyond("places", data.configurations * len(data.targets), where=data.source)
     places = places_of(data)

@@ -41,48 +41,26 @@ _EXPLAINED: Final = 0.3
 
 @dataclass(frozen=True)
 class Suspect:
-    """A reading that cannot be what it says.
+    """A reading that cannot be what it says."""
 
-    Attributes
-    ----------
-    code
-        What it seems to be.
-    configuration, target
-        Label and name.
-    words
-        What it looks like, for example ``is target 2``.
-    """
-
-    code: Suspicion
-    configuration: str
+    code: Suspicion  #: What it seems to be.
+    configuration: str  #: configuration, target: label and name.
     target: str
-    words: str = ""
+    words: str = ""  #: What it looks like, for example ``is target 2``.
 
 
 @dataclass(frozen=True, eq=False)
 class _Distances:
-    """Distances between targets of the same configuration, and how far off they are.
+    """Distances between targets of the same configuration, and how far off they are."""
 
-    Attributes
-    ----------
-    places
-        Of all targets.
-    pairs, usual
-        The pairs of targets, as one number each and in order, with the median of their distances [m], ``(pairs,)``.
-    allowed
-        How far off a distance may be [m].
-    share
-        Of the distances of each place how many are off by more, ``(places,)``.
-    most, total
-        How far off the distances of each place are [m], ``(places,)``.
-    """
-
-    places: Places
+    places: Places  #: Of all targets.
+    #: pairs, usual: the pairs of targets, as one number each and in order, with the median of their distances [m],
+    #: ``(pairs,)``.
     pairs: IntArray
     usual: Array
-    allowed: float
-    share: Array
-    most: Array
+    allowed: float  #: How far off a distance may be [m].
+    share: Array  #: Of the distances of each place how many are off by more, ``(places,)``.
+    most: Array  #: most, total: how far off the distances of each place are [m], ``(places,)``.
     total: Array
 
     def usual_between(self, targets: IntArray) -> Array:
@@ -126,9 +104,8 @@ def rigid_suspects(data: Dataset) -> list[Suspect]:
 def scaled_distances(data: Dataset) -> dict[float, IntArray]:
     """Return the configurations whose distances between targets are all usual ones in another unit of length.
 
-    Returns
-    -------
-    Their indices by the factor that makes them usual, of those of `LENGTH_FACTORS`.
+    Returns:
+        Their indices by the factor that makes them usual, of those of `LENGTH_FACTORS`.
     """
     places = places_of(data)
     one, other = _compared(places)
@@ -192,16 +169,11 @@ def _blamed(data: Dataset, distances: _Distances, c: int, known: dict[str, Array
 def suspect(point: Array, label: str, target: str, size: float, known: dict[str, Array]) -> Suspect:
     """Say what a wrong reading is: another known point, or an outlier.
 
-    Parameters
-    ----------
-    point
-        The reading [m], ``(3,)``.
-    label, target
-        Its configuration and target.
-    size
-        How far it is off [m].
-    known
-        Points that it could have been taken from [m].
+    Args:
+        point: The reading [m], ``(3,)``.
+        label, target: Its configuration and target.
+        size: How far it is off [m].
+        known: Points that it could have been taken from [m].
     """
     gaps = {name: float(np.linalg.norm(point - place)) for name, place in known.items() if np.isfinite(place).all()}
     nearest = min(gaps, key=lambda name: gaps[name]) if gaps else None
@@ -215,12 +187,9 @@ def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
 
     An exchange that hardly changes the usual distances explains nothing that a wrong reading does not.
 
-    Parameters
-    ----------
-    here
-        Readings of a configuration [m], ``(n, 3)``.
-    usual
-        Distances of their targets [m], ``(n, n)``.
+    Args:
+        here: Readings of a configuration [m], ``(n, 3)``.
+        usual: Distances of their targets [m], ``(n, n)``.
     """
     orders = np.array(list(permutations(range(len(here)))))[1:]
     changed = np.abs(usual[orders[:, :, None], orders[:, None]] - usual).max(axis=(1, 2))
@@ -240,12 +209,9 @@ def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
 def _off_without_each(here: Array, usual: Array) -> Array:
     """Return how far off distances are among all readings but one [m], for each one, ``(n,)``.
 
-    Parameters
-    ----------
-    here
-        Readings of a configuration [m], ``(n, 3)``.
-    usual
-        Distances of their targets [m], ``(n, n)``.
+    Args:
+        here: Readings of a configuration [m], ``(n, 3)``.
+        usual: Distances of their targets [m], ``(n, n)``.
     """
     off = np.abs(np.linalg.norm(here[:, None] - here, axis=2) - usual)
     kept = ~np.eye(len(here), dtype=bool)

@@ -15,24 +15,14 @@ from truearm.modeling.transform import cross
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """A target at k configurations, in the axes of the fixture that it is measured against.
+    """A target at k configurations, in the axes of the fixture that it is measured against."""
 
-    Attributes
-    ----------
-    target
-        The chain to the target, at all configurations.
-    configurations
-        Which of them, in order; a slice costs no copy.
-    fixture
-        The chain to the fixture, at one configuration; None for the instrument, whose frame is the world.
-    scale
-        How much longer than it reads the unit of length is, a number or one for each trial ``(trials, 1)``: places are
-        seen so much smaller.
-    """
-
-    target: ForwardKinematics
-    configurations: NDArray[np.intp] | slice
+    target: ForwardKinematics  #: The chain to the target, at all configurations.
+    configurations: NDArray[np.intp] | slice  #: Which of them, in order; a slice costs no copy.
+    #: The chain to the fixture, at one configuration; None for the instrument, whose frame is the world.
     fixture: ForwardKinematics | None = None
+    #: How much longer than it reads the unit of length is, a number or one for each trial ``(trials, 1)``: places are
+    #: seen so much smaller.
     scale: float | Array = 0.0
 
     @cached_property
@@ -50,12 +40,9 @@ class Sighting:
     def position_jacobian(self, velocity: Array, names: tuple[str, ...]) -> Array:
         """Return how the position moves with parameters [m per unit], ``(parameters, 3, ..., k)``.
 
-        Parameters
-        ----------
-        velocity
-            Of the target in the world by each parameter, at all configurations, ``(parameters, 3, ..., n)``.
-        names
-            Of the parameters.
+        Args:
+            velocity: Of the target in the world by each parameter, at all configurations, ``(parameters, 3, ..., n)``.
+            names: Of the parameters.
         """
         moved = velocity[..., self.configurations]
         if self.fixture is None:

@@ -36,25 +36,16 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors of a robot model on a dataset.
+    """Errors of a robot model on a dataset."""
 
-    Attributes
-    ----------
-    configurations
-        Number of configurations judged.
-    position_errors
-        Predicted minus measured position of each reading [m], ``(readings, 3)``, NaN where nothing was read.
-    orientation_errors
-        Rotation vector from the measured to the predicted orientation [rad], likewise; None without any. A target
-        that the robot knows only as a point has no orientation to be judged.
-    length_errors
-        Predicted minus measured distance from a fixture, or height over one [m], ``(readings,)``, NaN where none was
-        read; None without any.
-    """
-
-    configurations: int
+    configurations: int  #: Number of configurations judged.
+    #: Predicted minus measured position of each reading [m], ``(readings, 3)``, NaN where nothing was read.
     position_errors: Array
+    #: Rotation vector from the measured to the predicted orientation [rad], likewise; None without any. A target that
+    #: the robot knows only as a point has no orientation to be judged.
     orientation_errors: Array | None
+    #: Predicted minus measured distance from a fixture, or height over one [m], ``(readings,)``, NaN where none was
+    #: read; None without any.
     length_errors: Array | None = None
 
     @property
@@ -100,12 +91,9 @@ def _norms(errors: Array) -> Array:
 def errors_of(robot: Robot, data: Dataset) -> Errors:
     """Compare a robot with data taken in the frames that the robot knows.
 
-    Parameters
-    ----------
-    robot
-        With base, targets and fixtures.
-    data
-        Readings of those.
+    Args:
+        robot: With base, targets and fixtures.
+        data: Readings of those.
     """
     count = len(data.target)
     position = np.full((count, 3), np.nan)

@@ -19,22 +19,13 @@ _UNMOVED = 1e-4  # references that keep their distances better than this moved t
 
 @dataclass(frozen=True)
 class TableMotion:
-    """What the table's motion did to the readings of the targets.
+    """What the table's motion did to the readings of the targets."""
 
-    Attributes
-    ----------
-    removed
-        Root mean square by which it moved them [m].
-    left
-        Mean square of the error that the noise of the reference points leaves in readings from which the motion was
-        taken out [m^2].
-    freedom
-        Degrees of freedom behind that noise.
-    """
-
-    removed: float
+    removed: float  #: Root mean square by which it moved them [m].
+    #: Mean square of the error that the noise of the reference points leaves in readings from which the motion was
+    #: taken out [m^2].
     left: float
-    freedom: int
+    freedom: int  #: Degrees of freedom behind that noise.
 
 
 def without_table_motion(data: Dataset) -> Dataset:
@@ -81,10 +72,9 @@ def table_motion(data: Dataset) -> TableMotion | None:
 def _motions(data: Dataset) -> Iterator[tuple[NDArray[np.intp], Array, Array, Array, Array]]:
     """Go through the configurations at which the table's motion is known.
 
-    Yields
-    ------
-    Indices of the readings there; rotation and shift from there to where the reference points are on average; those
-    places ``(k, 3)``, and what the motion leaves of the points, ``(k, 3)``.
+    Yields:
+        Indices of the readings there; rotation and shift from there to where the reference points are on average; those
+        places ``(k, 3)``, and what the motion leaves of the points, ``(k, 3)``.
     """
     points = clean_references(data)
     if points is None:

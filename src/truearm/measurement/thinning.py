@@ -23,17 +23,12 @@ def thinned(data: Dataset, parameters: int, most: int) -> Dataset | None:
     The targets that were read at most configurations are kept, and of the configurations that read them so many, evenly
     spaced, as there is room for.
 
-    Parameters
-    ----------
-    parameters
-        How many the robot has, without base, targets and fixtures.
-    most
-        Largest number of equations times parameters.
+    Args:
+        parameters: How many the robot has, without base, targets and fixtures.
+        most: Largest number of equations times parameters.
 
-    Returns
-    -------
-    Dataset or None
-        None if the data are too large and no target was read at four configurations or more.
+    Returns:
+        Dataset or None: None if the data are too large and no target was read at four configurations or more.
     """
     beside = parameters + PARAMETERS_OF_A_PLACE * (1 + len(data.fixtures))
     if equations_of(data) * (beside + PARAMETERS_OF_A_PLACE * len(data.targets)) <= most:

@@ -23,18 +23,10 @@ SAME_POSITION: Final = math.radians(0.01)
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Configurations in a row between which one joint alone has moved.
+    """Configurations in a row between which one joint alone has moved."""
 
-    Attributes
-    ----------
-    joint
-        Its number, from 1.
-    configurations
-        Indices into the dataset, in the order of measurement, ``(n,)``.
-    """
-
-    joint: int
-    configurations: IntArray
+    joint: int  #: Its number, from 1.
+    configurations: IntArray  #: Indices into the dataset, in the order of measurement, ``(n,)``.
 
 
 def find_runs(data: Dataset) -> tuple[Run, ...]:
@@ -67,25 +59,14 @@ def _different(joints: Array) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """A joint turned alone, and what a point on the tool did.
+    """A joint turned alone, and what a point on the tool did."""
 
-    Attributes
-    ----------
-    circle
-        Through the places of the point; its normal points along the joint's axis, so that angles grow with joint
-        positions.
-    joint_position
-        Joint positions [rad], ``(n,)``.
-    error
-        Angle about the axis beyond the joint position, zero on average [rad], ``(n,)``.
-    direction
-        Sign of the last move, 0 where it is not known, ``(n,)``.
-    """
-
+    #: Through the places of the point; its normal points along the joint's axis, so that angles grow with joint
+    #: positions.
     circle: Circle
-    joint_position: Array
-    error: Array
-    direction: Array
+    joint_position: Array  #: Joint positions [rad], ``(n,)``.
+    error: Array  #: Angle about the axis beyond the joint position, zero on average [rad], ``(n,)``.
+    direction: Array  #: Sign of the last move, 0 where it is not known, ``(n,)``.
 
     @property
     def angular(self) -> float:
@@ -113,12 +94,10 @@ class Turn:
 def turn_of(circle: Circle, positions: Array, direction: Array | None = None) -> Turn:
     """Compare the angles about a fitted circle with joint positions ``(n,)`` [rad].
 
-    Parameters
-    ----------
-    circle
-        Fitted to the point's places; it is turned round where angles fall as joint positions grow.
-    direction
-        Sign of the last move, ``(n,)``; from the order of the joint positions if None, unknown until the first move.
+    Args:
+        circle: Fitted to the point's places; it is turned round where angles fall as joint positions grow.
+        direction: Sign of the last move, ``(n,)``; from the order of the joint positions if None, unknown until the
+            first move.
     """
     agreement = [abs(np.exp(1j * (sense * circle.angle - positions)).mean()) for sense in (1, -1)]
     circle = circle if agreement[0] >= agreement[1] else circle.reversed()

@@ -36,44 +36,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Anchor:
-    """Where a balancer holds a link.
+    """Where a balancer holds a link."""
 
-    Attributes
-    ----------
-    link
-        Number of the link; 0 is the base.
-    point
-        In the frame of the link [m].
-    """
-
-    link: int
-    point: Direction
+    link: int  #: Number of the link; 0 is the base.
+    point: Direction  #: In the frame of the link [m].
 
 
 @dataclass(frozen=True)
 class Balancer:
-    """A spring or a gas cylinder.
+    """A spring or a gas cylinder."""
 
-    Attributes
-    ----------
-    name
-        As the maker calls it.
-    fixed, moving
-        Its anchors; the fixed one is on the link nearer to the base.
-    force
-        With which it pulls [N] at `length`; zero for the free length of a spring, negative if it pushes.
-    length
-        Distance of the anchors [m].
-    stiffness
-        By how much the pull grows with the length [N/m].
-    """
-
-    name: str
-    fixed: Anchor
+    name: str  #: As the maker calls it.
+    fixed: Anchor  #: fixed, moving: its anchors; the fixed one is on the link nearer to the base.
     moving: Anchor
-    force: float
-    length: float
-    stiffness: float
+    force: float  #: With which it pulls [N] at `length`; zero for the free length of a spring, negative if it pushes.
+    length: float  #: Distance of the anchors [m].
+    stiffness: float  #: By how much the pull grows with the length [N/m].
 
     def pull(self, length: Number) -> Number:
         """Return the force [N] at a distance of the anchors [m]."""
@@ -94,14 +72,10 @@ def balancer_wrenches(
 ) -> Iterator[tuple[int, Wrench]]:
     """Give what a balancer does to its two links, as the number of elements up to the link's frame and the wrench.
 
-    Parameters
-    ----------
-    elements, moves
-        Of the arm, and what they do.
-    ends
-        Number of elements up to the frame of each link, beginning with the base.
-    values
-        Of the parameters: places count as with nominal slides, see :mod:`truearm.modeling.bearings`.
+    Args:
+        elements, moves: Of the arm, and what they do.
+        ends: Number of elements up to the frame of each link, beginning with the base.
+        values: Of the parameters: places count as with nominal slides, see :mod:`truearm.modeling.bearings`.
     """
     lower, upper = balancer.fixed, balancer.moving
     start, stop = ends[lower.link], ends[upper.link]

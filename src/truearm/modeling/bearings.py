@@ -29,17 +29,10 @@ _SLIDES: Final[tuple[Motion, ...]] = ("Tx", "Ty", "Tz")
 
 @dataclass(frozen=True)
 class AxialSlides:
-    """How far identified slides have carried joints and links along axes, beyond their nominal places.
+    """How far identified slides have carried joints and links along axes, beyond their nominal places."""
 
-    Attributes
-    ----------
-    joints
-        Of each joint's origin along its own axis.
-    links
-        Of each link's frame: directions in that frame, and how far along each.
-    """
-
-    joints: tuple[tuple[Offset, ...], ...]
+    joints: tuple[tuple[Offset, ...], ...]  #: Of each joint's origin along its own axis.
+    #: Of each link's frame: directions in that frame, and how far along each.
     links: tuple[tuple[tuple[Direction, tuple[Offset, ...]], ...], ...]
 
     @classmethod
@@ -88,10 +81,8 @@ class _Run:
     def before(self, place: int, along: Array) -> tuple[Offset, ...]:
         """Return the slides before an element; none behind the last of them, which all others move.
 
-        Parameters
-        ----------
-        along
-            The direction in which they count, that of the run or its opposite.
+        Args:
+            along: The direction in which they count, that of the run or its opposite.
         """
         if not self.slides or place > self.slides[-1][0]:
             return ()

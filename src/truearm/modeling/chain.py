@@ -52,28 +52,14 @@ _AXIS: Final = {"x": 0, "y": 1, "z": 2}
 class Element:
     """One elementary transform.
 
-    Parameters
-    ----------
-    motion
-        ``Rx``, ``Ry``, ``Rz`` turn about and ``Tx``, ``Ty``, ``Tz`` slide along an axis of the moving frame;
-        ``R`` and ``T`` do so along `axis`.
-    value
-        Nominal value [rad or m].
-    parameter
-        Name of the parameter that replaces `value`, if it has one.
-    variable
-        Index of the joint variable that is added to the value, if there is one.
-    axis
-        Unit vector in the moving frame, for ``R`` and ``T``.
-    offsets
-        What parameters of other elements add to the value.
-
-    Attributes
-    ----------
-    turns
-        Whether the element is a rotation.
-    along
-        Which axis of the moving frame it moves about or along, 0 to 2, unless it has an `axis` of its own.
+    Args:
+        motion: ``Rx``, ``Ry``, ``Rz`` turn about and ``Tx``, ``Ty``, ``Tz`` slide along an axis of the moving frame;
+            ``R`` and ``T`` do so along `axis`.
+        value: Nominal value [rad or m].
+        parameter: Name of the parameter that replaces `value`, if it has one.
+        variable: Index of the joint variable that is added to the value, if there is one.
+        axis: Unit vector in the moving frame, for ``R`` and ``T``.
+        offsets: What parameters of other elements add to the value.
     """
 
     motion: Motion
@@ -82,7 +68,8 @@ class Element:
     variable: int | None = None
     axis: Direction | None = None
     offsets: tuple[Offset, ...] = ()
-    turns: bool = field(init=False, repr=False, compare=False)
+    turns: bool = field(init=False, repr=False, compare=False)  #: Whether the element is a rotation.
+    #: Which axis of the moving frame it moves about or along, 0 to 2, unless it has an `axis` of its own.
     along: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -92,27 +79,15 @@ class Element:
 
 @dataclass(frozen=True, eq=False)
 class ForwardKinematics:
-    """A chain run through for all configurations.
+    """A chain run through for all configurations."""
 
-    Attributes
-    ----------
-    elements
-        The elements passed, in order.
-    moves
-        What each of them does.
-    shape
-        ``(n,)``, or ``(trials, n)`` with trial values; of several points, ``(points, ..., n)``.
-    start
-        The forward kinematics that this goes on from, whose elements are its first.
-    tip
-        Where the tip is, seen from the frame behind the last element; of several points, each coordinate has them as
-        its first axis.
-    """
-
-    elements: tuple[Element, ...]
-    moves: tuple[Move, ...]
-    shape: tuple[int, ...]
+    elements: tuple[Element, ...]  #: The elements passed, in order.
+    moves: tuple[Move, ...]  #: What each of them does.
+    shape: tuple[int, ...]  #: ``(n,)``, or ``(trials, n)`` with trial values; of several points, ``(points, ..., n)``.
+    #: The forward kinematics that this goes on from, whose elements are its first.
     start: ForwardKinematics | None = None
+    #: Where the tip is, seen from the frame behind the last element; of several points, each coordinate has them as its
+    #: first axis.
     tip: Coordinates = (0.0, 0.0, 0.0)
 
     @cached_property
@@ -150,10 +125,8 @@ class ForwardKinematics:
     def position_jacobian(self, indices: Sequence[int | None]) -> Array:
         """Return the velocity of the tip's origin by the values of the elements `indices` [m per unit].
 
-        Returns
-        -------
-        linear
-            In the world, ``(len(indices), 3, ..., n)``; zero where an index is None.
+        Returns:
+            linear: In the world, ``(len(indices), 3, ..., n)``; zero where an index is None.
         """
         linear = np.empty((len(indices), 3, *self.shape))
         other = np.empty((3, *self.shape))
@@ -177,10 +150,8 @@ class ForwardKinematics:
     def orientation_jacobian(self, indices: Sequence[int | None]) -> Array:
         """Return the angular velocity of the tip frame by the values of the elements `indices` [rad per unit].
 
-        Returns
-        -------
-        angular
-            In the world, ``(len(indices), 3, ..., n)``; zero where an index is None.
+        Returns:
+            angular: In the world, ``(len(indices), 3, ..., n)``; zero where an index is None.
         """
         angular = np.zeros((len(indices), 3, *self.shape))
         for row, index in zip(angular, indices, strict=True):
@@ -242,10 +213,8 @@ class ForwardKinematics:
 class Chain:
     """A product of elementary transforms.
 
-    Parameters
-    ----------
-    elements
-        The transforms from base to tip. A parameter name may occur once.
+    Args:
+        elements: The transforms from base to tip. A parameter name may occur once.
     """
 
     elements: tuple[Element, ...]
@@ -277,14 +246,10 @@ class Chain:
     ) -> ForwardKinematics:
         """Run through the chain for all configurations.
 
-        Parameters
-        ----------
-        variables
-            Joint variables [rad or m], ``(variables, n)``, or ``(variables, trials, n)`` with trial values.
-        values
-            Parameter values that replace nominal ones, each a number or ``(trials, 1)`` [rad or m].
-        start
-            Forward kinematics to go on from, with the same `variables` and `values`.
+        Args:
+            variables: Joint variables [rad or m], ``(variables, n)``, or ``(variables, trials, n)`` with trial values.
+            values: Parameter values that replace nominal ones, each a number or ``(trials, 1)`` [rad or m].
+            start: Forward kinematics to go on from, with the same `variables` and `values`.
         """
         given = values or {}
         moves: list[Move] = []
@@ -307,14 +272,11 @@ class Chain:
 def together(ends: Sequence[ForwardKinematics]) -> ForwardKinematics:
     """Run through the start of several chains once for all their tips.
 
-    Parameters
-    ----------
-    ends
-        Chains that go on from one start. Their positions are known afterwards.
+    Args:
+        ends: Chains that go on from one start. Their positions are known afterwards.
 
-    Returns
-    -------
-    The elements of the start, of shape ``(ends, ..., n)``.
+    Returns:
+        The elements of the start, of shape ``(ends, ..., n)``.
     """
     start = ends[0].start
     if start is None or any(end.start is not start for end in ends):

@@ -28,23 +28,13 @@ KinematicsKind = Literal["unknown", "nominal", "own", "proprietary"]
 
 @dataclass(frozen=True)
 class ControllerKinematics:
-    """With what the controller turns poses into joint positions.
+    """With what the controller turns poses into joint positions."""
 
-    Attributes
-    ----------
-    kind
-        ``nominal`` if it is the table of the robot file, ``own`` if it is `rows`.
-    rows
-        Of ``own``: rows of the convention ``hayati``, from the robot's base frame to its flange, one a joint.
-    source
-        Where this is known from.
-    identity
-        What its maker knows the kinematics by, such as checksums, as they were read.
-    """
-
-    kind: KinematicsKind = "unknown"
+    kind: KinematicsKind = "unknown"  #: ``nominal`` if it is the table of the robot file, ``own`` if it is `rows`.
+    #: Of ``own``: rows of the convention ``hayati``, from the robot's base frame to its flange, one a joint.
     rows: tuple[Mapping[str, float], ...] = ()
-    source: str = ""
+    source: str = ""  #: Where this is known from.
+    #: What its maker knows the kinematics by, such as checksums, as they were read.
     identity: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -53,37 +43,21 @@ class Controller:
     """What a robot's controller shows of the joints, and where its frames stand in those of the model.
 
     ``count_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)``
-
-    Attributes
-    ----------
-    signs
-        1 or -1 for each joint; empty if all are 1.
-    zeros
-        What the controller counts where the joint is zero, and all that it is coupled with [rad or m]; empty if all
-        are 0.
-    couplings
-        For a joint how much of others its count includes, by joint numbers from 1: ``{3: {2: 1.0}}`` if the count of
-        joint 3 includes joint 2.
-    pulses
-        Pulses of the motor per unit of the count [1/rad or 1/m], None where unknown; empty if all are.
-    base
-        ``T_base_controllerbase``: the controller's base frame in the robot's.
-    flange
-        ``T_flange_controllerflange``: the controller's flange frame in the robot's.
-    source
-        Where this is known from.
-    kinematics
-        With what the controller computes poses.
     """
 
-    signs: tuple[int, ...] = ()
+    signs: tuple[int, ...] = ()  #: 1 or -1 for each joint; empty if all are 1.
+    #: What the controller counts where the joint is zero, and all that it is coupled with [rad or m]; empty if all are
+    #: 0.
     zeros: tuple[float, ...] = ()
+    #: For a joint how much of others its count includes, by joint numbers from 1: ``{3: {2: 1.0}}`` if the count of
+    #: joint 3 includes joint 2.
     couplings: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
+    #: Pulses of the motor per unit of the count [1/rad or 1/m], None where unknown; empty if all are.
     pulses: tuple[float | None, ...] = ()
-    base: Transform = IDENTITY
-    flange: Transform = IDENTITY
-    source: str = ""
-    kinematics: ControllerKinematics = ControllerKinematics()
+    base: Transform = IDENTITY  #: ``T_base_controllerbase``: the controller's base frame in the robot's.
+    flange: Transform = IDENTITY  #: ``T_flange_controllerflange``: the controller's flange frame in the robot's.
+    source: str = ""  #: Where this is known from.
+    kinematics: ControllerKinematics = ControllerKinematics()  #: With what the controller computes poses.
 
     @property
     def counts_known(self) -> bool:
@@ -122,17 +96,12 @@ class Controller:
     def check_counts(self, robot: str, where: str | None = None) -> None:
         """Refuse joint positions of a controller of which it is not said how it counts.
 
-        Parameters
-        ----------
-        robot
-            Whose controller it is, for the message.
-        where
-            Names the joint positions in it, if they come from a file.
+        Args:
+            robot: Whose controller it is, for the message.
+            where: Names the joint positions in it, if they come from a file.
 
-        Raises
-        ------
-        InputError
-            If nothing is said.
+        Raises:
+            InputError: If nothing is said.
         """
         if not self.counts_known:
             raise InputError(
@@ -146,20 +115,16 @@ class Controller:
     def to_pulses(self, counted: Array) -> Array:
         """Return the pulses ``(n, joints)`` of the motors at joints ``(n, joints)`` [rad or m] of the controller.
 
-        Raises
-        ------
-        InputError
-            If a joint's pulses are not known.
+        Raises:
+            InputError: If a joint's pulses are not known.
         """
         return counted * self._known_pulses(counted.shape[1])
 
     def from_pulses(self, pulses: Array) -> Array:
         """Return joints ``(n, joints)`` [rad or m] as the controller counts them, at pulses of the motors.
 
-        Raises
-        ------
-        InputError
-            If a joint's pulses are not known.
+        Raises:
+            InputError: If a joint's pulses are not known.
         """
         return pulses / self._known_pulses(pulses.shape[1])
 

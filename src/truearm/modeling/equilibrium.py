@@ -30,10 +30,8 @@ _SETTLED: Final = 1e-12
 def settled(following: Callable[[NDArray[np.intp], Array], Array], start: Array) -> Array:
     """Return where rounds from `start` ``(variables, n)`` settle to 1e-12 rad or m.
 
-    Parameters
-    ----------
-    following
-        Returns what follows on some columns, given their places and what they are now.
+    Args:
+        following: Returns what follows on some columns, given their places and what they are now.
     """
     found = np.array(start, float)
     left = np.arange(found.shape[1])

@@ -20,19 +20,11 @@ class Fixture:
     A point is three coordinates. A frame is three coordinates and three small rotations behind `quaternion`. A plane
     is two small rotations behind `quaternion` and its distance from the origin along the normal, which is z of what
     comes out: Hesse's normal form.
-
-    Attributes
-    ----------
-    name
-        As the data call it.
-    kind
-        ``point``, ``plane`` or ``frame``.
-    quaternion
-        Reference orientation in the world; a point needs none.
     """
 
-    name: str
-    kind: FixtureKind
+    name: str  #: As the data call it.
+    kind: FixtureKind  #: ``point``, ``plane`` or ``frame``.
+    #: Reference orientation in the world; a point needs none.
     quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
     def parameter(self, axis: str) -> str:
@@ -54,10 +46,8 @@ class Fixture:
     def values_at(self, place: Transform) -> dict[str, float]:
         """Return the parameter values of a fixture at a place that is turned as `quaternion` says.
 
-        Parameters
-        ----------
-        place
-            A point's or frame's; for a plane a frame with its origin in the plane and its z along the normal.
+        Args:
+            place: A point's or frame's; for a plane a frame with its origin in the plane and its z along the normal.
         """
         if self.kind == "plane":
             height = float(place.rotation[:, 2] @ place.translation)

@@ -44,10 +44,8 @@ def frame_and_tip(robot: Robot, frame: Frame, target: str | None) -> tuple[Trans
 
     In the controller's frame the flange is the controller's, too: where a tool is that is all zeros.
 
-    Raises
-    ------
-    InputError
-        If there is no such frame, or it is the controller's and nothing is said of that.
+    Raises:
+        InputError: If there is no such frame, or it is the controller's and nothing is said of that.
     """
     checked_frame(frame)
     if frame == "world":

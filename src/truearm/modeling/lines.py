@@ -75,10 +75,8 @@ def first_frame(base: Array, axis: JointAxis) -> Array:
 def frame_between(axis: JointAxis, other: JointAxis) -> Array:
     """Return the frame that two axes fix: z along `axis`, x along ``axis x other``, on their common normal ``(4, 4)``.
 
-    Raises
-    ------
-    InputError
-        If the axes are parallel: then nothing says where along them the frame stands.
+    Raises:
+        InputError: If the axes are parallel: then nothing says where along them the frame stands.
     """
     normal = np.cross(axis.along, other.along)
     sine = float(np.linalg.norm(normal))
@@ -97,13 +95,10 @@ def frame_between(axis: JointAxis, other: JointAxis) -> Array:
 def common_normal(axis: JointAxis, following: JointAxis, before: Array, here: Array) -> tuple[Array, Array, Array]:
     """Return direction, start and end of a common normal of two axes.
 
-    Parameters
-    ----------
-    before
-        The x direction of the frame on `axis`: of two opposite normals the one nearer to it is taken, so that
-        joint zeros stay what they were; where both are as near, the one that points to `following`.
-    here
-        Origin of that frame, on `axis`.
+    Args:
+        before: The x direction of the frame on `axis`: of two opposite normals the one nearer to it is taken, so that
+            joint zeros stay what they were; where both are as near, the one that points to `following`.
+        here: Origin of that frame, on `axis`.
     """
     normal = np.cross(axis.along, following.along)
     sine = float(np.linalg.norm(normal))

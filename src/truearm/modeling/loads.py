@@ -64,25 +64,17 @@ def joint_loads(
     axis, see :mod:`truearm.modeling.bearings`; of a prismatic joint it is the origin of the frame behind the slide. The
     place of the base in the world does not matter, because gravity is given in the base frame.
 
-    Parameters
-    ----------
-    variables
-        Variables of the trunk [rad or m], ``(joints or more, n)``; those beyond the joints are at rest.
-    velocity, acceleration
-        Of the joints, ``(joints, n)`` [rad/s and rad/s^2, or m/s and m/s^2]; zero if None.
-    wrench
-        External force [N], then moment [N m], on the flange at its origin, in the axes of the base, ``(6, n)``. What
-        acts on the robot's tool comes on top.
+    Args:
+        variables: Variables of the trunk [rad or m], ``(joints or more, n)``; those beyond the joints are at rest.
+        velocity, acceleration: Of the joints, ``(joints, n)`` [rad/s and rad/s^2, or m/s and m/s^2]; zero if None.
+        wrench: External force [N], then moment [N m], on the flange at its origin, in the axes of the base, ``(6, n)``.
+            What acts on the robot's tool comes on top.
 
-    Returns
-    -------
-    loads
-        ``(joints, 6, n)``, force first. A positive moment about z turns the joint forward.
+    Returns:
+        loads: ``(joints, 6, n)``, force first. A positive moment about z turns the joint forward.
 
-    Raises
-    ------
-    InputError
-        If an array has another shape.
+    Raises:
+        InputError: If an array has another shape.
     """
     count, size = len(robot.joints), np.shape(variables)[-1]
     for name, given, rows in (

@@ -46,32 +46,21 @@ _TURN: Final = 2.0 * np.pi
 
 @dataclass(frozen=True)
 class Orientation:
-    """A way to write orientations.
+    """A way to write orientations."""
 
-    Attributes
-    ----------
-    name
-        Of the way.
-    count
-        How many numbers it takes.
-    matrices
-        Numbers ``(n, count)`` [rad, or the parts of unit quaternions] to rotation matrices ``(n, 3, 3)``.
-    nearest
-        Rotation matrices to those numbers that are nearest to others, ``(n, count)`` each.
-    """
-
-    name: str
-    count: int
+    name: str  #: Of the way.
+    count: int  #: How many numbers it takes.
+    #: Numbers ``(n, count)`` [rad, or the parts of unit quaternions] to rotation matrices ``(n, 3, 3)``.
     matrices: Callable[[Array], Array]
+    #: Rotation matrices to those numbers that are nearest to others, ``(n, count)`` each.
     nearest: Callable[[Array, Array], Array]
 
     def numbers(self, R: Array, near: Array) -> Array:
         """Return the numbers ``(n, count)`` of rotations ``(n, 3, 3)``.
 
-        Parameters
-        ----------
-        near
-            Numbers ``(n, count)`` to stay near to. Where they mean the same rotation they are returned as they are.
+        Args:
+            near: Numbers ``(n, count)`` to stay near to. Where they mean the same rotation they are returned as they
+                are.
         """
         turned = np.linalg.norm(rotation_vector(self.matrices(near).swapaxes(1, 2) @ R), axis=1)
         return np.where(turned[:, None] < _SAME_ROTATION, near, self.nearest(R, near))

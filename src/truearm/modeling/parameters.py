@@ -45,35 +45,17 @@ PRIOR: Final[Mapping[tuple[str, str], float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of the robot model.
+    """One number of the robot model."""
 
-    Attributes
-    ----------
-    name
-        Stable and the same in files, reports and messages: ``theta_offset_2``, ``base_x``.
-    unit
-        SI unit of all values here.
-    group
-        What the parameter describes, a :data:`Group` or a joint effect by its name; models free whole groups.
-    nominal
-        Value before calibration.
-    value
-        Current value.
-    prior
-        Standard deviation of the nominal value.
-    deviation
-        Standard deviation of the current value, where it was identified.
-    informed
-        Share of the prior variance that the data removed, 0 to 1, where it was identified.
-    """
-
-    name: str
-    unit: Unit
+    name: str  #: Stable and the same in files, reports and messages: ``theta_offset_2``, ``base_x``.
+    unit: Unit  #: SI unit of all values here.
+    #: What the parameter describes, a :data:`Group` or a joint effect by its name; models free whole groups.
     group: str
-    nominal: float
-    value: float
-    prior: float
-    deviation: float | None = None
+    nominal: float  #: Value before calibration.
+    value: float  #: Current value.
+    prior: float  #: Standard deviation of the nominal value.
+    deviation: float | None = None  #: Standard deviation of the current value, where it was identified.
+    #: Share of the prior variance that the data removed, 0 to 1, where it was identified.
     informed: float | None = None
 
     def __post_init__(self) -> None:
@@ -100,10 +82,8 @@ class Parameter:
 def parameter(name: str, unit: Unit, group: Group, nominal: float, priors: Mapping[str, float]) -> Parameter:
     """Make a parameter at its nominal value, with the prior of its group.
 
-    Parameters
-    ----------
-    priors
-        The robot file's own priors by SI unit, used for geometry and joint zeros.
+    Args:
+        priors: The robot file's own priors by SI unit, used for geometry and joint zeros.
     """
     prior = PRIOR[group, unit]
     if group in ("geometry", "joint zero"):

@@ -31,36 +31,20 @@ JOINT_SPEEDS: Final[Mapping[JointKind, tuple[float, float]]] = {
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint as the robot file describes it.
+    """One joint as the robot file describes it."""
 
-    Attributes
-    ----------
-    name
-        The maker's name.
-    kind
-        ``revolute`` or ``prismatic``.
-    row
-        Nominal value of each column of the convention [m and rad].
-    limits
-        Lowest and highest joint position [rad or m], where known.
-    transmission_periods
-        How often the joint's gear errs in a turn of the joint, where known: for a strain wave gear twice the turns of
-        its wave generator.
-    bearing
-        How far along the joint's axis its bearing lies [m], from the joint's origin at nominal values (the origin of
-        the frame right behind the joint's turn); None if that is not known, and zero is assumed. Joints that slide
-        have none.
-    max_speed
-        How fast it goes at 100 % [rad/s or m/s], where known.
-    """
-
-    name: str
-    kind: JointKind
-    row: Mapping[str, float]
-    limits: tuple[float, float] | None = None
+    name: str  #: The maker's name.
+    kind: JointKind  #: ``revolute`` or ``prismatic``.
+    row: Mapping[str, float]  #: Nominal value of each column of the convention [m and rad].
+    limits: tuple[float, float] | None = None  #: Lowest and highest joint position [rad or m], where known.
+    #: How often the joint's gear errs in a turn of the joint, where known: for a strain wave gear twice the turns of
+    #: its wave generator.
     transmission_periods: int | None = None
+    #: How far along the joint's axis its bearing lies [m], from the joint's origin at nominal values (the origin of the
+    #: frame right behind the joint's turn); None if that is not known, and zero is assumed. Joints that slide have
+    #: none.
     bearing: float | None = None
-    max_speed: float | None = None
+    max_speed: float | None = None  #: How fast it goes at 100 % [rad/s or m/s], where known.
 
     @property
     def range(self) -> tuple[float, float]:
@@ -70,21 +54,13 @@ class Joint:
 
 @dataclass(frozen=True)
 class Reach:
-    """How far an arm reaches, as its maker says.
+    """How far an arm reaches, as its maker says."""
 
-    Attributes
-    ----------
-    distance
-        [m].
-    axis
-        The joint, from 1, from the line of whose axis it is measured; None if it is of no such line and point.
-    point
-        Up to where: ``flange``, or ``wrist-centre``, the point of the last axis that is nearest to the axis before it.
-        None with `axis`.
-    """
-
-    distance: float
+    distance: float  #: [m].
+    #: The joint, from 1, from the line of whose axis it is measured; None if it is of no such line and point.
     axis: int | None = None
+    #: Up to where: ``flange``, or ``wrist-centre``, the point of the last axis that is nearest to the axis before it.
+    #: None with `axis`.
     point: ReachPoint | None = None
 
     @property
@@ -98,41 +74,22 @@ class Reach:
 
 @dataclass(frozen=True)
 class LinkMass:
-    """Mass of the link behind a joint.
+    """Mass of the link behind a joint."""
 
-    Attributes
-    ----------
-    joint
-        Number of the joint, from 1.
-    mass
-        [kg].
-    cog
-        Centre of gravity in the link's frame [m].
-    inertia
-        Entries xx, yy, zz, xy, xz, yz of the inertia tensor about the centre of gravity, in the axes of the link's
-        frame [kg m^2], so that xy is minus the integral of x y; zero is a point mass.
-    """
-
-    joint: int
-    mass: float
-    cog: tuple[float, float, float]
+    joint: int  #: Number of the joint, from 1.
+    mass: float  #: [kg].
+    cog: tuple[float, float, float]  #: Centre of gravity in the link's frame [m].
+    #: Entries xx, yy, zz, xy, xz, yz of the inertia tensor about the centre of gravity, in the axes of the link's frame
+    #: [kg m^2], so that xy is minus the integral of x y; zero is a point mass.
     inertia: Inertia = POINT_MASS
 
 
 @dataclass(frozen=True)
 class Payload:
-    """What hangs on the flange.
+    """What hangs on the flange."""
 
-    Attributes
-    ----------
-    mass
-        [kg].
-    cog
-        Centre of gravity in the flange frame [m].
-    """
-
-    mass: float = 0.0
-    cog: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass: float = 0.0  #: [kg].
+    cog: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: Centre of gravity in the flange frame [m].
 
     def __post_init__(self) -> None:
         """Refuse a mass below zero, and what is no number; keep plain numbers, which can be compared."""
@@ -208,16 +165,10 @@ class Target:
 
     Its position is three parameters; its orientation is `quaternion` followed by three small rotations that are
     parameters too.
-
-    Attributes
-    ----------
-    name
-        As the data call it.
-    quaternion
-        Reference orientation in the flange frame, None for a point.
     """
 
-    name: str
+    name: str  #: As the data call it.
+    #: Reference orientation in the flange frame, None for a point.
     quaternion: tuple[float, float, float, float] | None = None
 
     def parameter(self, axis: str) -> str:
@@ -237,39 +188,21 @@ class Target:
 
 @dataclass(frozen=True)
 class Truth:
-    """Published or chosen parameter values, for simulation.
+    """Published or chosen parameter values, for simulation."""
 
-    Attributes
-    ----------
-    source
-        Where they come from.
-    values
-        Parameter values [m, rad]; what is not named is nominal.
-    compliance
-        Deflection of a joint per moment about its axis [rad/(N m)], by joint number; only the twin knows it.
-    backlash, clearance
-        Whole play of a joint, and how far its shaft tilts from the middle [rad], likewise.
-    """
-
-    source: str
-    values: Mapping[str, float]
+    source: str  #: Where they come from.
+    values: Mapping[str, float]  #: Parameter values [m, rad]; what is not named is nominal.
+    #: Deflection of a joint per moment about its axis [rad/(N m)], by joint number; only the twin knows it.
     compliance: Mapping[int, float] = field(default_factory=dict)
+    #: backlash, clearance: whole play of a joint, and how far its shaft tilts from the middle [rad], likewise.
     backlash: Mapping[int, float] = field(default_factory=dict)
     clearance: Mapping[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Tool:
-    """An end-effector with targets, for simulation.
+    """An end-effector with targets, for simulation."""
 
-    Attributes
-    ----------
-    targets
-        Position of each target in the flange frame [m].
-    mass, cog
-        [kg] and [m] in the flange frame, where known.
-    """
-
-    targets: Mapping[str, tuple[float, float, float]]
-    mass: float = 0.0
+    targets: Mapping[str, tuple[float, float, float]]  #: Position of each target in the flange frame [m].
+    mass: float = 0.0  #: mass, cog: [kg] and [m] in the flange frame, where known.
     cog: tuple[float, float, float] = (0.0, 0.0, 0.0)

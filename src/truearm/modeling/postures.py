@@ -18,39 +18,24 @@ _ROUNDING: Final = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """Joint positions under known circumstances.
+    """Joint positions under known circumstances."""
 
-    Attributes
-    ----------
-    joints
-        Joint positions [rad; m for sliding joints], ``(n, joints)``.
-    velocity, acceleration
-        Of the joints [rad/s, m/s and so on], ``(n, joints)``; at rest if None.
-    approach
-        Sign of the last move of each joint, ``(n, joints)``: 1, -1, or 0 where it is not known; None if it is known
-        nowhere.
-    number
-        How many configurations were measured before each, ``(n,)``.
-    temperature
-        Of the arm [degC], ``(n,)``.
-    wrench
-        External force [N] and moment [N m] on the flange, about its origin, in the axes of the base, ``(n, 6)``.
-    loads
-        Force and moment of everything beyond each joint, in the joint's own axes, ``(joints, 6, n)``, as
-        :meth:`truearm.modeling.robot.Robot.loaded` finds them.
-    relief
-        What of the loads each balancer contributes at the factor 1, ``(balancers, joints, 6, n)``, and the factors that
-        the loads are of; None where no factor is a parameter.
-    """
-
-    joints: Array
+    joints: Array  #: Joint positions [rad; m for sliding joints], ``(n, joints)``.
+    #: velocity, acceleration: of the joints [rad/s, m/s and so on], ``(n, joints)``; at rest if None.
     velocity: Array | None = None
     acceleration: Array | None = None
+    #: Sign of the last move of each joint, ``(n, joints)``: 1, -1, or 0 where it is not known; None if it is known
+    #: nowhere.
     approach: Array | None = None
-    number: Array | None = None
-    temperature: Array | None = None
+    number: Array | None = None  #: How many configurations were measured before each, ``(n,)``.
+    temperature: Array | None = None  #: Of the arm [degC], ``(n,)``.
+    #: External force [N] and moment [N m] on the flange, about its origin, in the axes of the base, ``(n, 6)``.
     wrench: Array | None = None
+    #: Force and moment of everything beyond each joint, in the joint's own axes, ``(joints, 6, n)``, as
+    #: :meth:`truearm.modeling.robot.Robot.loaded` finds them.
     loads: Array | None = None
+    #: What of the loads each balancer contributes at the factor 1, ``(balancers, joints, 6, n)``, and the factors that
+    #: the loads are of; None where no factor is a parameter.
     relief: tuple[Array, tuple[float, ...]] | None = None
 
     @classmethod
@@ -113,13 +98,10 @@ class Postures:
 def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:
     """Return the sign of the last move of each joint, ``(n, joints)``.
 
-    Parameters
-    ----------
-    joints
-        Joint positions ``(n, joints)``.
-    order
-        Number of each row in the sequence of measurement, ``(n,)``. A row whose predecessor is not there came from
-        nowhere known: its signs are 0. A joint that did not move keeps the sign of its move before.
+    Args:
+        joints: Joint positions ``(n, joints)``.
+        order: Number of each row in the sequence of measurement, ``(n,)``. A row whose predecessor is not there came
+            from nowhere known: its signs are 0. A joint that did not move keeps the sign of its move before.
     """
     signs = np.zeros_like(joints)
     rows = np.argsort(order, kind="stable")
@@ -134,11 +116,10 @@ def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:
 def approach_from(stops: Array, joints: Array) -> Array:
     """Return the sign of the last move of each joint where an arm stops elsewhere right before, ``(n, joints)``.
 
-    Parameters
-    ----------
-    stops, joints
-        Where it stops right before each configuration, and the configurations, in the order in which it comes to them,
-        ``(n, joints)`` each. A joint that stands there already keeps the sign of its move to that stop.
+    Args:
+        stops, joints: Where it stops right before each configuration, and the configurations, in the order in which it
+            comes to them, ``(n, joints)`` each. A joint that stands there already keeps the sign of its move to that
+            stop.
     """
     way = np.stack([stops, joints], axis=1).reshape(-1, joints.shape[1])
     return approach_of(way, np.arange(len(way)))[1::2]

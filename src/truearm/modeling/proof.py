@@ -33,53 +33,31 @@ class Proof:
 
     It is about certain values, of which it keeps a hash: whether a robot still has them is asked with
     :func:`truearm.modeling.formats.robot_file.is_intact`.
-
-    Attributes
-    ----------
-    status
-        How the fit ended, in the word of files: ``converged``, ``rank-loss``.
-    errors
-        Notices of the level error.
-    region
-        Lowest and highest position of each joint at which it was measured [rad or m].
-    joint_error
-        Standard deviation of the error of each joint that readings of an arrival share [rad or m].
-    names
-        The parameters that were identified.
-    deviations
-        Their standard deviations [SI].
-    factor
-        Rows of the lower triangular factor of their correlation matrix, each one longer than the one before; zero for
-        parameters that are not uncertain.
-    warnings
-        Notes of the calibration that whoever corrects programs should hear again.
-    lower_bound
-        Whether the error may be larger than covariance and joint error say, for a reason that is known.
-    held
-        What was known beforehand and not found: ``base``; ``flange``, where the places of targets on it say all of its
-        pose; and parameters of the targets that were held, by name.
-    digest
-        SHA-256 of the values that it is about; empty if it is about none yet.
-    measured
-        Joint positions at which it was measured [rad or m], to a thousandth of a degree or millimetre; a thousand of
-        them at most, evenly taken. Empty where only the region is known.
-    loads
-        Lowest and highest moment about each joint's axis, or force along it, while it was measured [N m or N]; empty
-        if that is not known.
     """
 
-    status: str
-    errors: tuple[Notice, ...]
+    status: str  #: How the fit ended, in the word of files: ``converged``, ``rank-loss``.
+    errors: tuple[Notice, ...]  #: Notices of the level error.
+    #: Lowest and highest position of each joint at which it was measured [rad or m].
     region: tuple[tuple[float, float], ...]
+    #: Standard deviation of the error of each joint that readings of an arrival share [rad or m].
     joint_error: tuple[float, ...]
-    names: tuple[str, ...]
-    deviations: tuple[float, ...]
+    names: tuple[str, ...]  #: The parameters that were identified.
+    deviations: tuple[float, ...]  #: Their standard deviations [SI].
+    #: Rows of the lower triangular factor of their correlation matrix, each one longer than the one before; zero for
+    #: parameters that are not uncertain.
     factor: tuple[tuple[float, ...], ...]
+    #: Whether the error may be larger than covariance and joint error say, for a reason that is known.
     lower_bound: bool = False
-    warnings: tuple[Notice, ...] = ()
+    warnings: tuple[Notice, ...] = ()  #: Notes of the calibration that whoever corrects programs should hear again.
+    #: What was known beforehand and not found: ``base``; ``flange``, where the places of targets on it say all of its
+    #: pose; and parameters of the targets that were held, by name.
     held: tuple[str, ...] = ()
-    digest: str = ""
+    digest: str = ""  #: SHA-256 of the values that it is about; empty if it is about none yet.
+    #: Joint positions at which it was measured [rad or m], to a thousandth of a degree or millimetre; a thousand of
+    #: them at most, evenly taken. Empty where only the region is known.
     measured: tuple[tuple[float, ...], ...] = ()
+    #: Lowest and highest moment about each joint's axis, or force along it, while it was measured [N m or N]; empty if
+    #: that is not known.
     loads: tuple[tuple[float, float], ...] = ()
 
     @classmethod
@@ -101,16 +79,11 @@ class Proof:
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
 
-        Parameters
-        ----------
-        parameters
-            That were identified.
-        covariance
-            Of these parameters [SI], ``(parameters, parameters)``.
-        measured
-            Joint positions at which it was measured [rad or m].
-        joint_units
-            Units in which a file holds these, ``deg`` or ``mm``.
+        Args:
+            parameters: That were identified.
+            covariance: Of these parameters [SI], ``(parameters, parameters)``.
+            measured: Joint positions at which it was measured [rad or m].
+            joint_units: Units in which a file holds these, ``deg`` or ``mm``.
         """
         deviation = np.sqrt(np.diag(covariance))
         units = [SHOWN_AS[p.unit] for p in parameters]

@@ -55,83 +55,37 @@ class RobotData:
     stands in the world at ``base_x``, ``base_y``, ``base_z``, turned by `base_quaternion` and then by the small
     ``base_rx``, ``base_ry``, ``base_rz`` (Nubiola, equation I.2, with the reference orientation split off so
     that no installation meets a singular angle). The world is the instrument's frame.
-
-    Attributes
-    ----------
-    name, title, source
-        Short name, full name, and where the numbers come from.
-    convention_name
-        Name of the kinematic convention of the joints' rows.
-    joints
-        From base to flange.
-    flange
-        From the last link's frame to the flange.
-    masses
-        Link masses, where published.
-    balancers
-        Springs and gas cylinders that relieve joints.
-    payload
-        What hangs on the flange.
-    gravity
-        Acceleration of free fall in the base frame [m/s^2].
-    wrench
-        What acts on its tool besides weight; None of nothing. Robot files do not hold it.
-    rated_load
-        Mass that its maker rates it for [kg]; None if that is not known.
-    reach
-        How far it reaches, as its maker says; None if that is not known.
-    base_quaternion
-        Reference orientation of the base in the world.
-    targets
-        What the instrument sees.
-    fixtures
-        What stands beside the robot and targets are measured against.
-    effect_names
-        Joint effects that are part of the model.
-    known
-        Parameters that differ from the plain nominal ones.
-    priors
-        The file's own standard deviations of nominal values, by SI unit.
-    controller
-        How the robot's controller counts the joints, and where it has its frames.
-    tools, truths
-        For simulation.
-    maker
-        Who made it; empty if that is not known.
-    history
-        One line for each thing done to the robot.
-    proof
-        What its calibration knew about it; None if it was not calibrated, or by an older version.
-    simulated
-        Whether anything of it was identified from readings of a virtual instrument.
     """
 
-    name: str
+    name: str  #: name, title, source: short name, full name, and where the numbers come from.
     title: str
     source: str
-    convention_name: str
-    joints: tuple[Joint, ...]
-    flange: Transform = IDENTITY
-    masses: tuple[LinkMass, ...] = ()
-    payload: Payload = NO_PAYLOAD
-    gravity: tuple[float, float, float] = GRAVITY
-    wrench: Wrench | None = None
-    rated_load: float | None = None
+    convention_name: str  #: Name of the kinematic convention of the joints' rows.
+    joints: tuple[Joint, ...]  #: From base to flange.
+    flange: Transform = IDENTITY  #: From the last link's frame to the flange.
+    masses: tuple[LinkMass, ...] = ()  #: Link masses, where published.
+    payload: Payload = NO_PAYLOAD  #: What hangs on the flange.
+    gravity: tuple[float, float, float] = GRAVITY  #: Acceleration of free fall in the base frame [m/s^2].
+    wrench: Wrench | None = None  #: What acts on its tool besides weight; None of nothing. Robot files do not hold it.
+    rated_load: float | None = None  #: Mass that its maker rates it for [kg]; None if that is not known.
+    #: Reference orientation of the base in the world.
     base_quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    targets: tuple[Target, ...] = ()
-    fixtures: tuple[Fixture, ...] = ()
-    effect_names: tuple[str, ...] = ()
-    known: Mapping[str, Parameter] = field(default_factory=dict)
+    targets: tuple[Target, ...] = ()  #: What the instrument sees.
+    fixtures: tuple[Fixture, ...] = ()  #: What stands beside the robot and targets are measured against.
+    effect_names: tuple[str, ...] = ()  #: Joint effects that are part of the model.
+    known: Mapping[str, Parameter] = field(default_factory=dict)  #: Parameters that differ from the plain nominal ones.
+    #: The file's own standard deviations of nominal values, by SI unit.
     priors: Mapping[str, float] = field(default_factory=dict)
-    controller: Controller = AS_THE_MODEL
-    tools: Mapping[str, Tool] = field(default_factory=dict)
+    controller: Controller = AS_THE_MODEL  #: How the robot's controller counts the joints, and where it has its frames.
+    tools: Mapping[str, Tool] = field(default_factory=dict)  #: tools, truths: for simulation.
     truths: Mapping[str, Truth] = field(default_factory=dict)
-    maker: str = ""
-    history: tuple[str, ...] = ()
+    maker: str = ""  #: Who made it; empty if that is not known.
+    history: tuple[str, ...] = ()  #: One line for each thing done to the robot.
+    #: What its calibration knew about it; None if it was not calibrated, or by an older version.
     proof: Proof | None = None
-    balancers: tuple[Balancer, ...] = ()
-    reach: Reach | None = None
-    simulated: bool = False
+    balancers: tuple[Balancer, ...] = ()  #: Springs and gas cylinders that relieve joints.
+    reach: Reach | None = None  #: How far it reaches, as its maker says; None if that is not known.
+    simulated: bool = False  #: Whether anything of it was identified from readings of a virtual instrument.
 
     def __repr__(self) -> str:
         changed = sum(p.value != p.nominal for p in self.parameters.values())

@@ -110,12 +110,10 @@ def by_parameters(
 ) -> Array:
     """Return a derivative by parameters, from that by the elements of a chain.
 
-    Parameters
-    ----------
-    by_elements
-        The derivative by the elements with these indices, zero for None: the Jacobian of position or orientation.
-    rates
-        From :func:`effect_rates`.
+    Args:
+        by_elements: The derivative by the elements with these indices, zero for None: the Jacobian of position or
+            orientation.
+        rates: From :func:`effect_rates`.
     """
     derivative = by_elements([kinematics.places.get(name) for name in names])
     for i, name in enumerate(names):
@@ -139,14 +137,10 @@ def by_parameters_together(
 ) -> Array:
     """Return the velocity of several targets by parameters, ``(parameters, 3, targets, ..., n)``.
 
-    Parameters
-    ----------
-    whole
-        The trunk, run through :func:`~truearm.modeling.chain.together` for all of them.
-    ends
-        The forward kinematics to each target.
-    rates
-        From :func:`effect_rates`.
+    Args:
+        whole: The trunk, run through :func:`~truearm.modeling.chain.together` for all of them.
+        ends: The forward kinematics to each target.
+        rates: From :func:`effect_rates`.
     """
     derivative = by_parameters(robot, whole, whole.position_jacobian, names, rates)
     first, row = len(whole.elements), {name: i for i, name in enumerate(names)}

@@ -92,17 +92,10 @@ def fixed_rotation(quaternion: Sequence[float]) -> tuple[Element, ...]:
 
 @dataclass(frozen=True)
 class Transform:
-    """A rigid transform ``T_parent_child``.
+    """A rigid transform ``T_parent_child``."""
 
-    Attributes
-    ----------
-    translation
-        Child origin in the parent [m].
-    quaternion
-        Unit quaternion (w, x, y, z) that turns child vectors into the parent.
-    """
-
-    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: Child origin in the parent [m].
+    #: Unit quaternion (w, x, y, z) that turns child vectors into the parent.
     quaternion: tuple[float, float, float, float] = field(default=(1.0, 0.0, 0.0, 0.0))
 
     @classmethod
@@ -130,17 +123,12 @@ IDENTITY: Final = Transform()
 def rigid_motion(points: Array, places: Array) -> tuple[Array, Array]:
     """Return rotation and translation that bring points nearest to their places, in the sum of squares (Kabsch 1976).
 
-    Parameters
-    ----------
-    points
-        In the moved frame [m], ``(k, 3)``.
-    places
-        Where they are [m], ``(..., k, 3)``.
+    Args:
+        points: In the moved frame [m], ``(k, 3)``.
+        places: Where they are [m], ``(..., k, 3)``.
 
-    Returns
-    -------
-    R, p
-        ``(..., 3, 3)`` and ``(..., 3)``.
+    Returns:
+        R, p: ``(..., 3, 3)`` and ``(..., 3)``.
     """
     centre, middle = points.mean(axis=0), places.mean(axis=-2)
     H = np.swapaxes(places - middle[..., None, :], -1, -2) @ (points - centre)

@@ -42,24 +42,12 @@ STANDARD_GRAVITY: Final = 9.80665
 
 @dataclass(frozen=True)
 class Wrench:
-    """What acts on the tool.
+    """What acts on the tool."""
 
-    Attributes
-    ----------
-    force
-        [N].
-    moment
-        About the tool's point [N m].
-    frame
-        Whose axes both are given in.
-    tool
-        The tool on the flange: the force acts at its origin.
-    """
-
-    force: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    moment: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    frame: WrenchFrame = "base"
-    tool: Transform = IDENTITY
+    force: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: [N].
+    moment: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: About the tool's point [N m].
+    frame: WrenchFrame = "base"  #: Whose axes both are given in.
+    tool: Transform = IDENTITY  #: The tool on the flange: the force acts at its origin.
 
     def __post_init__(self) -> None:
         """Refuse what is no number, is too large, or is in no known frame; keep plain numbers."""
@@ -104,10 +92,8 @@ class Wrench:
     def of_text(cls, text: str, frame: WrenchFrame = "base", parameter: str = "wrench") -> Wrench:
         """Return the wrench that a text such as ``0,0,80,0,0,1.5`` names: in N and N m, or with units.
 
-        Raises
-        ------
-        InputError
-            If these are not six numbers, or a unit is none of a force or moment.
+        Raises:
+            InputError: If these are not six numbers, or a unit is none of a force or moment.
         """
         parts = text.split(",")
         if len(parts) != 6:
@@ -143,10 +129,8 @@ def _quantity(text: str, units: dict[str, float], parameter: str) -> float:
 def in_base(robot: Robot, wrench: Wrench) -> tuple[Array, Array]:
     """Return force and moment in the axes of the robot's base, ``(3,)`` each; the frame must not be the tool's.
 
-    Raises
-    ------
-    InputError
-        If they are in the controller's axes, and it is not known where those are.
+    Raises:
+        InputError: If they are in the controller's axes, and it is not known where those are.
     """
     turned = np.eye(3)
     if wrench.frame == "world":
@@ -166,10 +150,8 @@ def in_base(robot: Robot, wrench: Wrench) -> tuple[Array, Array]:
 def wrench_on_flange(robot: Robot, wrench: Wrench, flange: ForwardKinematics) -> Array:
     """Return what a wrench at the tool is on the flange: about its origin and in the axes of the base, ``(6, n)``.
 
-    Parameters
-    ----------
-    flange
-        Kinematics of the arm from the base to the flange as it stands.
+    Args:
+        flange: Kinematics of the arm from the base to the flange as it stands.
     """
     R = np.moveaxis(flange.matrix(), (-2, -1), (0, 1))
     arm = np.einsum("ijn,j->in", R, np.array(wrench.tool.translation))
@@ -188,10 +170,8 @@ def refuse_above_rating(robot: Robot, wrench: Wrench, parameter: str = "wrench")
     Makers rate a mass on the flange. A force may be as large as its weight. Moments are rated joint by joint, which few
     data sheets print; none is allowed beyond that weight at the end of the stretched arm, which no wrist holds.
 
-    Raises
-    ------
-    InputError
-        If the force or the moment is larger.
+    Raises:
+        InputError: If the force or the moment is larger.
     """
     if robot.rated_load is None:
         return
@@ -217,10 +197,8 @@ def refuse_above_rating(robot: Robot, wrench: Wrench, parameter: str = "wrench")
 def refuse_pushed(robot: Robot) -> None:
     """Refuse to write a robot on whose tool something acts: no file would hold that.
 
-    Raises
-    ------
-    InputError
-        If there is anything.
+    Raises:
+        InputError: If there is anything.
     """
     if robot.wrench is not None:
         raise InputError(

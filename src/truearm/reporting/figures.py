@@ -41,14 +41,10 @@ _LOGARITHMIC: Final = 12.0
 def histogram(before: Array, after: Array, unit: str, what: str, of: str = "readings") -> Figure:
     """Show how errors are spread before and after, in the same bins.
 
-    Parameters
-    ----------
-    before, after
-        Error norms in `unit`.
-    what
-        The quantity, for the axis: ``position error``.
-    of
-        What is counted.
+    Args:
+        before, after: Error norms in `unit`.
+        what: The quantity, for the axis: ``position error``.
+        of: What is counted.
     """
     both = np.concatenate([before, after])
     top = max(float(both.max()), 1e-9)
@@ -82,14 +78,10 @@ def histogram(before: Array, after: Array, unit: str, what: str, of: str = "read
 def workspace(part: Dataset, tips: Array, before: Array, after: Array) -> Figure:
     """Show where readings were taken, coloured by their error, with a switch between before and after.
 
-    Parameters
-    ----------
-    part
-        The readings.
-    tips
-        Where the target of each is, in the robot's base frame [m], ``(readings, 3)``.
-    before, after
-        Error of each reading [mm], NaN where none was read.
+    Args:
+        part: The readings.
+        tips: Where the target of each is, in the robot's base frame [m], ``(readings, 3)``.
+        before, after: Error of each reading [mm], NaN where none was read.
     """
     kept = np.isfinite(before) & np.isfinite(after)
     before, after = before[kept], after[kept]
@@ -163,12 +155,10 @@ def workspace(part: Dataset, tips: Array, before: Array, after: Array) -> Figure
 def expected_error_map(places: Array, error: Array, measured: Array) -> Figure:
     """Show the workspace from the side and from above, coloured by the error to expect, and where was measured.
 
-    Parameters
-    ----------
-    places, error
-        Where the targets can be, in the robot's base frame [m], ``(k, 3)``, and the error to expect there [m].
-    measured
-        Where they were in the training part, likewise, ``(readings, 3)``.
+    Args:
+        places, error: Where the targets can be, in the robot's base frame [m], ``(k, 3)``, and the error to expect
+            there [m].
+        measured: Where they were in the training part, likewise, ``(readings, 3)``.
     """
     top = _colour_end(error * 1e3)
     reach = float(np.abs(places).max()) * 1e3
@@ -242,14 +232,10 @@ def residuals(
 ) -> Figure:
     """Show the error after calibration of every configuration, mean over its targets, as measured.
 
-    Parameters
-    ----------
-    data
-        All readings.
-    parts
-        Training and then held-out: name, indices of the configurations, error of each reading [mm].
-    down_weighted
-        Which training readings the loss gave little weight.
+    Args:
+        data: All readings.
+        parts: Training and then held-out: name, indices of the configurations, error of each reading [mm].
+        down_weighted: Which training readings the loss gave little weight.
     """
     looks = ({"symbol": "circle-open", "size": 6}, {"symbol": "diamond", "size": 6})
     traces: list[Figure] = []

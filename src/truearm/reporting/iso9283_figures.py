@@ -86,10 +86,8 @@ def pose_pictures(
 ) -> list[Drawing]:
     """Return the pictures of what was measured at poses.
 
-    Parameters
-    ----------
-    other
-        Another result, whose accuracy is drawn beside this one's.
+    Args:
+        other: Another result, whose accuracy is drawn beside this one's.
     """
     drawings: list[Drawing] = []
     accuracy = fastest([one for one in clouds if one.test == "AP"])

@@ -38,10 +38,8 @@ _Curves = TypeVar("_Curves", PathDeviations, CornerCurves, VelocityCurves, Weave
 def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Drawing]:
     """Return the pictures of what was measured along paths, those at the fastest velocity of each test.
 
-    Parameters
-    ----------
-    other
-        Another result, whose deviations are drawn beside these.
+    Args:
+        other: Another result, whose deviations are drawn beside these.
     """
     drawings: list[Drawing] = []
     for test, name, title in (

@@ -29,16 +29,11 @@ _LONG_WORD: Final = re.compile(rf'[^\s"\\,:\[\]{{}}]{{{LONGEST_WORD + 1},}}')
 def page(template: str, figures: Mapping[str, Figure], of: object, **content: Any) -> str:
     """Return a page.
 
-    Parameters
-    ----------
-    template
-        Name of a template in this room; it includes ``style.css.jinja`` and ``script.html.jinja``.
-    figures
-        Pictures by the name of their place on the page.
-    of
-        The record that it tells about: if that is simulated, the page begins with it.
-    content
-        What the template tells about.
+    Args:
+        template: Name of a template in this room; it includes ``style.css.jinja`` and ``script.html.jinja``.
+        figures: Pictures by the name of their place on the page.
+        of: The record that it tells about: if that is simulated, the page begins with it.
+        content: What the template tells about.
     """
     return (
         _environment()

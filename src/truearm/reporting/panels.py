@@ -16,31 +16,16 @@ _ROW_GAP: Final = 104
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One of them.
+    """One of them."""
 
-    Attributes
-    ----------
-    title
-        Above it.
-    traces
-        What is drawn.
-    x, y
-        Titles of its axes.
-    equal
-        Whether a unit is as long on both axes.
-    shapes
-        What else is drawn, in its coordinates; one with ``yref`` ``paper`` reaches from its bottom to its top.
-    more_x, more_y
-        What else its axes have.
-    """
-
-    title: str
-    traces: Sequence[Figure]
-    x: str
+    title: str  #: Above it.
+    traces: Sequence[Figure]  #: What is drawn.
+    x: str  #: x, y: titles of its axes.
     y: str
-    equal: bool = False
+    equal: bool = False  #: Whether a unit is as long on both axes.
+    #: What else is drawn, in its coordinates; one with ``yref`` ``paper`` reaches from its bottom to its top.
     shapes: Sequence[Figure] = ()
-    more_x: Figure = field(default_factory=dict)
+    more_x: Figure = field(default_factory=dict)  #: more_x, more_y: what else its axes have.
     more_y: Figure = field(default_factory=dict)
 
 

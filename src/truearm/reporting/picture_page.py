@@ -13,44 +13,22 @@ from truearm.simulated import without_mark
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A picture on a page.
+    """A picture on a page."""
 
-    Attributes
-    ----------
-    name
-        Of its place on the page.
-    title, words
-        Above it.
-    figure
-        What is drawn.
-    """
-
-    name: str
-    title: str
+    name: str  #: Of its place on the page.
+    title: str  #: title, words: above it.
     words: str
-    figure: Figure
+    figure: Figure  #: What is drawn.
 
 
 @dataclass(frozen=True)
 class Figures:
-    """A table on a page.
+    """A table on a page."""
 
-    Attributes
-    ----------
-    title
-        Above it.
-    heading
-        Names of the columns; those after the first are numbers, if they are not in `texts`.
-    rows
-        Its cells, row by row.
-    texts
-        Columns of words, from 0, whose cells go on in another line where there is no room.
-    """
-
-    title: str
-    heading: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    texts: tuple[int, ...] = ()
+    title: str  #: Above it.
+    heading: tuple[str, ...]  #: Names of the columns; those after the first are numbers, if they are not in `texts`.
+    rows: tuple[tuple[str, ...], ...]  #: Its cells, row by row.
+    texts: tuple[int, ...] = ()  #: Columns of words, from 0, whose cells go on in another line where there is no room.
 
 
 def picture_page(
@@ -67,22 +45,14 @@ def picture_page(
 ) -> str:
     """Return the page.
 
-    Parameters
-    ----------
-    title, subtitle
-        At its head.
-    words
-        What was found, a sentence each.
-    command
-        How to run it again.
-    of
-        The record that it tells about.
-    pictures, tables
-        What is shown.
-    details
-        Tables below the pictures.
-    notices
-        What to know about the result.
+    Args:
+        title, subtitle: At its head.
+        words: What was found, a sentence each.
+        command: How to run it again.
+        of: The record that it tells about.
+        pictures, tables: What is shown.
+        details: Tables below the pictures.
+        notices: What to know about the result.
     """
     return page(
         "pictures.html.jinja",

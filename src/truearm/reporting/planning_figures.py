@@ -31,12 +31,9 @@ _SHOWN: Final = {"revolute": (180.0 / np.pi, "deg"), "prismatic": (1e3, "mm")}
 def pose_cube(plan: PosePlan, paths: Mapping[str, Array] | None = None) -> Figure:
     """Show a cube with its diagonal planes, the poses on them in their order, and the directions of the tip.
 
-    Parameters
-    ----------
-    plan
-        The poses.
-    paths
-        Points of paths to draw with them, by name, ``(n, 3)`` each [m].
+    Args:
+        plan: The poses.
+        paths: Points of paths to draw with them, by name, ``(n, 3)`` each [m].
     """
     traces = [_edges(plan.cube)]
     tails = plan.points - _TAIL * plan.cube.side * plan.approach

@@ -53,15 +53,9 @@ _MAPPED: Final = 4000
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What the page shows of a calibration: its tables and pictures.
+    """What the page shows of a calibration: its tables and pictures."""
 
-    Attributes
-    ----------
-    calibration
-        What it tells about.
-    """
-
-    calibration: Calibration
+    calibration: Calibration  #: What it tells about.
 
     @property
     def judged(self) -> Errors:

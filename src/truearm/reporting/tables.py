@@ -39,27 +39,14 @@ _PER: Final = {"position": "coordinate", "orientation": "rotation axis", "distan
 
 @dataclass(frozen=True)
 class SpreadRow:
-    """Errors of one robot on one part of the data, in the unit that is shown.
+    """Errors of one robot on one part of the data, in the unit that is shown."""
 
-    Attributes
-    ----------
-    part
-        ``held out`` or ``training``.
-    robot
-        ``before`` or ``after``.
-    configurations, readings
-        How many there are.
-    figures
-        Mean, root mean square, 95th percentile and maximum.
-    deviation
-        Standard error of the mean, by the scatter of the configurations; None of fewer than two.
-    """
-
-    part: str
-    robot: str
-    configurations: int
+    part: str  #: ``held out`` or ``training``.
+    robot: str  #: ``before`` or ``after``.
+    configurations: int  #: configurations, readings: how many there are.
     readings: int
-    figures: tuple[float, float, float, float]
+    figures: tuple[float, float, float, float]  #: Mean, root mean square, 95th percentile and maximum.
+    #: Standard error of the mean, by the scatter of the configurations; None of fewer than two.
     deviation: float | None = None
 
     @property
@@ -83,10 +70,8 @@ def spread_rows(
 ) -> tuple[SpreadRow, ...]:
     """Return the errors of one kind, ``position`` and ``length`` in mm, ``orientation`` in mrad; none without any.
 
-    Parameters
-    ----------
-    configuration
-        Of each reading of the training part, and of the part that is judged.
+    Args:
+        configuration: Of each reading of the training part, and of the part that is judged.
     """
     part = "training" if validation is None else "held out"
     cases = [(part, "before", nominal, configuration[1])]

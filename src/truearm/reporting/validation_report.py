@@ -84,12 +84,9 @@ def validation_figures(found: Validation) -> dict[str, Figure]:
 def distance_figure(found: RegionDistances, distance: Array, what: str, unit: str, labels: list[str]) -> Figure:
     """Show the error of each reading over a distance, and the mean of readings that are about as far.
 
-    Parameters
-    ----------
-    distance
-        In the unit that is shown, ``(n,)``.
-    labels
-        Of the readings.
+    Args:
+        distance: In the unit that is shown, ``(n,)``.
+        labels: Of the readings.
     """
     spans = found.spans(distance)
     low = [min(span.low for span in spans)]

@@ -33,18 +33,10 @@ AXIS_FILES: Final = ("calibrated.yaml", "joint-errors.yaml", "axes.json")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AxisCalibration(Record):
-    """A robot found axis by axis.
+    """A robot found axis by axis."""
 
-    Attributes
-    ----------
-    analysis
-        Circles, axes and the fits of the robot's parameters.
-    inputs
-        The files that were read: none of them is overwritten.
-    """
-
-    analysis: AxisAnalysis
-    inputs: tuple[Path, ...] = ()
+    analysis: AxisAnalysis  #: Circles, axes and the fits of the robot's parameters.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
 
     @property
     def robot(self) -> Robot:
@@ -112,9 +104,8 @@ class AxisCalibration(Record):
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write ``calibrated.yaml``, ``joint-errors.yaml`` and ``axes.json`` into a folder.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
         """
         folder = output_folder(folder, AXIS_FILES, self.inputs, ours=True)
         files = {

@@ -61,74 +61,32 @@ RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibra
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Record):
-    """A finished calibration: the fit, and the proof on configurations it has not seen.
+    """A finished calibration: the fit, and the proof on configurations it has not seen."""
 
-    Attributes
-    ----------
-    fit
-        Made from the training part alone.
-    nominal
-        Errors of the uncalibrated robot on the held-out part, base and targets fitted on the training part. If
-        nothing was held out, on the training part.
-    train
-        Errors of the calibrated robot on the training part.
-    validation
-        Errors of the calibrated robot on the held-out part; None if nothing was held out.
-    expected
-        The error of the targets' positions to expect over the workspace.
-    warnings
-        What to know about the result, in plain words.
-    data
-        All readings.
-    training, held_out
-        Indices of the configurations of each part.
-    command
-        How to run it again.
-    history
-        What was done, in one line with the hash of the data.
-    urdf
-        The user's own URDF, if that is where the robot came from.
-    selection
-        How the model was chosen; None if it was named.
-    inputs
-        The files that were read: none of them is overwritten.
-    known_before
-        What was known of the robot from an earlier calibration; None if nothing was.
-    without
-        Labels of the configurations that were left out; `data` does not have them.
-    excluded
-        Readings that were excluded; `data` have none there.
-    notes
-        What the user noted, by its name.
-    next
-        What to do next, three steps at most, the most useful first.
-    monte_carlo
-        Calibrations that were simulated for intervals; None if none were asked for.
-    zones
-        What became of zones of the workspace; None if none were asked for.
-    """
-
-    fit: Fit
+    fit: Fit  #: Made from the training part alone.
+    #: Errors of the uncalibrated robot on the held-out part, base and targets fitted on the training part. If nothing
+    #: was held out, on the training part.
     nominal: Errors
-    train: Errors
-    validation: Errors | None
-    expected: ExpectedError
-    warnings: tuple[Notice, ...]
-    data: Dataset
-    training: NDArray[np.intp]
+    train: Errors  #: Errors of the calibrated robot on the training part.
+    validation: Errors | None  #: Errors of the calibrated robot on the held-out part; None if nothing was held out.
+    expected: ExpectedError  #: The error of the targets' positions to expect over the workspace.
+    warnings: tuple[Notice, ...]  #: What to know about the result, in plain words.
+    data: Dataset  #: All readings.
+    training: NDArray[np.intp]  #: training, held_out: indices of the configurations of each part.
     held_out: NDArray[np.intp]
-    command: str
-    history: str
-    urdf: bytes | None = None
-    selection: Selection | None = None
-    inputs: tuple[Path, ...] = ()
-    known_before: Proof | None = None
-    without: tuple[str, ...] = ()
-    excluded: tuple[Excluded, ...] = ()
-    notes: dict[str, str] = field(default_factory=dict)
-    next: tuple[NextStep, ...] = ()
+    command: str  #: How to run it again.
+    history: str  #: What was done, in one line with the hash of the data.
+    urdf: bytes | None = None  #: The user's own URDF, if that is where the robot came from.
+    selection: Selection | None = None  #: How the model was chosen; None if it was named.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    known_before: Proof | None = None  #: What was known of the robot from an earlier calibration; None if nothing was.
+    without: tuple[str, ...] = ()  #: Labels of the configurations that were left out; `data` does not have them.
+    excluded: tuple[Excluded, ...] = ()  #: Readings that were excluded; `data` have none there.
+    notes: dict[str, str] = field(default_factory=dict)  #: What the user noted, by its name.
+    next: tuple[NextStep, ...] = ()  #: What to do next, three steps at most, the most useful first.
+    #: Calibrations that were simulated for intervals; None if none were asked for.
     monte_carlo: SimulatedCalibrations | None = None
-    zones: ZoneChoice | None = None
+    zones: ZoneChoice | None = None  #: What became of zones of the workspace; None if none were asked for.
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:

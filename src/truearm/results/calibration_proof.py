@@ -33,21 +33,15 @@ def proof_of(
 ) -> Proof:
     """Return what a calibration knows about its result.
 
-    Parameters
-    ----------
-    fit
-        Of the training part.
-    status
-        How it ended, or that what it found cannot be this robot.
-    warnings
-        All notices of the calibration.
-    expected
-        The error to expect over the workspace.
-    training
-        The training part.
-    before
-        What was known of the robot already. It holds for the parameters of the arm that this fit has not touched, as
-        where only base and targets are found anew; and if there are any, so does what spoke against them.
+    Args:
+        fit: Of the training part.
+        status: How it ended, or that what it found cannot be this robot.
+        warnings: All notices of the calibration.
+        expected: The error to expect over the workspace.
+        training: The training part.
+        before: What was known of the robot already. It holds for the parameters of the arm that this fit has not
+            touched, as where only base and targets are found anew; and if there are any, so does what spoke against
+            them.
     """
     ended, joint_error = status.value, expected.joint_error
     errors = [notice for notice in warnings if notice.level == "error"]

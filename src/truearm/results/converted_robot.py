@@ -12,18 +12,10 @@ from truearm.results.record import Record
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConvertedRobot(Record):
-    """A robot in another kinematic convention, every pose the same.
+    """A robot in another kinematic convention, every pose the same."""
 
-    Attributes
-    ----------
-    robot
-        In the other convention. Its history ends with what was done.
-    file
-        Its robot file; None if none was written.
-    """
-
-    robot: Robot
-    file: Path | None = None
+    robot: Robot  #: In the other convention. Its history ends with what was done.
+    file: Path | None = None  #: Its robot file; None if none was written.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""

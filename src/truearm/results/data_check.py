@@ -15,24 +15,12 @@ from truearm.simulated import Marked
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DataCheck(Record):
-    """What was found wrong with measurements.
+    """What was found wrong with measurements."""
 
-    Attributes
-    ----------
-    data
-        The measurements.
-    warnings
-        One notice for each kind of fault; none for believable data.
-    next
-        What to do next, three steps at most, the most useful first.
-    simulated_from
-        What of measurements and robot comes from a virtual instrument.
-    """
-
-    data: Dataset
-    warnings: tuple[Notice, ...]
-    next: tuple[NextStep, ...] = ()
-    simulated_from: tuple[Marked, ...] = ()
+    data: Dataset  #: The measurements.
+    warnings: tuple[Notice, ...]  #: One notice for each kind of fault; none for believable data.
+    next: tuple[NextStep, ...] = ()  #: What to do next, three steps at most, the most useful first.
+    simulated_from: tuple[Marked, ...] = ()  #: What of measurements and robot comes from a virtual instrument.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""

@@ -13,21 +13,11 @@ from truearm.results.record import Record
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Demonstration(Record):
-    """A calibration, and a program corrected with it.
+    """A calibration, and a program corrected with it."""
 
-    Attributes
-    ----------
-    folder
-        Where data and results are.
-    calibration
-        Of a digital twin.
-    correction
-        Of a program; None if the fit did not converge.
-    """
-
-    folder: Path
-    calibration: Calibration
-    correction: ProgramCorrection | None
+    folder: Path  #: Where data and results are.
+    calibration: Calibration  #: Of a digital twin.
+    correction: ProgramCorrection | None  #: Of a program; None if the fit did not converge.
 
     @property
     def corrected_folder(self) -> Path:

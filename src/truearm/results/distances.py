@@ -19,24 +19,12 @@ _LONGEST: Final = 50
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Distances(Record):
-    """Errors of the distances between all pairs of measured points.
+    """Errors of the distances between all pairs of measured points."""
 
-    Attributes
-    ----------
-    source
-        The measurements, for messages.
-    configurations
-        How many there are.
-    errors
-        Predicted minus measured distances.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    source: str
-    configurations: int
-    errors: PairDistances
-    simulated_from: tuple[Marked, ...] = ()
+    source: str  #: The measurements, for messages.
+    configurations: int  #: How many there are.
+    errors: PairDistances  #: Predicted minus measured distances.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

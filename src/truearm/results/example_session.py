@@ -12,15 +12,9 @@ from truearm.simulated import Marked
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ExampleSession(Record):
-    """A small complete session to imitate.
+    """A small complete session to imitate."""
 
-    Attributes
-    ----------
-    files
-        A robot, its data, data to check with, the commands.
-    """
-
-    files: tuple[Path, ...]
+    files: tuple[Path, ...]  #: A robot, its data, data to check with, the commands.
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:
@@ -38,15 +32,9 @@ class ExampleSession(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotTemplate(Record):
-    """A commented robot file to fill in.
+    """A commented robot file to fill in."""
 
-    Attributes
-    ----------
-    file
-        The file.
-    """
-
-    file: Path
+    file: Path  #: The file.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""

@@ -20,21 +20,11 @@ _OF: Final = {
 
 @dataclass(frozen=True)
 class Excluded:
-    """An exclusion, and what it means for a result.
+    """An exclusion, and what it means for a result."""
 
-    Attributes
-    ----------
-    row
-        Of the file of exclusions.
-    readings
-        How many readings it means.
-    part
-        The part of the split that they would belong to; ``left out`` if their whole configuration is.
-    """
-
-    row: Exclusion
-    readings: int
-    part: Part
+    row: Exclusion  #: Of the file of exclusions.
+    readings: int  #: How many readings it means.
+    part: Part  #: The part of the split that they would belong to; ``left out`` if their whole configuration is.
 
     def summary(self) -> dict[str, str | int]:
         """Return it as JSON holds it."""

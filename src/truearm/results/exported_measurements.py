@@ -14,28 +14,14 @@ from truearm.simulated import Marked
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ExportedMeasurements(Record):
-    """Measurements for other programs.
+    """Measurements for other programs."""
 
-    Attributes
-    ----------
-    text
-        Content of the file.
-    configurations, readings
-        How many there are.
-    joints_are
-        Whose joint positions the file holds.
-    file
-        The file; None if none was written.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    text: str
-    configurations: int
+    text: str  #: Content of the file.
+    configurations: int  #: configurations, readings: how many there are.
     readings: int
-    joints_are: JointsOf
-    file: Path | None = None
-    simulated_from: tuple[Marked, ...] = ()
+    joints_are: JointsOf  #: Whose joint positions the file holds.
+    file: Path | None = None  #: The file; None if none was written.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""

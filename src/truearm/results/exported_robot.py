@@ -13,33 +13,15 @@ from truearm.results.record import Record, notice_lines, notice_summaries
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ExportedRobot(Record):
-    """A robot for other programs, and what the format cannot hold.
+    """A robot for other programs, and what the format cannot hold."""
 
-    Attributes
-    ----------
-    robot
-        The robot.
-    format
-        Name of the format.
-    text
-        Content of the file.
-    frames
-        Which frames its numbers refer to.
-    left_out
-        What the format cannot hold, one sentence each.
-    file
-        The file; None if none was written.
-    told
-        What speaks against the calibration of the robot.
-    """
-
-    robot: Robot
-    format: str
-    text: str
-    frames: str
-    left_out: tuple[str, ...]
-    file: Path | None = None
-    told: tuple[Notice, ...] = ()
+    robot: Robot  #: The robot.
+    format: str  #: Name of the format.
+    text: str  #: Content of the file.
+    frames: str  #: Which frames its numbers refer to.
+    left_out: tuple[str, ...]  #: What the format cannot hold, one sentence each.
+    file: Path | None = None  #: The file; None if none was written.
+    told: tuple[Notice, ...] = ()  #: What speaks against the calibration of the robot.
 
     @property
     def warnings(self) -> tuple[Notice, ...]:

@@ -34,41 +34,21 @@ FLEET_FILES: Final = ("fleet.json", "robots.csv", "report.html", PRIORS_FILE)
 
 @dataclass(frozen=True)
 class Run:
-    """How the parts of a fleet were computed this time; no result depends on it.
+    """How the parts of a fleet were computed this time; no result depends on it."""
 
-    Attributes
-    ----------
-    parts, before
-        How many there are, and how many were on disk already.
-    told
-        What happened to workers, in plain words.
-    lost
-        Robots of parts that were given up, because their workers died of them.
-    """
-
-    parts: int
+    parts: int  #: parts, before: how many there are, and how many were on disk already.
     before: int
-    told: tuple[str, ...] = ()
-    lost: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()  #: What happened to workers, in plain words.
+    lost: tuple[str, ...] = ()  #: Robots of parts that were given up, because their workers died of them.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fleet(Record):
-    """A fleet of robots.
+    """A fleet of robots."""
 
-    Attributes
-    ----------
-    recorded
-        Its parts on disk.
-    run
-        How they were computed.
-    command
-        How to make it again; empty if that is not known.
-    """
-
-    recorded: Recorded
-    run: Run
-    command: str = ""
+    recorded: Recorded  #: Its parts on disk.
+    run: Run  #: How they were computed.
+    command: str = ""  #: How to make it again; empty if that is not known.
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
@@ -251,9 +231,8 @@ class Fleet(Record):
     def write(self) -> tuple[Path, ...]:
         """Write ``fleet.json``, ``robots.csv`` and ``report.html`` beside the parts, and ``priors.yaml`` if any follow.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
         """
         from truearm.reporting.fleet_report import fleet_html
 

@@ -40,35 +40,17 @@ STAGES: Final[Mapping[Knowledge, str]] = {
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FollowedPath(Record):
-    """The joint motion along a path, and what corrects it.
+    """The joint motion along a path, and what corrects it."""
 
-    Attributes
-    ----------
-    robot
-        The robot, with what it carries.
-    path
-        The path, its joint motions and the errors that the calibrated robot predicts along it.
-    programs
-        Texts of programs by the names of their files.
-    command
-        How to run it again.
-    warnings
-        What to know about it.
-    inputs
-        The files that were read: none of them is overwritten.
-    joints_are
-        Whose joint positions the files hold: the ``model``'s, or those that the ``controller`` shows.
-    ledger
-        Where the targets of corrected programs are remembered, and what; None for nowhere.
-    """
-
-    robot: Robot
-    path: CorrectedPath
-    programs: Mapping[str, str]
-    command: str
-    warnings: tuple[Notice, ...] = ()
-    inputs: tuple[Path, ...] = ()
+    robot: Robot  #: The robot, with what it carries.
+    path: CorrectedPath  #: The path, its joint motions and the errors that the calibrated robot predicts along it.
+    programs: Mapping[str, str]  #: Texts of programs by the names of their files.
+    command: str  #: How to run it again.
+    warnings: tuple[Notice, ...] = ()  #: What to know about it.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    #: Whose joint positions the files hold: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
+    #: Where the targets of corrected programs are remembered, and what; None for nowhere.
     ledger: tuple[Path, tuple[LedgerEntry, ...]] | None = None
 
     @property

@@ -14,18 +14,10 @@ from truearm.shown import counted, listed
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GuessedMapping(Record):
-    """A mapping file that a table seems to need.
+    """A mapping file that a table seems to need."""
 
-    Attributes
-    ----------
-    guessed
-        The mapping and what would come of it.
-    out
-        The file that holds it; None if none was written.
-    """
-
-    guessed: Guessed
-    out: Path | None = None
+    guessed: Guessed  #: The mapping and what would come of it.
+    out: Path | None = None  #: The file that holds it; None if none was written.
 
     @property
     def text(self) -> str:

@@ -19,27 +19,13 @@ _SHOWN: Final = ((("fx", "fy"), " px"), (("cx", "cy"), " px"), (("k1", "k2", "k3
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ImportedHandEye(Record):
-    """A camera and a board, one of them on the flange, as poses of that one.
+    """A camera and a board, one of them on the flange, as poses of that one."""
 
-    Attributes
-    ----------
-    data
-        The measurements.
-    on_flange
-        ``camera`` or ``board``.
-    ahead
-        How far before the camera, on its axis, the target is [m]; zero for a board on the flange.
-    lens
-        Of the camera, where pictures were read.
-    out
-        The canonical CSV file that holds the measurements; None if none was written.
-    """
-
-    data: Dataset
-    on_flange: str
-    ahead: float
-    lens: Lens | None = None
-    out: Path | None = None
+    data: Dataset  #: The measurements.
+    on_flange: str  #: ``camera`` or ``board``.
+    ahead: float  #: How far before the camera, on its axis, the target is [m]; zero for a board on the flange.
+    lens: Lens | None = None  #: Of the camera, where pictures were read.
+    out: Path | None = None  #: The canonical CSV file that holds the measurements; None if none was written.
 
     @property
     def sigma(self) -> float | None:

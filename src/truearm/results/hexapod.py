@@ -35,25 +35,13 @@ _CUPS: Final = ("t1", "t2", "t3")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodPoses(Record):
-    """Designs, assemblies and poses of the device.
+    """Designs, assemblies and poses of the device."""
 
-    Attributes
-    ----------
-    designs, assemblies
-        How many there are.
-    poses
-        Those that can be measured, by their number.
-    distinct
-        Those of them that are left without near-equal ones.
-    near_equal
-        Numbers of poses that teach much the same, in pairs.
-    """
-
-    designs: int
+    designs: int  #: designs, assemblies: how many there are.
     assemblies: int
-    poses: tuple[HexapodPose, ...]
-    distinct: tuple[HexapodPose, ...]
-    near_equal: tuple[tuple[int, int], ...]
+    poses: tuple[HexapodPose, ...]  #: Those that can be measured, by their number.
+    distinct: tuple[HexapodPose, ...]  #: Those of them that are left without near-equal ones.
+    near_equal: tuple[tuple[int, int], ...]  #: Numbers of poses that teach much the same, in pairs.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -76,18 +64,10 @@ class HexapodPoses(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodUncertainty(Record):
-    """How well the tool's cups are known, in standard deviations of one length.
+    """How well the tool's cups are known, in standard deviations of one length."""
 
-    Attributes
-    ----------
-    solutions
-        Propagated, for each of the four ways to assemble a design.
-    drawn
-        The same by Monte Carlo: T1, T2, T3 of each solution.
-    """
-
-    solutions: tuple[CupUncertainty, ...]
-    drawn: tuple[tuple[float, float, float], ...]
+    solutions: tuple[CupUncertainty, ...]  #: Propagated, for each of the four ways to assemble a design.
+    drawn: tuple[tuple[float, float, float], ...]  #: The same by Monte Carlo: T1, T2, T3 of each solution.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -115,52 +95,25 @@ class HexapodUncertainty(Record):
 
 @dataclass(frozen=True, eq=False)
 class SolvedPose:
-    """The tool's cups at one pose.
+    """The tool's cups at one pose."""
 
-    Attributes
-    ----------
-    configuration
-        Its label; empty without a sheet.
-    design, solution
-        Which legs were measured, and how they are assembled.
-    cups
-        T1, T2, T3 in the frame of the base fixture [m], ``(3, 3)``.
-    place
-        Name of the place of the base fixture; empty if the sheet has none.
-    side
-        On which side of four cups the legs were measured, 1 to 4.
-    """
-
-    configuration: str
-    design: Design
+    configuration: str  #: Its label; empty without a sheet.
+    design: Design  #: design, solution: which legs were measured, and how they are assembled.
     solution: int
-    cups: Array
-    place: str = ""
-    side: int = 1
+    cups: Array  #: T1, T2, T3 in the frame of the base fixture [m], ``(3, 3)``.
+    place: str = ""  #: Name of the place of the base fixture; empty if the sheet has none.
+    side: int = 1  #: On which side of four cups the legs were measured, 1 to 4.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodSolution(Record):
-    """The tool's cups, from lengths.
+    """The tool's cups, from lengths."""
 
-    Attributes
-    ----------
-    poses
-        One for each configuration with six measured legs.
-    left_out
-        Labels of the configurations of which a leg is missing.
-    data
-        The cups as measurements of the robot; None without joint positions.
-    inputs
-        The files that were read: none of them is overwritten.
-    attached
-        How well the tool changer repeats the cups; None if the tool was attached once, as far as is said.
-    """
-
-    poses: tuple[SolvedPose, ...]
-    left_out: tuple[str, ...]
-    data: Dataset | None
-    inputs: tuple[Path, ...] = ()
+    poses: tuple[SolvedPose, ...]  #: One for each configuration with six measured legs.
+    left_out: tuple[str, ...]  #: Labels of the configurations of which a leg is missing.
+    data: Dataset | None  #: The cups as measurements of the robot; None without joint positions.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    #: How well the tool changer repeats the cups; None if the tool was attached once, as far as is said.
     attached: Attachments | None = None
 
     @property
@@ -254,20 +207,11 @@ class HexapodSolution(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodPlan(Record):
-    """Which configurations of a robot can be measured with the base fixture at one place or several.
+    """Which configurations of a robot can be measured with the base fixture at one place or several."""
 
-    Attributes
-    ----------
-    robot
-        With the cups as its targets.
-    reachable
-        The configurations in their order, and what was left out.
-    joints_are
-        Whose joint positions the files hold: the ``model``'s, or those that the ``controller`` shows.
-    """
-
-    robot: Robot
-    reachable: Reachable
+    robot: Robot  #: With the cups as its targets.
+    reachable: Reachable  #: The configurations in their order, and what was left out.
+    #: Whose joint positions the files hold: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
 
     def summary(self) -> dict[str, Any]:
@@ -326,18 +270,10 @@ class HexapodPlan(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodFrame(Record):
-    """Where the base fixture stands in the robot's base frame.
+    """Where the base fixture stands in the robot's base frame."""
 
-    Attributes
-    ----------
-    found
-        The frame, what it would be without the measured distances, and what is left at the cups.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    found: WorldFrame
-    simulated_from: tuple[Marked, ...] = ()
+    found: WorldFrame  #: The frame, what it would be without the measured distances, and what is left at the cups.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

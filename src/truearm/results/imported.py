@@ -18,24 +18,13 @@ from truearm.shown import counted
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Imported(Record):
-    """Measurements that came from files of other programs.
+    """Measurements that came from files of other programs."""
 
-    Attributes
-    ----------
-    data
-        The measurements.
-    out
-        The canonical CSV file that holds them; None if none was written.
-    missing
-        How many readings are missing of each point, where the file has places for them.
-    warnings
-        What the data cannot hold of the files.
-    """
-
-    data: Dataset
-    out: Path | None = None
+    data: Dataset  #: The measurements.
+    out: Path | None = None  #: The canonical CSV file that holds them; None if none was written.
+    #: How many readings are missing of each point, where the file has places for them.
     missing: Mapping[str, int] = field(default_factory=dict)
-    warnings: tuple[Notice, ...] = ()
+    warnings: tuple[Notice, ...] = ()  #: What the data cannot hold of the files.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -57,24 +46,12 @@ class Imported(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ImportedRoboDK(Record):
-    """Measurements that came from a table of RoboDK.
+    """Measurements that came from a table of RoboDK."""
 
-    Attributes
-    ----------
-    data
-        The measurements.
-    tool_points
-        Where each target is in the flange frame, as RoboDK was told [m], ``(targets, 3)``.
-    out
-        The canonical CSV file that holds them; None if none was written.
-    missing
-        How many readings are missing.
-    """
-
-    data: Dataset
-    tool_points: Array
-    out: Path | None = None
-    missing: int = 0
+    data: Dataset  #: The measurements.
+    tool_points: Array  #: Where each target is in the flange frame, as RoboDK was told [m], ``(targets, 3)``.
+    out: Path | None = None  #: The canonical CSV file that holds them; None if none was written.
+    missing: int = 0  #: How many readings are missing.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -97,21 +74,11 @@ class ImportedRoboDK(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ImportedCircles(Record):
-    """Circles that a robot drew, as distances and heights.
+    """Circles that a robot drew, as distances and heights."""
 
-    Attributes
-    ----------
-    data
-        The measurements.
-    pages
-        Names of the pages.
-    out
-        The canonical CSV file that holds them; None if none was written.
-    """
-
-    data: Dataset
-    pages: tuple[str, ...]
-    out: Path | None = None
+    data: Dataset  #: The measurements.
+    pages: tuple[str, ...]  #: Names of the pages.
+    out: Path | None = None  #: The canonical CSV file that holds them; None if none was written.
 
     @property
     def gaps(self) -> int:

@@ -25,21 +25,11 @@ _LOST: Final = 0.05
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ImportedBag(Record):
-    """Measurements that came from a recording of a ROS cell.
+    """Measurements that came from a recording of a ROS cell."""
 
-    Attributes
-    ----------
-    found
-        Standstills, and what was seen in them.
-    command
-        How to run it again.
-    inputs
-        The files that were read: none of them is overwritten.
-    """
-
-    found: Recording
-    command: str
-    inputs: tuple[Path, ...] = ()
+    found: Recording  #: Standstills, and what was seen in them.
+    command: str  #: How to run it again.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
 
     @property
     def data(self) -> Dataset:
@@ -119,9 +109,8 @@ class ImportedBag(Record):
     def save(self, file: str | Path) -> tuple[Path, Path]:
         """Write the measurements as canonical CSV, and a page with the same name that ends in ``.html``.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
         """
         from truearm.measurement.readers.canonical import csv_text
         from truearm.reporting.bag_page import bag_html

@@ -19,27 +19,14 @@ _CLEARLY: Final = 5.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ImportedKinematics(Record):
-    """A robot with the kinematics that its controller computes with.
+    """A robot with the kinematics that its controller computes with."""
 
-    Attributes
-    ----------
-    robot
-        Its values are the controller's, its nominal values the type's.
-    type
-        The type of arm, as its maker publishes it.
-    distance
-        How far the flange is from the type's on average, at random joint positions [m].
-    fitting
-        Other types of the library that the file fits as well, with the largest joint zero that it has of them [rad].
-    file
-        The robot file; None if none was written.
-    """
-
-    robot: Robot
-    type: Robot
-    distance: float
+    robot: Robot  #: Its values are the controller's, its nominal values the type's.
+    type: Robot  #: The type of arm, as its maker publishes it.
+    distance: float  #: How far the flange is from the type's on average, at random joint positions [m].
+    #: Other types of the library that the file fits as well, with the largest joint zero that it has of them [rad].
     fitting: Mapping[str, float] = field(default_factory=dict)
-    file: Path | None = None
+    file: Path | None = None  #: The robot file; None if none was written.
 
     @property
     def warnings(self) -> tuple[Notice, ...]:

@@ -39,36 +39,17 @@ def pushed_file(file: Path) -> Path:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InclinometerPlan(Record):
-    """Configurations in which inclinometers are read, in pairs, and poses under a load for what they do not see.
+    """Configurations in which inclinometers are read, in pairs, and poses under a load for what they do not see."""
 
-    Attributes
-    ----------
-    robot
-        With its payload.
-    made
-        The pairs, and how accurate every constant of the joints will be.
-    pull
-        Force on the flange [N], 0 for gravity alone.
-    command
-        How to run it again.
-    tour
-        How the configurations are driven, each way checked.
-    inputs
-        The files that were read: none of them is overwritten.
-    joints_are
-        Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
-    replaced
-        What to know of another plan that it was written over.
-    """
-
-    robot: Robot
-    made: TiltingPlan
-    pull: float
-    command: str
-    tour: Tour
-    inputs: tuple[Path, ...] = ()
+    robot: Robot  #: With its payload.
+    made: TiltingPlan  #: The pairs, and how accurate every constant of the joints will be.
+    pull: float  #: Force on the flange [N], 0 for gravity alone.
+    command: str  #: How to run it again.
+    tour: Tour  #: How the configurations are driven, each way checked.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    #: Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
-    replaced: tuple[Notice, ...] = ()
+    replaced: tuple[Notice, ...] = ()  #: What to know of another plan that it was written over.
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
@@ -140,9 +121,8 @@ class InclinometerPlan(Record):
     def save(self, file: str | Path) -> tuple[Path, ...]:
         """Write the plan as CSV, and every stop on the ways in a second one.
 
-        Returns
-        -------
-        The files written; the second ends in ``-ways.csv``.
+        Returns:
+            The files written; the second ends in ``-ways.csv``.
         """
         table = output_file(file, self.inputs, ours=True)
         ways = output_file(ways_beside(table), self.inputs, ours=True)
@@ -153,26 +133,14 @@ class InclinometerPlan(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InclinometerSimulation(Record):
-    """What inclinometers read of a simulated robot, and its poses under loads that push the joints both ways.
+    """What inclinometers read of a simulated robot, and its poses under loads that push the joints both ways."""
 
-    Attributes
-    ----------
-    robot
-        Name of the nominal robot.
-    truth
-        What the simulated robot truly is: the name of a truth, or the robot file.
-    inclinations
-        The readings.
-    pushed
-        Positions of the targets in pairs of configurations under two loads; None where nothing pulls.
-    out
-        The file that holds the readings, see :func:`pushed_file` for the poses; None if none was written.
-    """
-
-    robot: str
-    truth: str
-    inclinations: Inclinations
+    robot: str  #: Name of the nominal robot.
+    truth: str  #: What the simulated robot truly is: the name of a truth, or the robot file.
+    inclinations: Inclinations  #: The readings.
+    #: Positions of the targets in pairs of configurations under two loads; None where nothing pulls.
     pushed: Dataset | None = None
+    #: The file that holds the readings, see :func:`pushed_file` for the poses; None if none was written.
     out: Path | None = None
 
     @property

@@ -40,68 +40,32 @@ WAYS: Final[Mapping[Way, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """The same parameters, identified in several ways from the same readings.
+    """The same parameters, identified in several ways from the same readings."""
 
-    Attributes
-    ----------
-    robots
-        By the way they were found.
-    errors
-        Of each on configurations that none of them was made from, or on those that all were.
-    held_out
-        Whether it is the former.
-    training
-        How many configurations they were made from.
-    by_influence, by_norm
-        What single poses said.
-    frames
-        ``placed`` if base and targets were fitted with the nominal robot and held, ``robot`` if they are the file's.
-    """
-
-    robots: Mapping[Way, Robot]
+    robots: Mapping[Way, Robot]  #: By the way they were found.
+    #: Of each on configurations that none of them was made from, or on those that all were.
     errors: Mapping[Way, Errors]
-    held_out: bool
-    training: int
-    by_influence: PoseByPose
+    held_out: bool  #: Whether it is the former.
+    training: int  #: How many configurations they were made from.
+    by_influence: PoseByPose  #: by_influence, by_norm: what single poses said.
     by_norm: PoseByPose
+    #: ``placed`` if base and targets were fitted with the nominal robot and held, ``robot`` if they are the file's.
     frames: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InfluenceResult(Record):
-    """What parameters do to the tip, configuration by configuration, and identification by that.
+    """What parameters do to the tip, configuration by configuration, and identification by that."""
 
-    Attributes
-    ----------
-    robot
-        The robot that was perturbed.
-    made
-        What each parameter does.
-    labels
-        Names of the configurations.
-    tip
-        The target whose pose is meant, or the flange.
-    identified
-        From readings; None without any.
-    notices
-        What to know about it.
-    command
-        How to run it again.
-    inputs
-        The files that were read: none of them is overwritten.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    robot: Robot
-    made: Influence
-    labels: tuple[str, ...]
-    tip: str
-    identified: Identified | None
-    notices: tuple[Notice, ...]
-    command: str
-    inputs: tuple[Path, ...] = ()
-    simulated_from: tuple[Marked, ...] = ()
+    robot: Robot  #: The robot that was perturbed.
+    made: Influence  #: What each parameter does.
+    labels: tuple[str, ...]  #: Names of the configurations.
+    tip: str  #: The target whose pose is meant, or the flange.
+    identified: Identified | None  #: From readings; None without any.
+    notices: tuple[Notice, ...]  #: What to know about it.
+    command: str  #: How to run it again.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
@@ -211,9 +175,8 @@ class InfluenceResult(Record):
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write ``influence.csv``, ``result.json`` and ``report.html`` into a folder.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
         """
         from truearm.reporting.influence_report import influence_html
 

@@ -30,35 +30,16 @@ SCHEMA: Final = "truearm-iso9283-result/1"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Iso9283Evaluation(Record):
-    """Tests of a robot's performance, evaluated.
+    """Tests of a robot's performance, evaluated."""
 
-    Attributes
-    ----------
-    plan
-        What was commanded.
-    evaluation
-        All values, and what they come from.
-    instrument
-        What is not known of its readings.
-    comparison
-        Beside another result; None without one.
-    command
-        How to run it again.
-    warnings
-        What to know about it.
-    inputs
-        The files that were read: none of them is overwritten.
-    read
-        Their names and hashes, by the parameters that named them; ``robot`` is the robot file of the plan.
-    """
-
-    plan: PerformancePlan
-    evaluation: Evaluation
-    instrument: Instrument
-    comparison: Comparison | None
-    command: str
-    warnings: tuple[Notice, ...] = ()
-    inputs: tuple[Path, ...] = ()
+    plan: PerformancePlan  #: What was commanded.
+    evaluation: Evaluation  #: All values, and what they come from.
+    instrument: Instrument  #: What is not known of its readings.
+    comparison: Comparison | None  #: Beside another result; None without one.
+    command: str  #: How to run it again.
+    warnings: tuple[Notice, ...] = ()  #: What to know about it.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    #: Their names and hashes, by the parameters that named them; ``robot`` is the robot file of the plan.
     read: Mapping[str, ReadFile] = field(default_factory=dict)
 
     @property

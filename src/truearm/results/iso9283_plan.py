@@ -24,55 +24,25 @@ PLAN_FILES: Final = (PLAN, ROBOT, SHEET)
 
 @dataclass(frozen=True, eq=False)
 class WrittenPrograms:
-    """Measuring programs of a plan.
+    """Measuring programs of a plan."""
 
-    Attributes
-    ----------
-    language
-        Its name.
-    files
-        Texts by their names in the plan's folder.
-    record
-        Text of the record of the slow run, still to be done; None where one was given.
-    count
-        How many programs they are.
-    share
-        Velocity of the slow run, in that of the robot; that of single tests may be lower.
-    """
-
-    language: str
-    files: Mapping[str, str]
-    record: str | None
-    count: int
-    share: float
+    language: str  #: Its name.
+    files: Mapping[str, str]  #: Texts by their names in the plan's folder.
+    record: str | None  #: Text of the record of the slow run, still to be done; None where one was given.
+    count: int  #: How many programs they are.
+    share: float  #: Velocity of the slow run, in that of the robot; that of single tests may be lower.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Iso9283Plan(Record):
-    """Tests of a robot's performance, planned.
+    """Tests of a robot's performance, planned."""
 
-    Attributes
-    ----------
-    plan
-        What is commanded.
-    command
-        How to run it again.
-    warnings
-        What to know about it.
-    inputs
-        The files that were read: none of them is overwritten.
-    programs
-        Measuring programs; None where they were not asked for.
-    kept
-        What all ways keep clear of, in words; nothing where no cell was stated.
-    """
-
-    plan: PerformancePlan
-    command: str
-    warnings: tuple[Notice, ...] = ()
-    inputs: tuple[Path, ...] = ()
-    programs: WrittenPrograms | None = None
-    kept: str = ""
+    plan: PerformancePlan  #: What is commanded.
+    command: str  #: How to run it again.
+    warnings: tuple[Notice, ...] = ()  #: What to know about it.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    programs: WrittenPrograms | None = None  #: Measuring programs; None where they were not asked for.
+    kept: str = ""  #: What all ways keep clear of, in words; nothing where no cell was stated.
 
     def summary(self) -> dict[str, Any]:
         """Return the plan as JSON holds it: lengths in mm, velocities and loads in percent of the rated ones."""

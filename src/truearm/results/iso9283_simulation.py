@@ -22,17 +22,10 @@ FILES: Final = ("poses.csv", "paths.csv", "settling.csv", "forces.csv", "alignme
 
 @dataclass(frozen=True)
 class StatedTie:
-    """How the instrument is said to be tied to the robot's base: what was drawn about the true tie.
+    """How the instrument is said to be tied to the robot's base: what was drawn about the true tie."""
 
-    Attributes
-    ----------
-    T_base_instrument
-        The instrument's frame in the robot's base frame.
-    sigma, sigma_rot
-        Standard deviations of each coordinate [m] and angle [rad] at the origin of the base.
-    """
-
-    T_base_instrument: Transform
+    T_base_instrument: Transform  #: The instrument's frame in the robot's base frame.
+    #: sigma, sigma_rot: standard deviations of each coordinate [m] and angle [rad] at the origin of the base.
     sigma: float
     sigma_rot: float
 
@@ -55,45 +48,19 @@ class StatedTie:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Iso9283Simulation(Record):
-    """What an instrument reads in the tests of a plan, of a robot whose truth is known.
+    """What an instrument reads in the tests of a plan, of a robot whose truth is known."""
 
-    Attributes
-    ----------
-    robot
-        Name of the nominal robot.
-    truth
-        What the robot truly is: the name of a truth, or the robot file.
-    corrected
-        The calibrated robot by which the commands were corrected; None where they were nominal.
-    campaign
-        The readings.
-    tie
-        How the instrument is tied to the base.
-    tracker
-        The instrument.
-    tests
-        Those that were run.
-    out
-        The folder of the files; None if none were written.
-    command
-        How to simulate it again.
-    inputs
-        The files that were read: none of them is overwritten.
-    warnings
-        What speaks against it.
-    """
-
-    robot: str
-    truth: str
-    corrected: str | None
-    campaign: SimulatedCampaign
-    tie: StatedTie
-    tracker: Tracker
-    tests: tuple[str, ...]
-    out: Path | None
-    command: str
-    inputs: tuple[Path, ...] = ()
-    warnings: tuple[Notice, ...] = ()
+    robot: str  #: Name of the nominal robot.
+    truth: str  #: What the robot truly is: the name of a truth, or the robot file.
+    corrected: str | None  #: The calibrated robot by which the commands were corrected; None where they were nominal.
+    campaign: SimulatedCampaign  #: The readings.
+    tie: StatedTie  #: How the instrument is tied to the base.
+    tracker: Tracker  #: The instrument.
+    tests: tuple[str, ...]  #: Those that were run.
+    out: Path | None  #: The folder of the files; None if none were written.
+    command: str  #: How to simulate it again.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    warnings: tuple[Notice, ...] = ()  #: What speaks against it.
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:

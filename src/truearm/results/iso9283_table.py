@@ -44,27 +44,13 @@ _ALL_PLACES: Final = "all poses"
 
 @dataclass(frozen=True)
 class Worst:
-    """A criterion at its worst place at the fastest velocity.
+    """A criterion at its worst place at the fastest velocity."""
 
-    Attributes
-    ----------
-    value
-        The largest of them without its sign.
-    places
-        How many there are.
-    others
-        The worst at each other velocity.
-    missing
-        Other places at that velocity that have no value.
-    faster
-        A faster planned velocity at which there is no value; None if there is none.
-    """
-
-    value: Value
-    places: int
-    others: tuple[Value, ...]
-    missing: tuple[str, ...] = ()
-    faster: float | None = None
+    value: Value  #: The largest of them without its sign.
+    places: int  #: How many there are.
+    others: tuple[Value, ...]  #: The worst at each other velocity.
+    missing: tuple[str, ...] = ()  #: Other places at that velocity that have no value.
+    faster: float | None = None  #: A faster planned velocity at which there is no value; None if there is none.
 
     @property
     def cells(self) -> tuple[str, ...]:

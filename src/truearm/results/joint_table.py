@@ -19,27 +19,14 @@ _EXPLAINED: Final = 10
 
 @dataclass(frozen=True, eq=False, repr=False)
 class JointTable(Record):
-    """Joints for poses.
+    """Joints for poses."""
 
-    Attributes
-    ----------
-    labels
-        Name of each pose.
-    solutions
-        What was found, one row a pose, or one a pose and branch.
-    warnings
-        What speaks against the calibration of the robot.
-    joints_are
-        Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    labels: tuple[str, ...]
-    solutions: JointSolutions
-    warnings: tuple[Notice, ...] = ()
+    labels: tuple[str, ...]  #: Name of each pose.
+    solutions: JointSolutions  #: What was found, one row a pose, or one a pose and branch.
+    warnings: tuple[Notice, ...] = ()  #: What speaks against the calibration of the robot.
+    #: Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
-    simulated_from: tuple[Marked, ...] = ()
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     @property
     def joints(self) -> Array:

@@ -14,15 +14,9 @@ from truearm.simulation.devices import Device
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotList(Record):
-    """The robots of the library.
+    """The robots of the library."""
 
-    Attributes
-    ----------
-    robots
-        In the order of their ids.
-    """
-
-    robots: tuple[Robot, ...]
+    robots: tuple[Robot, ...]  #: In the order of their ids.
 
     def summary(self) -> dict[str, Any]:
         """Return what is known of each, as JSON holds it."""
@@ -54,15 +48,9 @@ class RobotList(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DeviceList(Record):
-    """The instruments that can be simulated and planned for.
+    """The instruments that can be simulated and planned for."""
 
-    Attributes
-    ----------
-    devices
-        In the order of the registry.
-    """
-
-    devices: tuple[Device, ...]
+    devices: tuple[Device, ...]  #: In the order of the registry.
 
     def summary(self) -> dict[str, Any]:
         """Return name, words, deviation and source of each, as JSON holds them."""

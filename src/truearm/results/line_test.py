@@ -19,39 +19,18 @@ from truearm.writing import output_file, write_text
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LineTest(Record):
-    """A line test of a robot.
+    """A line test of a robot."""
 
-    Attributes
-    ----------
-    robot
-        The nominal robot.
-    poses
-        The poses, line after line.
-    joints
-        Joint positions to command, of the model, ``(7 k, joints)`` [rad or m].
-    compensated
-        Whether `joints` are compensated for joint errors.
-    before
-        Errors without compensation; None where nothing was measured and no truth was named.
-    after
-        Errors with compensation; None where it was not tried.
-    inputs
-        The files that were read: none of them is overwritten.
-    joints_are
-        Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    robot: Robot
-    poses: SevenLines
-    joints: Array
-    compensated: bool
-    before: LineErrors | None
-    after: LineErrors | None
-    inputs: tuple[Path, ...] = ()
+    robot: Robot  #: The nominal robot.
+    poses: SevenLines  #: The poses, line after line.
+    joints: Array  #: Joint positions to command, of the model, ``(7 k, joints)`` [rad or m].
+    compensated: bool  #: Whether `joints` are compensated for joint errors.
+    before: LineErrors | None  #: Errors without compensation; None where nothing was measured and no truth was named.
+    after: LineErrors | None  #: Errors with compensation; None where it was not tried.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    #: Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
-    simulated_from: tuple[Marked, ...] = ()
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

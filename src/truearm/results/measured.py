@@ -30,42 +30,18 @@ GOES_ON: Final = "The same command goes on there."
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Measured(Record):
-    """A plan as it was measured so far.
+    """A plan as it was measured so far."""
 
-    Attributes
-    ----------
-    title
-        What the robot is called.
-    plan
-        The plan, for messages.
-    session
-        All readings.
-    configurations
-        Those of the plan.
-    about
-        What it was measured with.
-    instrument
-        Where the readings came from, in words.
-    folder
-        In which the files are.
-    command
-        How to go on, or to write the files again.
-    told
-        What to know about how it was measured.
-    simulated
-        Whether a virtual instrument reads.
-    """
-
-    title: str
-    plan: str
-    session: Session
-    configurations: Configurations
-    about: About
-    instrument: str
-    folder: Path
-    command: str
-    told: tuple[Notice, ...] = ()
-    simulated: bool = False
+    title: str  #: What the robot is called.
+    plan: str  #: The plan, for messages.
+    session: Session  #: All readings.
+    configurations: Configurations  #: Those of the plan.
+    about: About  #: What it was measured with.
+    instrument: str  #: Where the readings came from, in words.
+    folder: Path  #: In which the files are.
+    command: str  #: How to go on, or to write the files again.
+    told: tuple[Notice, ...] = ()  #: What to know about how it was measured.
+    simulated: bool = False  #: Whether a virtual instrument reads.
 
     @property
     def data(self) -> Dataset | None:

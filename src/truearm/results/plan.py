@@ -28,45 +28,20 @@ PAGE: Final = ".html"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(Record):
-    """Configurations to measure for a calibration, in measuring order.
+    """Configurations to measure for a calibration, in measuring order."""
 
-    Attributes
-    ----------
-    made
-        What was chosen, among what, and how accurate the calibration will be.
-    command
-        How to run it again.
-    inputs
-        The files that were read: none of them is overwritten.
-    noise
-        Standard deviation of a coordinate about the model that was assumed [m].
-    joints_are
-        Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
-    accurate_at
-        Where the robot shall be accurate, in words; empty for everywhere.
-    tour
-        How the configurations are driven, each way checked; None where nothing was checked.
-    program
-        What drives it; None where no program was asked for.
-    replaced
-        What to know of another plan that it was written over.
-    told
-        What to know of what it was made with: the load, and targets that nobody said.
-    hashes
-        SHA-256 of the files that were read, by parameter.
-    """
-
-    made: MeasurementPlan
-    command: str
-    inputs: tuple[Path, ...] = ()
-    noise: float = 1e-4
+    made: MeasurementPlan  #: What was chosen, among what, and how accurate the calibration will be.
+    command: str  #: How to run it again.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    noise: float = 1e-4  #: Standard deviation of a coordinate about the model that was assumed [m].
+    #: Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
-    accurate_at: str = ""
-    tour: Tour | None = None
-    program: PlanProgram | None = None
-    replaced: tuple[Notice, ...] = ()
-    told: tuple[Notice, ...] = ()
-    hashes: Mapping[str, str] = field(default_factory=dict)
+    accurate_at: str = ""  #: Where the robot shall be accurate, in words; empty for everywhere.
+    tour: Tour | None = None  #: How the configurations are driven, each way checked; None where nothing was checked.
+    program: PlanProgram | None = None  #: What drives it; None where no program was asked for.
+    replaced: tuple[Notice, ...] = ()  #: What to know of another plan that it was written over.
+    told: tuple[Notice, ...] = ()  #: What to know of what it was made with: the load, and targets that nobody said.
+    hashes: Mapping[str, str] = field(default_factory=dict)  #: SHA-256 of the files that were read, by parameter.
 
     @property
     def joints(self) -> Array:
@@ -220,10 +195,9 @@ class Plan(Record):
 
         A plan with a program is written into a folder, with the program and a sheet for the operator.
 
-        Returns
-        -------
-        The files written; all stops on the ways are in the one that ends in ``-ways.csv``, and ``-sheet.html`` is for
-        the operator.
+        Returns:
+            The files written; all stops on the ways are in the one that ends in ``-ways.csv``, and ``-sheet.html`` is
+            for the operator.
         """
         from truearm.reporting.plan_report import plan_html
         from truearm.reporting.plan_sheet import plan_sheet

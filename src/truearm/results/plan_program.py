@@ -32,39 +32,17 @@ _BY_HAND: Final = {"FANUC LS": "Payload schedule 1", "INFORM": "Tool file 0", "V
 
 @dataclass(frozen=True, eq=False)
 class PlanProgram:
-    """A program that drives a plan.
+    """A program that drives a plan."""
 
-    Attributes
-    ----------
-    language
-        Its name.
-    files
-        Texts by their names in the folder of the plan.
-    tour
-        What it drives.
-    driving
-        How fast, and for what it waits.
-    carried
-        What it tells the controller of the tool.
-    fastest
-        Highest speed of a target or the flange [m/s].
-    mark
-        The first digits of the plan's hash, by which program and sheet name it.
-    speeds
-        How fast the joints go at 100 %, in words; empty where it is not known.
-    warnings
-        What to know about it.
-    """
-
-    language: str
-    files: Mapping[str, str]
-    tour: Tour
-    driving: Driving
-    carried: Carried
-    fastest: float
-    mark: str = ""
-    warnings: tuple[Notice, ...] = ()
-    speeds: str = ""
+    language: str  #: Its name.
+    files: Mapping[str, str]  #: Texts by their names in the folder of the plan.
+    tour: Tour  #: What it drives.
+    driving: Driving  #: How fast, and for what it waits.
+    carried: Carried  #: What it tells the controller of the tool.
+    fastest: float  #: Highest speed of a target or the flange [m/s].
+    mark: str = ""  #: The first digits of the plan's hash, by which program and sheet name it.
+    warnings: tuple[Notice, ...] = ()  #: What to know about it.
+    speeds: str = ""  #: How fast the joints go at 100 %, in words; empty where it is not known.
 
     @property
     def answer(self) -> tuple[str, ...]:

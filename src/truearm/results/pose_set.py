@@ -32,30 +32,15 @@ POSES: Final = "-poses.csv"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlannedPoses(Record):
-    """Poses of a named set.
+    """Poses of a named set."""
 
-    Attributes
-    ----------
-    robot
-        The robot that goes to them, with its targets.
-    made
-        The poses.
-    command
-        How to run it again.
-    inputs
-        The files that were read: none of them is overwritten.
-    joints_are
-        Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
-    own_target
-        Whether the robot has the target that goes to the poses, so that ``ik`` finds it.
-    """
-
-    robot: Robot
-    made: PoseSet
-    command: str
-    inputs: tuple[Path, ...] = ()
+    robot: Robot  #: The robot that goes to them, with its targets.
+    made: PoseSet  #: The poses.
+    command: str  #: How to run it again.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    #: Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
-    own_target: bool = True
+    own_target: bool = True  #: Whether the robot has the target that goes to the poses, so that ``ik`` finds it.
 
     @property
     def joints(self) -> Array:
@@ -164,9 +149,8 @@ class PlannedPoses(Record):
     def save(self, file: str | Path) -> tuple[Path, ...]:
         """Write the configurations as CSV, the poses beside them, and a page with the picture.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
         """
         table, poses, page = self.places(file)
         contents = {table.name: self.csv_text(), poses.name: self.poses_text(), page.name: self.page()}

@@ -38,30 +38,14 @@ _EXPLAINED: Final = 10
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FileCorrection(Record):
-    """One corrected file of a program.
+    """One corrected file of a program."""
 
-    Attributes
-    ----------
-    file
-        As it was found.
-    correction
-        Of the program that it is part of.
-    source
-        Which file of that program, from 0.
-    text
-        Its new bytes.
-    relative
-        Whether the errors to expect are of the targets relative to each other.
-    lower_bound
-        Whether they may be larger, for a reason that the calibration knows.
-    """
-
-    file: ProgramFile
-    correction: Correction
-    source: int
-    text: bytes
-    relative: bool = False
-    lower_bound: bool = False
+    file: ProgramFile  #: As it was found.
+    correction: Correction  #: Of the program that it is part of.
+    source: int  #: Which file of that program, from 0.
+    text: bytes  #: Its new bytes.
+    relative: bool = False  #: Whether the errors to expect are of the targets relative to each other.
+    lower_bound: bool = False  #: Whether they may be larger, for a reason that the calibration knows.
 
     @property
     def name(self) -> str:
@@ -249,19 +233,11 @@ def _shift_summary(shift: Array) -> dict[str, list[float]]:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
-    """How far a simulated robot is from each target of a program [m], ``(n,)``.
+    """How far a simulated robot is from each target of a program [m], ``(n,)``."""
 
-    Attributes
-    ----------
-    original, corrected
-        With the program as it was, and as it is now.
-    robot
-        Which robot, in words.
-    """
-
-    original: Array
+    original: Array  #: original, corrected: with the program as it was, and as it is now.
     corrected: Array
-    robot: str
+    robot: str  #: Which robot, in words.
 
     def lines(self) -> list[str]:
         """Return it in words and figures."""
@@ -276,48 +252,20 @@ class SimulatedRun:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProgramCorrection(Record):
-    """Corrected programs, ready to be written.
+    """Corrected programs, ready to be written."""
 
-    Attributes
-    ----------
-    robot
-        The calibrated robot, with the payload that holds.
-    files
-        In the order of the programs.
-    result
-        How they were corrected.
-    splits
-        How their moves are split, one a program; empty if they are not.
-    warnings
-        What to know about it.
-    command
-        How to do it again.
-    simulated
-        What a simulated robot does with the programs, where there is one.
-    inputs
-        The files that were read besides the programs: none of them is overwritten.
-    hashes
-        SHA-256 of these files, by the parameters that named them.
-    notes
-        What the user noted, by its name.
-    date
-        When they were corrected.
-    ledger
-        Where their targets are remembered beside their records; None for nowhere.
-    """
-
-    robot: Robot
-    files: tuple[FileCorrection, ...]
-    result: CorrectedPrograms
-    splits: tuple[ProgramSplit, ...]
-    warnings: tuple[Notice, ...]
-    command: str
-    simulated: SimulatedRun | None = None
-    inputs: tuple[Path, ...] = ()
-    hashes: dict[str, str] = field(default_factory=dict)
-    notes: dict[str, str] = field(default_factory=dict)
-    date: str = ""
-    ledger: Path | None = None
+    robot: Robot  #: The calibrated robot, with the payload that holds.
+    files: tuple[FileCorrection, ...]  #: In the order of the programs.
+    result: CorrectedPrograms  #: How they were corrected.
+    splits: tuple[ProgramSplit, ...]  #: How their moves are split, one a program; empty if they are not.
+    warnings: tuple[Notice, ...]  #: What to know about it.
+    command: str  #: How to do it again.
+    simulated: SimulatedRun | None = None  #: What a simulated robot does with the programs, where there is one.
+    inputs: tuple[Path, ...] = ()  #: The files that were read besides the programs: none of them is overwritten.
+    hashes: dict[str, str] = field(default_factory=dict)  #: SHA-256 of these files, by the parameters that named them.
+    notes: dict[str, str] = field(default_factory=dict)  #: What the user noted, by its name.
+    date: str = ""  #: When they were corrected.
+    ledger: Path | None = None  #: Where their targets are remembered beside their records; None for nowhere.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm."""
@@ -426,14 +374,11 @@ class ProgramCorrection(Record):
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write programs, their records and the report ``compensation.html`` into a folder, all or nothing.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
 
-        Raises
-        ------
-        InputError
-            If a file would be overwritten that was read, or that truearm has not written.
+        Raises:
+            InputError: If a file would be overwritten that was read, or that truearm has not written.
         """
         from truearm.reporting.program_report import program_html
 

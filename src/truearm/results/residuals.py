@@ -25,54 +25,30 @@ _SHOWN = 10
 
 
 class Residual(NamedTuple):
-    """One row: what was read of a target at a configuration, and by how much the prediction differs.
+    """One row: what was read of a target at a configuration, and by how much the prediction differs."""
 
-    Attributes
-    ----------
-    configuration, target
-        By their names.
-    part
-        Whether the fit has seen it: ``training`` or ``held out``.
-    kind
-        ``position`` [m], ``orientation`` [rad] or ``length`` (a distance or a height) [m].
-    error
-        Predicted minus measured, ``(3,)``: a vector in the instrument's frame (or the fixture's); for an orientation
-        the rotation vector from measured to predicted; for a length that number and two NaN.
-    norm
-        Length of it.
-    """
-
-    configuration: str
+    configuration: str  #: configuration, target: by their names.
     target: str
-    part: Part
-    kind: Kind
+    part: Part  #: Whether the fit has seen it: ``training`` or ``held out``.
+    kind: Kind  #: ``position`` [m], ``orientation`` [rad] or ``length`` (a distance or a height) [m].
+    #: Predicted minus measured, ``(3,)``: a vector in the instrument's frame (or the fixture's); for an orientation the
+    #: rotation vector from measured to predicted; for a length that number and two NaN.
     error: Array
-    norm: float
+    norm: float  #: Length of it.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Residuals(Record):
-    """What a calibrated robot leaves of every reading, in the order of the data: training first, then held out.
+    """What a calibrated robot leaves of every reading, in the order of the data: training first, then held out."""
 
-    Attributes
-    ----------
-    configuration, target, part, kind
-        Of each row, see :class:`Residual`, ``(rows,)``.
-    error
-        Predicted minus measured [m, rad], ``(rows, 3)``.
-    norm
-        Length of it [m, rad], ``(rows,)``.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
+    #: configuration, target, part, kind: of each row, see :class:`Residual`, ``(rows,)``.
     configuration: NDArray[np.str_]
     target: NDArray[np.str_]
     part: NDArray[np.str_]
     kind: NDArray[np.str_]
-    error: Array
-    norm: Array
-    simulated_from: tuple[Marked, ...] = ()
+    error: Array  #: Predicted minus measured [m, rad], ``(rows, 3)``.
+    norm: Array  #: Length of it [m, rad], ``(rows,)``.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def __len__(self) -> int:
         return len(self.norm)
@@ -112,10 +88,8 @@ class Residuals(Record):
     def to_pandas(self) -> Any:
         """Return the rows as a pandas DataFrame, the error in columns ``ex``, ``ey``, ``ez``; pandas is needed for it.
 
-        Raises
-        ------
-        ImportError
-            If pandas is not installed.
+        Raises:
+            ImportError: If pandas is not installed.
         """
         from pandas import DataFrame
 
@@ -134,10 +108,8 @@ class Residuals(Record):
 def residuals_of(parts: Iterable[tuple[Part, Dataset, Errors]]) -> Residuals:
     """Return the residuals of the parts of a campaign, readings that were not made left out.
 
-    Parameters
-    ----------
-    parts
-        Of each its name, its readings and their errors.
+    Args:
+        parts: Of each its name, its readings and their errors.
     """
     parts, names = [*parts], list[tuple[str, str, Part, Kind]]()
     errors = [np.zeros((0, 3))]

@@ -13,18 +13,10 @@ from truearm.writing import output_folder
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RestoredPrograms(Record):
-    """The originals of corrected programs, out of the records beside them.
+    """The originals of corrected programs, out of the records beside them."""
 
-    Attributes
-    ----------
-    files
-        One a program, with its original.
-    folder
-        Where the originals were written; None if they were not.
-    """
-
-    files: tuple[ProgramFile, ...]
-    folder: Path | None = None
+    files: tuple[ProgramFile, ...]  #: One a program, with its original.
+    folder: Path | None = None  #: Where the originals were written; None if they were not.
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -42,14 +34,11 @@ class RestoredPrograms(Record):
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the originals into a folder, all or nothing.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
 
-        Raises
-        ------
-        InputError
-            If a file would be overwritten that was read, or that truearm has not written.
+        Raises:
+            InputError: If a file would be overwritten that was read, or that truearm has not written.
         """
         folder = output_folder(folder)
         write_programs(folder, [file.path for file in self.files], {file.name: file.original for file in self.files})

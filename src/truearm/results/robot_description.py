@@ -22,18 +22,10 @@ from truearm.units import SHOWN_AS, from_si, written
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotDescription(Record):
-    """What is known about a robot.
+    """What is known about a robot."""
 
-    Attributes
-    ----------
-    robot
-        The robot.
-    at
-        Where it stands, if joint positions were given.
-    """
-
-    robot: Robot
-    at: ShownPose | None = None
+    robot: Robot  #: The robot.
+    at: ShownPose | None = None  #: Where it stands, if joint positions were given.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm and angles in deg."""

@@ -37,18 +37,10 @@ _HALF_A_TURN: Final = 1e-6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShownPose(Record):
-    """Where a robot stands.
+    """Where a robot stands."""
 
-    Attributes
-    ----------
-    robot
-        The robot.
-    joints
-        Joint positions of its model [rad; m for prismatic joints], ``(joints,)``.
-    """
-
-    robot: Robot
-    joints: Array
+    robot: Robot  #: The robot.
+    joints: Array  #: Joint positions of its model [rad; m for prismatic joints], ``(joints,)``.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm and angles in deg, rotation vectors in rad."""

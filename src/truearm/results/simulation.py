@@ -13,27 +13,13 @@ from truearm.shown import counted
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation(Record):
-    """What an instrument reads of a simulated robot.
+    """What an instrument reads of a simulated robot."""
 
-    Attributes
-    ----------
-    robot
-        Name of the nominal robot.
-    truth
-        What the simulated robot truly is: the name of a truth, or the robot file.
-    data
-        The readings.
-    out
-        The file that holds them; None if none was written.
-    stopped_before
-        Whether the arm stopped right before each configuration where a plan says so.
-    """
-
-    robot: str
-    truth: str
-    data: Dataset
-    out: Path | None = None
-    stopped_before: bool = False
+    robot: str  #: Name of the nominal robot.
+    truth: str  #: What the simulated robot truly is: the name of a truth, or the robot file.
+    data: Dataset  #: The readings.
+    out: Path | None = None  #: The file that holds them; None if none was written.
+    stopped_before: bool = False  #: Whether the arm stopped right before each configuration where a plan says so.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""

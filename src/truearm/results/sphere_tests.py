@@ -18,65 +18,30 @@ from truearm.writing import output_file, write_text
 
 @dataclass(frozen=True, eq=False)
 class OneSphere:
-    """The test of one target about one ball.
+    """The test of one target about one ball."""
 
-    Attributes
-    ----------
-    target
-        At which the bar is attached.
-    fixture
-        The fixed ball.
-    lengths
-        What the bar read [m], ``(n,)``.
-    left_out
-        How many configurations have no length: there the bar was beyond its range.
-    before
-        By the nominal robot; None for a robot that is not calibrated.
-    after
-        By the robot.
-    """
-
-    target: str
-    fixture: str
-    lengths: Array
-    left_out: int
-    before: SphereTest | None
-    after: SphereTest
+    target: str  #: At which the bar is attached.
+    fixture: str  #: The fixed ball.
+    lengths: Array  #: What the bar read [m], ``(n,)``.
+    left_out: int  #: How many configurations have no length: there the bar was beyond its range.
+    before: SphereTest | None  #: By the nominal robot; None for a robot that is not calibrated.
+    after: SphereTest  #: By the robot.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SphereTests(Record):
-    """Every sphere of a file of measurements.
+    """Every sphere of a file of measurements."""
 
-    Attributes
-    ----------
-    robot
-        The robot that is judged.
-    source
-        The measurements, for messages.
-    spheres
-        One for each target and ball.
-    taught
-        Name of the configuration at which the robot was taught where the ball is; None where the centre that fits best
-        was taken.
-    command
-        How to run it again.
-    warnings
-        What speaks against the calibration of the robot.
-    inputs
-        The files that were read: none of them is overwritten.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    robot: Robot
-    source: str
-    spheres: tuple[OneSphere, ...]
+    robot: Robot  #: The robot that is judged.
+    source: str  #: The measurements, for messages.
+    spheres: tuple[OneSphere, ...]  #: One for each target and ball.
+    #: Name of the configuration at which the robot was taught where the ball is; None where the centre that fits best
+    #: was taken.
     taught: str | None
-    command: str
-    warnings: tuple[Notice, ...] = ()
-    inputs: tuple[Path, ...] = ()
-    simulated_from: tuple[Marked, ...] = ()
+    command: str  #: How to run it again.
+    warnings: tuple[Notice, ...] = ()  #: What speaks against the calibration of the robot.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""

@@ -27,14 +27,10 @@ _WARNINGS: Final = (NO_GAIN, "not-better")
 class ResultKeptError(InputError):
     """A result that is not sound would have replaced a sound one; nothing was written.
 
-    Parameters
-    ----------
-    calibration
-        The new result. It can be saved in another folder.
-    standing
-        The figures of the sound one, in words.
-    folder
-        Where that is.
+    Args:
+        calibration: The new result. It can be saved in another folder.
+        standing: The figures of the sound one, in words.
+        folder: Where that is.
     """
 
     def __init__(self, calibration: Calibration, standing: str, folder: Path) -> None:
@@ -73,12 +69,9 @@ def sound_result(folder: Path) -> str | None:
 def said_of(summary: dict[str, Any], faults: Sequence[str]) -> str:
     """Return the status, what speaks against a result and its error on unseen configurations, in words.
 
-    Parameters
-    ----------
-    summary
-        As ``result.json`` begins.
-    faults
-        Codes of what speaks against it.
+    Args:
+        summary: As ``result.json`` begins.
+        faults: Codes of what speaks against it.
     """
     text = listed([summary["status"], *(fault for fault in faults if fault != summary["status"])])
     for kind in ("position_mm", "length_mm"):

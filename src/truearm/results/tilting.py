@@ -38,51 +38,21 @@ _OF_CALIBRATE: Final = ("other-model", "give-loads")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tilting(Record):
-    """What inclinometers told of the joints, and what poses told of the geometry with that held.
+    """What inclinometers told of the joints, and what poses told of the geometry with that held."""
 
-    Attributes
-    ----------
-    fit
-        The first stage: tilt, backlash and compliance of every joint.
-    robot
-        With all that was found, and what is known about it.
-    read
-        What the inclinometers read.
-    changes
-        By how much that changed within pairs.
-    mounting
-        How the instruments sit on their links.
-    pushed
-        How many configurations with poses under loads there were beside.
-    geometry
-        The second stage, with tilt, backlash and compliance held; None without poses.
-    geometry_alone
-        The same calibration without them, for comparison; None without poses.
-    notices
-        What to know about the first stage.
-    command
-        How to run it again.
-    urdf
-        The user's own URDF, if that is where the robot came from.
-    inputs
-        The files that were read: none of them is overwritten.
-    notes
-        What the user noted, by its name.
-    """
-
-    fit: TiltingFit
-    robot: Robot
-    read: Inclinations
-    changes: InclinometerReadings
-    mounting: Mounting
-    pushed: int
-    geometry: Calibration | None
-    geometry_alone: Calibration | None
-    notices: tuple[Notice, ...]
-    command: str
-    urdf: bytes | None = None
-    inputs: tuple[Path, ...] = ()
-    notes: dict[str, str] = field(default_factory=dict)
+    fit: TiltingFit  #: The first stage: tilt, backlash and compliance of every joint.
+    robot: Robot  #: With all that was found, and what is known about it.
+    read: Inclinations  #: What the inclinometers read.
+    changes: InclinometerReadings  #: By how much that changed within pairs.
+    mounting: Mounting  #: How the instruments sit on their links.
+    pushed: int  #: How many configurations with poses under loads there were beside.
+    geometry: Calibration | None  #: The second stage, with tilt, backlash and compliance held; None without poses.
+    geometry_alone: Calibration | None  #: The same calibration without them, for comparison; None without poses.
+    notices: tuple[Notice, ...]  #: What to know about the first stage.
+    command: str  #: How to run it again.
+    urdf: bytes | None = None  #: The user's own URDF, if that is where the robot came from.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    notes: dict[str, str] = field(default_factory=dict)  #: What the user noted, by its name.
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
@@ -198,9 +168,8 @@ class Tilting(Record):
 
         Where poses were given, ``geometry.html`` is the full report of the second stage.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
         """
         from truearm.modeling.formats.urdf import calibrated_urdf
         from truearm.modeling.formats.urdf_writing import urdf_text

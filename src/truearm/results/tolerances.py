@@ -13,24 +13,12 @@ from truearm.validation.tolerances import FlangeError, Tolerance
 
 @dataclass(frozen=True, eq=False, repr=False)
 class UsedTolerances(Record):
-    """What the errors of a robot's joints use of their tolerances.
+    """What the errors of a robot's joints use of their tolerances."""
 
-    Attributes
-    ----------
-    robot
-        Its name.
-    depths
-        Of the joints' holes [m].
-    joints
-        What each joint uses.
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    robot: str
-    depths: tuple[float, ...]
-    joints: tuple[Tolerance, ...]
-    simulated_from: tuple[Marked, ...] = ()
+    robot: str  #: Its name.
+    depths: tuple[float, ...]  #: Of the joints' holes [m].
+    joints: tuple[Tolerance, ...]  #: What each joint uses.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm and deg."""
@@ -58,27 +46,13 @@ class UsedTolerances(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AllowedErrors(Record):
-    """The largest error of the flange's position that tolerances allow.
+    """The largest error of the flange's position that tolerances allow."""
 
-    Attributes
-    ----------
-    robot
-        Its name.
-    configurations
-        How many were looked at.
-    angles
-        Largest angle of each joint's axis [rad].
-    errors
-        What the tolerances may do at the flange [m].
-    simulated_from
-        What of it comes from a virtual instrument.
-    """
-
-    robot: str
-    configurations: int
-    angles: tuple[float, ...]
-    errors: FlangeError
-    simulated_from: tuple[Marked, ...] = ()
+    robot: str  #: Its name.
+    configurations: int  #: How many were looked at.
+    angles: tuple[float, ...]  #: Largest angle of each joint's axis [rad].
+    errors: FlangeError  #: What the tolerances may do at the flange [m].
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm and deg."""

@@ -30,51 +30,27 @@ VALIDATION_FILES: Final = ("result.json", "report.html")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Validation(Record):
-    """Errors of a robot on measurements.
+    """Errors of a robot on measurements."""
 
-    Attributes
-    ----------
-    source
-        The measurements, for messages.
-    errors
-        Predicted minus measured, reading by reading.
-    warnings
-        What to know about them, in plain words.
-    refit
-        What was found anew from these measurements, if anything was; `errors` then judge each configuration by what is
-        found without it.
-    notes
-        What the user noted, by its name.
-    orientations
-        Orientation errors by their parts; None if no orientation was read.
-    distances
-        How far the readings lie from where the robot was calibrated; None where it does not know.
-    next
-        What to do next.
-    robot, data
-        What was compared.
-    zones
-        For each zone, and for elsewhere by an empty name, how many configurations lie in it and their mean error [m];
-        None of a robot without zones.
-    command
-        How to run it again.
-    inputs
-        The files that were read: none of them is overwritten.
-    """
-
-    source: str
-    errors: Errors
-    warnings: tuple[Notice, ...] = ()
+    source: str  #: The measurements, for messages.
+    errors: Errors  #: Predicted minus measured, reading by reading.
+    warnings: tuple[Notice, ...] = ()  #: What to know about them, in plain words.
+    #: What was found anew from these measurements, if anything was; `errors` then judge each configuration by what is
+    #: found without it.
     refit: Refit | None = None
-    notes: dict[str, str] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)  #: What the user noted, by its name.
+    #: Orientation errors by their parts; None if no orientation was read.
     orientations: OrientationErrors | None = None
+    #: How far the readings lie from where the robot was calibrated; None where it does not know.
     distances: RegionDistances | None = None
-    next: tuple[NextStep, ...] = ()
-    robot: Robot | None = None
+    next: tuple[NextStep, ...] = ()  #: What to do next.
+    robot: Robot | None = None  #: robot, data: what was compared.
     data: Dataset | None = None
+    #: For each zone, and for elsewhere by an empty name, how many configurations lie in it and their mean error [m];
+    #: None of a robot without zones.
     zones: dict[str, tuple[int, float]] | None = None
-    command: str = ""
-    inputs: tuple[Path, ...] = ()
+    command: str = ""  #: How to run it again.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
 
     @property
     def position(self) -> Spread | None:
@@ -147,9 +123,8 @@ class Validation(Record):
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write ``result.json`` and ``report.html`` into a folder.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
         """
         from truearm.reporting.validation_report import validation_html
 

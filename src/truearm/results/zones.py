@@ -24,21 +24,11 @@ def robot_file_of(name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class ZoneChoice:
-    """What became of the zones that were tried.
+    """What became of the zones that were tried."""
 
-    Attributes
-    ----------
-    verdicts
-        One for each.
-    overlap
-        How far beyond its box a zone took training configurations [m].
-    whole, zoned
-        Mean held-out error with the model of the whole alone, and with the kept zones [m].
-    """
-
-    verdicts: tuple[ZoneVerdict, ...]
-    overlap: float
-    whole: float
+    verdicts: tuple[ZoneVerdict, ...]  #: One for each.
+    overlap: float  #: How far beyond its box a zone took training configurations [m].
+    whole: float  #: whole, zoned: mean held-out error with the model of the whole alone, and with the kept zones [m].
     zoned: float
 
     @property
@@ -99,12 +89,9 @@ def _words(verdict: ZoneVerdict) -> str:
 def zone_files(choice: ZoneChoice | None, whole: Robot, robot_of: Callable[[ZoneVerdict], Robot]) -> dict[str, str]:
     """Return the files of the zones that are kept, by name: the robots, and the file that names them.
 
-    Parameters
-    ----------
-    whole
-        The robot of the whole workspace, in calibrated.yaml.
-    robot_of
-        Returns the sealed robot of a zone.
+    Args:
+        whole: The robot of the whole workspace, in calibrated.yaml.
+        robot_of: Returns the sealed robot of a zone.
     """
     if choice is None or not choice.kept:
         return {}

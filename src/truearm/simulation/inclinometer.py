@@ -37,19 +37,13 @@ def inclinations(
     across it in full; one near the vertical hardly sees it. Differences between configurations are free of how the
     instrument sits on its link as long as the link turns little between them.
 
-    Parameters
-    ----------
-    noise
-        Standard deviation of each reading [rad].
-    resolution
-        Readings are whole multiples of it [rad], unless it is zero.
-    conditions
-        See :class:`Conditions`.
+    Args:
+        noise: Standard deviation of each reading [rad].
+        resolution: Readings are whole multiples of it [rad], unless it is zero.
+        conditions: See :class:`Conditions`.
 
-    Returns
-    -------
-    inclinations
-        ``(n, links, 3)`` [rad].
+    Returns:
+        inclinations: ``(n, links, 3)`` [rad].
     """
     down = np.array(twin.robot.gravity) / np.linalg.norm(twin.robot.gravity)
     links = np.array([posture.links for posture in twin.postures(joints, **conditions)])
@@ -64,12 +58,9 @@ def read_pairs(
 ) -> Inclinations:
     """Return what inclinometers on all links of a twin read at the postures of pairs, in turn.
 
-    Parameters
-    ----------
-    resolution
-        Of each reading [rad].
-    axes
-        Which axes of the link each of them has: 0, 1 and 2 for x, y and z.
+    Args:
+        resolution: Of each reading [rad].
+        axes: Which axes of the link each of them has: 0, 1 and 2 for x, y and z.
     """
     joints, wrench = pairs.joints_in_turn()
     count, links = len(joints), len(twin.robot.joints)
@@ -95,10 +86,8 @@ def compare(
 ) -> InclinometerReadings:
     """Return by how much inclinometers on the links of a twin change their readings between postures.
 
-    Parameters
-    ----------
-    resolution, noise
-        Of each reading [rad]; see :func:`inclinations`.
+    Args:
+        resolution, noise: Of each reading [rad]; see :func:`inclinations`.
     """
     joints, wrench = pairs.joints_in_turn()
     read = inclinations(twin, joints, noise, rng, resolution, wrench=wrench)

@@ -38,21 +38,16 @@ def truth_names(robot: Robot) -> tuple[str, ...]:
 def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator) -> Twin:
     """Return the twin of a robot.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot.
-    truth
-        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; ``gear-errors`` and
-        ``tooth-errors``, the same with errors of encoders and gears (:mod:`truearm.simulation.gear_errors`); the name
-        of one of the robot file's truths; or a robot or its file, whose own base and targets are used if it has any.
-    rng
-        For what is drawn.
+    Args:
+        robot: The nominal robot.
+        truth: ``nominal``; ``random``, geometry and joint zeros drawn from their priors; ``gear-errors`` and
+            ``tooth-errors``, the same with errors of encoders and gears (:mod:`truearm.simulation.gear_errors`); the
+            name of one of the robot file's truths; or a robot or its file, whose own base and targets are used if it
+            has any.
+        rng: For what is drawn.
 
-    Raises
-    ------
-    InputError
-        If there is no such truth, or the file is of another kind of robot.
+    Raises:
+        InputError: If there is no such truth, or the file is of another kind of robot.
     """
     tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
     if isinstance(truth, Robot):
@@ -108,10 +103,8 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
     The twin computes every effect a second time, on a path of its own, so that one can be held against the other. What
     it knows is therefore named here parameter by parameter, and not taken from the effects.
 
-    Raises
-    ------
-    InputError
-        If the robot has an effect that the twin does not compute.
+    Raises:
+        InputError: If the robot has an effect that the twin does not compute.
     """
     values = robot.values
     known = {

@@ -71,30 +71,19 @@ class Conditions(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """Where a twin truly stands.
+    """Where a twin truly stands."""
 
-    Attributes
-    ----------
-    links
-        Frame of each link behind the tilt of its joint, in the base ``(joints, 4, 4)``.
-    targets
-        ``T_world_target`` ``(4, 4)`` of every target.
-    loads
-        Force [N] and moment [N m] ``(joints, 6)`` that everything beyond a joint puts on it: weight, inertia and the
-        wrench on the flange. Its sign is the load's: a compliant joint gives way in its direction. It is taken about
-        the joint's bearing in the joint's axes: z along the joint, x and y of the frame right behind its own element
-        (of Rz(theta) for DH), before the tilt; joints that are not about their frame's z have some x and y across it.
-    deflection
-        What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
-        3)``.
-    wrench
-        External force [N] and moment about the flange's origin [N m] on the flange, in base axes, ``(6,)``.
-    """
-
-    links: Array
-    targets: Mapping[str, Array]
+    links: Array  #: Frame of each link behind the tilt of its joint, in the base ``(joints, 4, 4)``.
+    targets: Mapping[str, Array]  #: ``T_world_target`` ``(4, 4)`` of every target.
+    #: Force [N] and moment [N m] ``(joints, 6)`` that everything beyond a joint puts on it: weight, inertia and the
+    #: wrench on the flange. Its sign is the load's: a compliant joint gives way in its direction. It is taken about the
+    #: joint's bearing in the joint's axes: z along the joint, x and y of the frame right behind its own element (of
+    #: Rz(theta) for DH), before the tilt; joints that are not about their frame's z have some x and y across it.
     loads: Array
+    #: What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
+    #: 3)``.
     deflection: Array
+    #: External force [N] and moment about the flange's origin [N m] on the flange, in base axes, ``(6,)``.
     wrench: Array
 
     def of_row(self, row: int) -> Posture:
@@ -110,21 +99,12 @@ class Posture:
 
 @dataclass(frozen=True)
 class Twin:
-    """A true robot.
+    """A true robot."""
 
-    Attributes
-    ----------
-    robot
-        True parameter values, true base, true targets, masses, payload and gravity.
-    joints
-        The truth about joints and links, by joint number; a joint that is left out is perfect.
-    contact
-        How clearance tilt follows from the moments.
-    """
-
-    robot: Robot
+    robot: Robot  #: True parameter values, true base, true targets, masses, payload and gravity.
+    #: The truth about joints and links, by joint number; a joint that is left out is perfect.
     joints: Mapping[int, JointTruth] = field(default_factory=dict)
-    contact: Contact = "exact"
+    contact: Contact = "exact"  #: How clearance tilt follows from the moments.
 
     def __post_init__(self) -> None:
         count = len(self.robot.joints)
@@ -152,10 +132,8 @@ class Twin:
         turn by ``Rx Ry``. Moments are those of the arm as it has given way: deflections are found again until none
         changes by more than 1e-13 rad. A backlash may not come to rest, then the 50th round stays.
 
-        Raises
-        ------
-        InputError
-            If joints or conditions have another shape.
+        Raises:
+            InputError: If joints or conditions have another shape.
         """
         n, count = len(joints), len(self.robot.joints)
         rest = np.zeros((n, count))

@@ -31,33 +31,16 @@ class Link:
     """One link: the way to its joint, the joint, the way on to the link's frame.
 
     Where the arm is warmer at one configuration than at another, `before`, `after` and `zero` have a row for each.
-
-    Attributes
-    ----------
-    before, after
-        Matrices that no joint changes ``(4, 4)`` or ``(n, 4, 4)``.
-    generator
-        Derivative of the joint's matrix by its variable at zero ``(4, 4)``.
-    square
-        That derivative times itself ``(4, 4)``.
-    turns
-        Whether the joint turns.
-    zero
-        Value of the joint's own element [rad or m], or ``(n,)`` of them.
-    axes
-        The joint's axes in the frame behind its element, z along the joint, at its bearing ``(4, 4)``.
-    body
-        Second moments of the link's masses in the link's frame ``(4, 4)``.
     """
 
-    before: Array
-    generator: Array
-    square: Array
-    turns: bool
-    zero: float | Array
-    axes: Array
+    before: Array  #: before, after: matrices that no joint changes ``(4, 4)`` or ``(n, 4, 4)``.
+    generator: Array  #: Derivative of the joint's matrix by its variable at zero ``(4, 4)``.
+    square: Array  #: That derivative times itself ``(4, 4)``.
+    turns: bool  #: Whether the joint turns.
+    zero: float | Array  #: Value of the joint's own element [rad or m], or ``(n,)`` of them.
+    axes: Array  #: The joint's axes in the frame behind its element, z along the joint, at its bearing ``(4, 4)``.
     after: Array
-    body: Array
+    body: Array  #: Second moments of the link's masses in the link's frame ``(4, 4)``.
 
     @classmethod
     def made_of(
@@ -164,12 +147,9 @@ def moved(T: Moving, link: Link, variable: Array, velocity: Array, acceleration:
 def weight(bodies: Array, T: Moving, gravity: Array) -> Array:
     """Return weight and inertial forces on bodies: the sum of ``p f^T`` over the points of each ``(n, bodies, 4, 4)``.
 
-    Parameters
-    ----------
-    bodies
-        Second moments ``(bodies, 4, 4)``.
-    T
-        Their frames with first and second derivative, ``(3, n, bodies, 4, 4)``, or alone, ``(1, n, bodies, 4, 4)``.
+    Args:
+        bodies: Second moments ``(bodies, 4, 4)``.
+        T: Their frames with first and second derivative, ``(3, n, bodies, 4, 4)``, or alone, ``(1, n, bodies, 4, 4)``.
     """
     pull = -T[2] if len(T) > 1 else np.zeros(T.shape[1:])
     pull[..., :3, 3] += gravity
@@ -201,12 +181,9 @@ def forces_on_tool(wrench: Wrench, flange: Array, turned: Array) -> Array:
 
     A force at a point is ``x f^T`` of that point; a moment is half a couple ``d f^T - f d^T`` of unit arms d across it.
 
-    Parameters
-    ----------
-    flange
-        Frame of the flange ``(4, 4)``.
-    turned
-        Axes that force and moment are given in, ``(3, 3)``; for those of the tool they are turned with it.
+    Args:
+        flange: Frame of the flange ``(4, 4)``.
+        turned: Axes that force and moment are given in, ``(3, 3)``; for those of the tool they are turned with it.
     """
     place = flange @ wrench.tool.matrix
     axes = place[:3, :3] if wrench.frame == "tool" else turned

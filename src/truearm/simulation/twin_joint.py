@@ -24,56 +24,36 @@ class JointTruth:
 
     Loads are moments about the joint's axis [N m], or forces along it [N] for a prismatic joint, which then deflects
     in metres.
-
-    Attributes
-    ----------
-    compliance, quadratic, cubic
-        Deflection per load M, per M|M| and per M^3 [rad/(N m)] and so on; hardening is negative.
-    backlash
-        What a dial shows when the load changes its sign, the full gap [rad]: half of it on either side
-        (Patel, equation 5.19, whose text measures the gap by such a reversal).
-    clearance
-        How far the shaft can tilt in its housing from the middle [rad] (Patel, equation 4.11).
-    gear
-        Run-out of the gear: harmonic (1 for one sine a turn), amplitude [rad] and phase [rad] of each sine.
-    teeth
-        Errors that rise and fall in straight lines: periods in a turn, amplitude and phase [rad] of each triangle.
-    bumps
-        Places of a turn at which something is worn or dirty: middle [rad], half of its width [rad], height [rad].
-    bearing
-        Tilt of the shaft per moment across the axis [rad/(N m)]: bearings that give way.
-    hysteresis
-        What the joint turns too far [rad] when its last move was forward, and too little when it was backward.
-    growth
-        Thermal growth of the lengths of the link behind the joint [1/K].
-    warm_up
-        Share by which those lengths are shorter when a campaign begins than when the arm is warm.
     """
 
+    #: compliance, quadratic, cubic: deflection per load M, per M|M| and per M^3 [rad/(N m)] and so on; hardening is
+    #: negative.
     compliance: float = 0.0
     quadratic: float = 0.0
     cubic: float = 0.0
+    #: What a dial shows when the load changes its sign, the full gap [rad]: half of it on either side (Patel, equation
+    #: 5.19, whose text measures the gap by such a reversal).
     backlash: float = 0.0
-    clearance: float = 0.0
-    bearing: float = 0.0
+    clearance: float = 0.0  #: How far the shaft can tilt in its housing from the middle [rad] (Patel, equation 4.11).
+    bearing: float = 0.0  #: Tilt of the shaft per moment across the axis [rad/(N m)]: bearings that give way.
+    #: Run-out of the gear: harmonic (1 for one sine a turn), amplitude [rad] and phase [rad] of each sine.
     gear: tuple[tuple[int, float, float], ...] = ()
+    #: Errors that rise and fall in straight lines: periods in a turn, amplitude and phase [rad] of each triangle.
     teeth: tuple[tuple[int, float, float], ...] = ()
+    #: Places of a turn at which something is worn or dirty: middle [rad], half of its width [rad], height [rad].
     bumps: tuple[tuple[float, float, float], ...] = ()
+    #: What the joint turns too far [rad] when its last move was forward, and too little when it was backward.
     hysteresis: float = 0.0
-    growth: float = 0.0
-    warm_up: float = 0.0
+    growth: float = 0.0  #: Thermal growth of the lengths of the link behind the joint [1/K].
+    warm_up: float = 0.0  #: Share by which those lengths are shorter when a campaign begins than when the arm is warm.
 
     def turn(self, position: Array | float, approach: Array | float, load: Array | float) -> Array:
         """Return what the joint turns, or slides, beyond its commanded positions ``(n,)`` [rad or m].
 
-        Parameters
-        ----------
-        position
-            [rad or m], ``(n,)``.
-        approach
-            Direction of the last move, +1 or -1, 0 if it is not known, ``(n,)``.
-        load
-            Moment about the axis [N m], or force along it [N], ``(n,)``.
+        Args:
+            position: [rad or m], ``(n,)``.
+            approach: Direction of the last move, +1 or -1, 0 if it is not known, ``(n,)``.
+            load: Moment about the axis [N m], or force along it [N], ``(n,)``.
         """
         geared = sum((amplitude * np.sin(k * position + phase) for k, amplitude, phase in self.gear), np.zeros(()))
         geared = sum((size * _triangle(k * position + phase) for k, size, phase in self.teeth), geared)

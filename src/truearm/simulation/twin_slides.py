@@ -20,16 +20,11 @@ _ALIKE: Final = 1.0 - 1e-12
 def carried(elements: Sequence[Element], place: int, direction: Array, values: Mapping[str, float]) -> float:
     """Return how far a place was carried along a direction [m].
 
-    Parameters
-    ----------
-    elements
-        Of all links, one behind the other.
-    place
-        Between the elements before this number and those from it on.
-    direction
-        Unit vector ``(3,)`` in the frame there, along the axis of a joint.
-    values
-        What the parameters are.
+    Args:
+        elements: Of all links, one behind the other.
+        place: Between the elements before this number and those from it on.
+        direction: Unit vector ``(3,)`` in the frame there, along the axis of a joint.
+        values: What the parameters are.
     """
     ahead = [e for e, along in _reached(elements, place, direction, forward=True) if abs(along) > _ALIKE]
     if not ahead:

@@ -50,33 +50,20 @@ class VirtualInstrument:
     a real instrument. What it reads depends on the seed and on how many readings there are, so measuring
     that was stopped goes on as if it had not been.
 
-    Parameters
-    ----------
-    device
-        One of ``VIRTUAL``.
-    twin
-        The true robot where the device sees it, with its targets.
-    placed
-        The nominal robot at the same place, for the line of sight.
-    joints
-        Of the plan, as the model counts them [rad or m], ``(n, joints)``.
-    nests
-        Names of fixed points; they stand about the base.
-    seed
-        Of all that is drawn.
-    disturbed
-        Share of the readings with a broken beam, an arm that still moves, or too much scatter.
-    drift
-        How far the instrument has moved at the last configuration [m], evenly over the plan.
-    sigma
-        Standard deviation of a coordinate of a reading [m]; the device's if None.
-    before
-        Where the arm stops right before each configuration, as `joints`; None if it comes from the one before.
+    Args:
+        device: One of ``VIRTUAL``.
+        twin: The true robot where the device sees it, with its targets.
+        placed: The nominal robot at the same place, for the line of sight.
+        joints: Of the plan, as the model counts them [rad or m], ``(n, joints)``.
+        nests: Names of fixed points; they stand about the base.
+        seed: Of all that is drawn.
+        disturbed: Share of the readings with a broken beam, an arm that still moves, or too much scatter.
+        drift: How far the instrument has moved at the last configuration [m], evenly over the plan.
+        sigma: Standard deviation of a coordinate of a reading [m]; the device's if None.
+        before: Where the arm stops right before each configuration, as `joints`; None if it comes from the one before.
 
-    Attributes
-    ----------
-    hides
-        What stands between it and each nest, in words, at each configuration: a nest that is not named is seen.
+    Attributes:
+        hides: What stands between it and each nest, in words, at each configuration: a nest that is not named is seen.
     """
 
     kind: Final = "virtual"
@@ -198,10 +185,8 @@ class VirtualInstrument:
 def virtual_device(name: str) -> Device:
     """Return a device that can measure a plan virtually.
 
-    Raises
-    ------
-    InputError
-        If there is none of this name, or it does not go through a plan: then the postures are its own.
+    Raises:
+        InputError: If there is none of this name, or it does not go through a plan: then the postures are its own.
     """
     if name in VIRTUAL:
         return VIRTUAL[name]

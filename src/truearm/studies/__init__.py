@@ -22,21 +22,11 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Entry:
-    """A study in the list.
+    """A study in the list."""
 
-    Attributes
-    ----------
-    name
-        As the command line spells it.
-    about
-        What it does, in a few words.
-    files
-        Measured data that its folder must hold; none for a study on digital twins.
-    """
-
-    name: str
-    about: str
-    files: tuple[str, ...] = ()
+    name: str  #: As the command line spells it.
+    about: str  #: What it does, in a few words.
+    files: tuple[str, ...] = ()  #: Measured data that its folder must hold; none for a study on digital twins.
 
     @property
     def module(self) -> str:
@@ -104,21 +94,14 @@ STUDIES: Final = (
 def run_study(name: str, seeds: int = 10, data: str | Path | None = None, progress: Progress = lambda _: None) -> Study:
     """Run a study.
 
-    Parameters
-    ----------
-    name
-        One of :data:`STUDIES`.
-    seeds
-        How often to do it anew, with seeds 0, 1, 2 and so on.
-    data
-        Folder of the measured data, for a study that needs them.
-    progress
-        Called with a few words at each step.
+    Args:
+        name: One of :data:`STUDIES`.
+        seeds: How often to do it anew, with seeds 0, 1, 2 and so on.
+        data: Folder of the measured data, for a study that needs them.
+        progress: Called with a few words at each step.
 
-    Raises
-    ------
-    InputError
-        If there is no such study, or its data are missing, or it needs none.
+    Raises:
+        InputError: If there is no such study, or its data are missing, or it needs none.
     """
     entry = _entry(name)
     study = import_module(entry.module).study

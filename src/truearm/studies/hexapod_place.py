@@ -19,14 +19,10 @@ _DOWN: Final = np.diag([1.0, -1.0, -1.0])
 def fixture_at(centre: tuple[float, float, float], turn: float, tilt: float = 0.0, towards: float = 0.0) -> Transform:
     """Return the fixture whose triangle has its centre at a point.
 
-    Parameters
-    ----------
-    centre
-        In the robot's base frame [m].
-    turn
-        About its own normal [deg].
-    tilt, towards
-        How far the normal leans from the vertical, and in which direction [deg].
+    Args:
+        centre: In the robot's base frame [m].
+        turn: About its own normal [deg].
+        tilt, towards: How far the normal leans from the vertical, and in which direction [deg].
     """
     lean = _turned_about_z(towards) @ _turned_about_y(tilt) @ _turned_about_z(turn - towards)
     middle = triangle([DEVICE.base] * 3, "B").mean(axis=0)

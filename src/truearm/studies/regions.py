@@ -12,15 +12,9 @@ from truearm.modeling.chain import Array
 
 @dataclass(frozen=True)
 class Region:
-    """A box of joint positions.
+    """A box of joint positions."""
 
-    Attributes
-    ----------
-    low, high
-        Lowest and highest position of each joint [deg].
-    """
-
-    low: tuple[float, ...]
+    low: tuple[float, ...]  #: low, high: lowest and highest position of each joint [deg].
     high: tuple[float, ...]
 
     @property

@@ -34,24 +34,12 @@ def seeds_done_by(workers: Workers | None) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Seed:
-    """One repetition of a study.
+    """One repetition of a study."""
 
-    Attributes
-    ----------
-    number
-        0, 1, 2 and so on.
-    of
-        How many seeds there are.
-    what
-        What one of them is called when progress is shown.
-    progress
-        Called with a few words at each step.
-    """
-
-    number: int
-    of: int
-    progress: Progress
-    what: str = "seed"
+    number: int  #: 0, 1, 2 and so on.
+    of: int  #: How many seeds there are.
+    progress: Progress  #: Called with a few words at each step.
+    what: str = "seed"  #: What one of them is called when progress is shown.
 
     def generator(self) -> np.random.Generator:
         """Return the random numbers of this seed, from their beginning."""
@@ -67,21 +55,15 @@ def over_seeds(
 ) -> tuple[Outcome, ...]:
     """Do something once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How often.
-    progress
-        Called with a few words at each seed.
-    one
-        Returns the record of one seed's outcome. It may go to another process: a function of a module, perhaps with
-        arguments that it has already (``functools.partial``).
-    what
-        What one seed is called when progress is shown.
+    Args:
+        seeds: How often.
+        progress: Called with a few words at each seed.
+        one: Returns the record of one seed's outcome. It may go to another process: a function of a module, perhaps
+            with arguments that it has already (``functools.partial``).
+        what: What one seed is called when progress is shown.
 
-    Returns
-    -------
-    What `one` returned, in the order of the seeds.
+    Returns:
+        What `one` returned, in the order of the seeds.
     """
     workers = _WORKERS.get()
     if workers is not None:

@@ -25,34 +25,18 @@ STUDY_FILES = ("report.html", "study.json")
 class Row:
     """One figure, ours beside the published one.
 
-    Attributes
-    ----------
-    what, unit
-        What it is of.
-    ours
-        One value a seed; a single number is a figure that no chance enters.
-    published
-        What the document prints, with all its digits ("0.50"); None where it prints nothing.
-    source
-        Where it prints it.
-    claim
-        What is said of the printed figure.
-    explanation
-        Why it differs, or what it means, in plain words.
-
-    Raises
-    ------
-    ValueError
-        If `published` is no number.
+    Raises:
+        ValueError: If `published` is no number.
     """
 
-    what: str
+    what: str  #: what, unit: what it is of.
     unit: str
-    ours: Sequence[float] | float
+    ours: Sequence[float] | float  #: One value a seed; a single number is a figure that no chance enters.
+    #: What the document prints, with all its digits ("0.50"); None where it prints nothing.
     published: str | None = None
-    source: str = ""
-    claim: Claim = "equal"
-    explanation: str = ""
+    source: str = ""  #: Where it prints it.
+    claim: Claim = "equal"  #: What is said of the printed figure.
+    explanation: str = ""  #: Why it differs, or what it means, in plain words.
 
     def __post_init__(self) -> None:
         """Refuse a published figure that is no number."""
@@ -110,21 +94,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows that belong together.
+    """Rows that belong together."""
 
-    Attributes
-    ----------
-    title
-        Their heading.
-    words
-        What they are, in plain words.
-    rows
-        At least one.
-    """
-
-    title: str
-    words: str
-    rows: tuple[Row, ...]
+    title: str  #: Their heading.
+    words: str  #: What they are, in plain words.
+    rows: tuple[Row, ...]  #: At least one.
 
     @property
     def compares(self) -> bool:
@@ -144,40 +118,19 @@ class Picture:
 
 @dataclass(frozen=True, repr=False)
 class Study(Record):
-    """A finished study.
+    """A finished study."""
 
-    Attributes
-    ----------
-    name
-        As the command line spells it.
-    title
-        Of the report.
-    source
-        The document.
-    answer
-        What came out, in a few sentences.
-    seeds
-        How many.
-    tables, pictures
-        What was found.
-    notes
-        How it was done, and what a reader must know, one thing each.
-    files
-        What else is written, by its name: robots and readings to try on one's own.
-    command
-        How to make it again, as whoever asked for it calls it; empty if that is not known.
-    """
-
-    name: str
-    title: str
-    source: str
-    answer: str
-    seeds: int
-    tables: tuple[Table, ...]
+    name: str  #: As the command line spells it.
+    title: str  #: Of the report.
+    source: str  #: The document.
+    answer: str  #: What came out, in a few sentences.
+    seeds: int  #: How many.
+    tables: tuple[Table, ...]  #: tables, pictures: what was found.
     pictures: tuple[Picture, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  #: How it was done, and what a reader must know, one thing each.
+    #: What else is written, by its name: robots and readings to try on one's own.
     files: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
+    command: str = ""  #: How to make it again, as whoever asked for it calls it; empty if that is not known.
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:
@@ -231,9 +184,8 @@ class Study(Record):
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write ``report.html``, ``study.json`` and the study's own files into a folder.
 
-        Returns
-        -------
-        The files written.
+        Returns:
+            The files written.
         """
         folder = output_folder(folder)
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"

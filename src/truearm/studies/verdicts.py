@@ -35,24 +35,13 @@ _ROUNDING: Final = 1e-6
 class Comparison:
     """Ours beside a printed figure.
 
-    Attributes
-    ----------
-    ours
-        One value a seed; a single number is a figure that no chance enters.
-    printed
-        The figure as the document prints it, all digits: "0.50" is not "0.5".
-    claim
-        What is said of it.
-
-    Raises
-    ------
-    ValueError
-        If `printed` is no number, or is zero where an order is claimed.
+    Raises:
+        ValueError: If `printed` is no number, or is zero where an order is claimed.
     """
 
-    ours: Sequence[float] | float
-    printed: str
-    claim: Claim = "equal"
+    ours: Sequence[float] | float  #: One value a seed; a single number is a figure that no chance enters.
+    printed: str  #: The figure as the document prints it, all digits: "0.50" is not "0.5".
+    claim: Claim = "equal"  #: What is said of it.
 
     def __post_init__(self) -> None:
         """Refuse what cannot be compared."""

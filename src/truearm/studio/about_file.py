@@ -42,15 +42,11 @@ ENTRIES: Final[dict[str, _Entry]] = {
 def changed_about(path: Path, change: Change) -> str:
     """Return the text of a file after a change; a file that is missing is a new one.
 
-    Parameters
-    ----------
-    change
-        Called with the entries of the file and its unit of lengths, to change the entries.
+    Args:
+        change: Called with the entries of the file and its unit of lengths, to change the entries.
 
-    Raises
-    ------
-    InputError
-        If the file is no such one, or would not be one that can be used.
+    Raises:
+        InputError: If the file is no such one, or would not be one that can be used.
     """
     from ruamel.yaml import YAML
 

@@ -44,38 +44,21 @@ _ENTER: Final = (
 
 @dataclass(frozen=True)
 class Refused:
-    """A request that goes no further.
+    """A request that goes no further."""
 
-    Attributes
-    ----------
-    status
-        Of the answer.
-    why
-        In words.
-    """
-
-    status: int
-    why: str
+    status: int  #: Of the answer.
+    why: str  #: In words.
 
 
 @dataclass(frozen=True)
 class Access:
-    """Where the window is served, and to whom.
+    """Where the window is served, and to whom."""
 
-    Attributes
-    ----------
-    host, port
-        As bound.
-    token
-        What a browser must bring; None for none, on loopback alone.
-    names
-        Names and addresses by which a browser may call this machine, in lower case; the numeric addresses of a machine
-        that listens on more than loopback are all allowed.
-    """
-
-    host: str
+    host: str  #: host, port: as bound.
     port: int
-    token: str | None
+    token: str | None  #: What a browser must bring; None for none, on loopback alone.
+    #: Names and addresses by which a browser may call this machine, in lower case; the numeric addresses of a machine
+    #: that listens on more than loopback are all allowed.
     names: frozenset[str]
 
     @property
@@ -116,10 +99,8 @@ class Access:
     def refusal(self, request: Request, windows: int) -> Refused | None:
         """Return why a request goes no further; None where it may.
 
-        Parameters
-        ----------
-        windows
-            How many connections there are already.
+        Args:
+            windows: How many connections there are already.
         """
         headers = request.headers
         upgrade = [value.lower() for value in headers.get_all("Upgrade")]
@@ -212,10 +193,8 @@ def new_token() -> str:
 def listening_socket(host: str, port: int) -> socket.socket:
     """Return a socket that listens, or refuse.
 
-    Raises
-    ------
-    InputError
-        If the host is none of this machine's, or the port is taken; a free one is named.
+    Raises:
+        InputError: If the host is none of this machine's, or the port is taken; a free one is named.
     """
     try:
         family, _, _, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]

@@ -24,39 +24,23 @@ _COLOURS: Final = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Arrows:
-    """Arrows to draw.
+    """Arrows to draw."""
 
-    Attributes
-    ----------
-    segments
-        Start and end of each [m], ``(n, 2, 3)``.
-    colours
-        ``(n, 3)``, 0 to 255.
-    words
-        What must stand beside them: how much they are magnified, and how large the largest is.
-    """
-
-    segments: Array
-    colours: NDArray[np.uint8]
-    words: str
+    segments: Array  #: Start and end of each [m], ``(n, 2, 3)``.
+    colours: NDArray[np.uint8]  #: ``(n, 3)``, 0 to 255.
+    words: str  #: What must stand beside them: how much they are magnified, and how large the largest is.
 
 
 def error_arrows(points: Array, errors: Array, factor: float, lightest: float | None = None) -> Arrows:
     """Return arrows of errors, at the points where they were found.
 
-    Parameters
-    ----------
-    points, errors
-        ``(n, 3)`` [m]; rows with a NaN are left out.
-    factor
-        By how much they are magnified, 1 to 2000.
-    lightest
-        Size that has the lightest colour [m]; None for the largest of them.
+    Args:
+        points, errors: ``(n, 3)`` [m]; rows with a NaN are left out.
+        factor: By how much they are magnified, 1 to 2000.
+        lightest: Size that has the lightest colour [m]; None for the largest of them.
 
-    Raises
-    ------
-    InputError
-        If the factor is beyond that.
+    Raises:
+        InputError: If the factor is beyond that.
     """
     times = finite_number(factor, "factor")
     if not FACTORS[0] <= times <= FACTORS[1]:

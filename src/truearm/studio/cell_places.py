@@ -29,23 +29,13 @@ _CELL: Final = "-cell"
 
 @dataclass(frozen=True)
 class Thing:
-    """A target or a fixture.
+    """A target or a fixture."""
 
-    Attributes
-    ----------
-    name
-        As data call it.
-    kind
-        What it is.
-    place
-        x, y and z [mm]: of a target on the flange, of a fixture in the instrument's frame.
-    turns
-        About the fixed axes x, y and z in turn [deg]; z of a plane is its normal. A point and a target have none.
-    """
-
-    name: str
-    kind: ThingKind
+    name: str  #: As data call it.
+    kind: ThingKind  #: What it is.
+    #: x, y and z [mm]: of a target on the flange, of a fixture in the instrument's frame.
     place: Numbers = (0.0, 0.0, 0.0)
+    #: About the fixed axes x, y and z in turn [deg]; z of a plane is its normal. A point and a target have none.
     turns: Numbers = (0.0, 0.0, 0.0)
 
     @property
@@ -66,10 +56,8 @@ def numbers_of(place: Transform) -> tuple[Numbers, Numbers]:
 def place_of(place: Numbers, turns: Numbers, where: str) -> Transform:
     """Return the frame that such numbers say.
 
-    Raises
-    ------
-    InputError
-        If one is none, or out of all bounds.
+    Raises:
+        InputError: If one is none, or out of all bounds.
     """
     metres = np.array([sized_si(value, "mm", where) for value in place])
     angles = np.array([[sized_si(value, "deg", where) for value in turns]])
@@ -99,17 +87,12 @@ def with_base(robot: Robot, place: Numbers, turns: Numbers) -> Robot:
 def with_thing(robot: Robot, thing: Thing | None, before: str | None = None) -> Robot:
     """Return a robot with another target or fixture.
 
-    Parameters
-    ----------
-    thing
-        The new one; None where one is taken away.
-    before
-        What is changed or taken away, by its name; None for nothing.
+    Args:
+        thing: The new one; None where one is taken away.
+        before: What is changed or taken away, by its name; None for nothing.
 
-    Raises
-    ------
-    InputError
-        If its name is taken, or a number is none.
+    Raises:
+        InputError: If its name is taken, or a number is none.
     """
     targets, fixtures = _targets(robot), _fixtures(robot)
     for known in (targets, fixtures):
@@ -129,10 +112,8 @@ def with_thing(robot: Robot, thing: Thing | None, before: str | None = None) -> 
 def placed_text(robot: Robot, where: str) -> str:
     """Return the robot file of a robot, after reading it again.
 
-    Raises
-    ------
-    InputError
-        If a name could not stand in it, or the robot was calibrated: where that stands was measured.
+    Raises:
+        InputError: If a name could not stand in it, or the robot was calibrated: where that stands was measured.
     """
     from ruamel.yaml import YAML
 
@@ -148,12 +129,9 @@ def placed_text(robot: Robot, where: str) -> str:
 def file_for_places(robot: str, name: str, taken: list[str]) -> str:
     """Return the name of the robot file with a cell's places: the robot's own if it is one, else a new one.
 
-    Parameters
-    ----------
-    robot, name
-        Library id or file, and the robot's name.
-    taken
-        Files that are there.
+    Args:
+        robot, name: Library id or file, and the robot's name.
+        taken: Files that are there.
     """
     stem = Path(robot.partition("#")[0]).stem
     if robot in taken and (stem.endswith(_CELL) or stem.rpartition("-")[0].endswith(_CELL)):

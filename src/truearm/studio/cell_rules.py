@@ -28,34 +28,22 @@ _RANGE: Final = "LOW..HIGH in mm, both with a decimal point; or an empty field w
 
 @dataclass(frozen=True, eq=False)
 class CellRules:
-    """What a constraints file says of the cell, as fields of a page show it.
+    """What a constraints file says of the cell, as fields of a page show it."""
 
-    Attributes
-    ----------
-    text
-        The file.
-    boxes
-        For each box its ranges x, y and z in mm, such as ``350..800``; empty where it does not end.
-    corners
-        Lowest and highest corner of each in the base frame [m], infinite where it does not end.
-    floor, clearance
-        In mm; None where nothing is said.
-    """
-
-    text: str
+    text: str  #: The file.
+    #: For each box its ranges x, y and z in mm, such as ``350..800``; empty where it does not end.
     boxes: Mapping[str, tuple[str, str, str]]
+    #: Lowest and highest corner of each in the base frame [m], infinite where it does not end.
     corners: Mapping[str, tuple[Array, Array]]
-    floor: float | None
+    floor: float | None  #: floor, clearance: in mm; None where nothing is said.
     clearance: float | None
 
 
 def read_rules(path: Path) -> CellRules:
     """Read what a constraints file says of the cell.
 
-    Raises
-    ------
-    InputError
-        If it is none, or a box has no end or a range the wrong way round.
+    Raises:
+        InputError: If it is none, or a box has no end or a range the wrong way round.
     """
     return _rules(read_text(path, "yaml_size"), read_yaml(path, Constraints), str(path))
 
@@ -63,17 +51,12 @@ def read_rules(path: Path) -> CellRules:
 def changed_rules(path: Path, robot: Robot, change: Callable[[dict[str, Any], str], None]) -> CellRules:
     """Return what a constraints file says after a change; a file that is missing is a new one.
 
-    Parameters
-    ----------
-    robot
-        Whose base no box may hold.
-    change
-        Called with the entries of the file and its unit of lengths, to change the entries.
+    Args:
+        robot: Whose base no box may hold.
+        change: Called with the entries of the file and its unit of lengths, to change the entries.
 
-    Raises
-    ------
-    InputError
-        If the file would not be one that can be used.
+    Raises:
+        InputError: If the file would not be one that can be used.
     """
     from ruamel.yaml import YAML
 
@@ -98,10 +81,8 @@ def with_box(
 ) -> Callable[[dict[str, Any], str], None]:
     """Return a change that puts a box with ranges in mm into a file.
 
-    Parameters
-    ----------
-    before
-        What the box was called; None for a new one.
+    Args:
+        before: What the box was called; None for a new one.
     """
 
     def change(content: dict[str, Any], unit: str) -> None:

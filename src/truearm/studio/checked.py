@@ -24,31 +24,16 @@ _PLACED_BY = 400
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """What a check found, and the readings that it looked at, the excluded ones too.
+    """What a check found, and the readings that it looked at, the excluded ones too."""
 
-    Attributes
-    ----------
-    outcome
-        What its command prints.
-    findings
-        Its notices, the worst first.
-    readings
-        Label of the configuration and name of the target of each reading.
-    points
-        Where the instrument saw it, in the robot's base frame as far as that is known [m], ``(readings, 3)``; NaN where
-        it read no place of its own.
-    read
-        What each reading is, as the file of excluded readings notes it.
-    joints
-        Of the model at each reading's configuration [rad or m], ``(readings, joints)``.
-    """
-
-    outcome: Outcome
-    findings: tuple[Notice, ...]
-    readings: tuple[tuple[str, str], ...]
+    outcome: Outcome  #: What its command prints.
+    findings: tuple[Notice, ...]  #: Its notices, the worst first.
+    readings: tuple[tuple[str, str], ...]  #: Label of the configuration and name of the target of each reading.
+    #: Where the instrument saw it, in the robot's base frame as far as that is known [m], ``(readings, 3)``; NaN where
+    #: it read no place of its own.
     points: Array
-    read: tuple[Read, ...]
-    joints: Array
+    read: tuple[Read, ...]  #: What each reading is, as the file of excluded readings notes it.
+    joints: Array  #: Of the model at each reading's configuration [rad or m], ``(readings, joints)``.
 
     def rows_of(self, named: tuple[tuple[str, str], ...]) -> NDArray[np.intp]:
         """Return which readings are named; an empty target names all of its configuration."""
@@ -102,15 +87,11 @@ def with_exclusions(
 ) -> tuple[Exclusion, ...]:
     """Return excluded readings with some more; those that are excluded already keep their reason.
 
-    Parameters
-    ----------
-    named
-        Of the further ones, as :meth:`Checked.named` returns them.
+    Args:
+        named: Of the further ones, as :meth:`Checked.named` returns them.
 
-    Raises
-    ------
-    InputError
-        If no reason is given.
+    Raises:
+        InputError: If no reason is given.
     """
     text = " ".join(reason.split())
     if not text:

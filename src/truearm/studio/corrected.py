@@ -30,24 +30,13 @@ _KINEMATICS: Final = re.compile(r"^kinematics[ \t]*+:", re.M)
 
 @dataclass(frozen=True)
 class Corrected:
-    """A correction that stands in the folder, of the program that is chosen.
+    """A correction that stands in the folder, of the program that is chosen."""
 
-    Attributes
-    ----------
-    name
-        Of the corrected program, in the project.
-    files
-        The paths of the program, first the one that is chosen, and of the files that belong to it.
-    report
-        The path of its report; None where that is of another correction, or missing.
-    changed
-        What is not as it was corrected with, in words; empty if nothing is.
-    """
-
-    name: str
+    name: str  #: Of the corrected program, in the project.
+    #: The paths of the program, first the one that is chosen, and of the files that belong to it.
     files: tuple[Path, ...]
-    report: Path | None
-    changed: tuple[str, ...]
+    report: Path | None  #: The path of its report; None where that is of another correction, or missing.
+    changed: tuple[str, ...]  #: What is not as it was corrected with, in words; empty if nothing is.
 
     @property
     def told(self) -> str:
@@ -58,10 +47,8 @@ class Corrected:
     def refuse_other(self) -> None:
         """Refuse to hand out what is of another state of the project.
 
-        Raises
-        ------
-        InputError
-            With what has changed.
+        Raises:
+            InputError: With what has changed.
         """
         if self.changed:
             raise InputError(
@@ -96,10 +83,8 @@ def _is_kinematics(project: Project, name: str) -> bool:
 def corrected_now(project: Project, robots: Callable[[], tuple[Robot | None, str]]) -> Corrected | None:
     """Return the correction of the chosen program that stands in the folder; None if there is none.
 
-    Parameters
-    ----------
-    robots
-        Gives the calibrated robot, and which robot the result is of where that is not the one that is chosen.
+    Args:
+        robots: Gives the calibrated robot, and which robot the result is of where that is not the one that is chosen.
     """
     folder, program = project.file("corrected"), project.file("program")
     if folder is None or program is None or not exists(folder / program.name):

@@ -35,34 +35,20 @@ _Kind = TypeVar("_Kind", bound=_UnderConditions)
 
 @dataclass(frozen=True, eq=False)
 class CubeInSpace:
-    """What is drawn of tests, in the base frame [m].
+    """What is drawn of tests, in the base frame [m]."""
 
-    Attributes
-    ----------
-    frame
-        Edges of the cube, and of the plane in it, ``(n, 2, 3)``.
-    poses
-        Where each commanded pose is, by its name.
-    paths
-        Pieces of the commanded paths, ``(m, 2, 3)``.
-    path_errors
-        How far the barycentre of the attained paths is from each piece [m], ``(m,)``; NaN where that is not known.
-    names, commands, offsets, repeatability
-        Of the poses with a result: their names, where they are, where the barycentre of the attained poses is from
-        there, ``(k, 3)``, and RP, ``(k,)``; NaN where there is none.
-    under
-        At which velocity that was, in words; of several the fastest.
-    """
-
-    frame: Array
-    poses: Mapping[str, Array]
-    paths: Array
+    frame: Array  #: Edges of the cube, and of the plane in it, ``(n, 2, 3)``.
+    poses: Mapping[str, Array]  #: Where each commanded pose is, by its name.
+    paths: Array  #: Pieces of the commanded paths, ``(m, 2, 3)``.
+    #: How far the barycentre of the attained paths is from each piece [m], ``(m,)``; NaN where that is not known.
     path_errors: Array
+    #: names, commands, offsets, repeatability: of the poses with a result: their names, where they are, where the
+    #: barycentre of the attained poses is from there, ``(k, 3)``, and RP, ``(k,)``; NaN where there is none.
     names: tuple[str, ...] = ()
     commands: Array = field(default_factory=lambda: np.zeros((0, 3)))
     offsets: Array = field(default_factory=lambda: np.zeros((0, 3)))
     repeatability: Array = field(default_factory=lambda: np.zeros(0))
-    under: str = ""
+    under: str = ""  #: At which velocity that was, in words; of several the fastest.
 
     @property
     def accuracy(self) -> Array:

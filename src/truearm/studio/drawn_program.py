@@ -23,36 +23,20 @@ _MOVES: Final = 5000
 
 @dataclass(frozen=True, eq=False)
 class DrawnProgram:
-    """What of a program is drawn, in the robot's base frame [m].
+    """What of a program is drawn, in the robot's base frame [m]."""
 
-    Attributes
-    ----------
-    outcome
-        What the command prints that corrects it; None if it was only read.
-    names
-        Of each target, with its line.
-    tips
-        Where the controller takes the tip of each target to be, ``(n, 3)``.
-    way
-        These in the order of the moves, with rows of NaN between routines, ``(m, 3)``.
-    joints
-        That the controller commands, of the model [rad or m], ``(n, joints)``; NaN where it finds none.
-    meant, before, after
-        Where tips shall be on the real robot, and where the calibrated robot takes them with the program as it was
-        and as it is corrected, ``(n, 3)`` each; NaN for targets that were not corrected. Empty if it was only read.
-    corrected
-        Joint positions that the corrected program commands, like `joints`; empty if it was only read.
-    """
-
-    outcome: Outcome | None
-    names: tuple[str, ...]
-    tips: Array
-    way: Array
-    joints: Array
+    outcome: Outcome | None  #: What the command prints that corrects it; None if it was only read.
+    names: tuple[str, ...]  #: Of each target, with its line.
+    tips: Array  #: Where the controller takes the tip of each target to be, ``(n, 3)``.
+    way: Array  #: These in the order of the moves, with rows of NaN between routines, ``(m, 3)``.
+    joints: Array  #: That the controller commands, of the model [rad or m], ``(n, joints)``; NaN where it finds none.
+    #: meant, before, after: where tips shall be on the real robot, and where the calibrated robot takes them with the
+    #: program as it was and as it is corrected, ``(n, 3)`` each; NaN for targets that were not corrected. Empty if it
+    #: was only read.
     meant: Array
     before: Array
     after: Array
-    corrected: Array
+    corrected: Array  #: Joint positions that the corrected program commands, like `joints`; empty if it was only read.
 
     def between(self, share: float) -> Array:
         """Return how far the tips are from where they shall be, from the original program, 0, to the corrected, 1."""

@@ -22,23 +22,14 @@ _SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ErrorVectors:
-    """Errors of positions on the configurations that the fit has not seen; of all, if it has seen all.
+    """Errors of positions on the configurations that the fit has not seen; of all, if it has seen all."""
 
-    Attributes
-    ----------
-    points
-        Where the instrument saw the targets, in its frame [m], ``(readings, 3)``.
-    before, after
-        Predicted minus measured of the nominal robot, placed as well as it can be, and of the calibrated one [m],
-        ``(readings, 3)``; NaN where nothing was read.
-    held_out
-        Whether the fit has not seen them.
-    """
-
-    points: Array
+    points: Array  #: Where the instrument saw the targets, in its frame [m], ``(readings, 3)``.
+    #: before, after: predicted minus measured of the nominal robot, placed as well as it can be, and of the calibrated
+    #: one [m], ``(readings, 3)``; NaN where nothing was read.
     before: Array
     after: Array
-    held_out: bool
+    held_out: bool  #: Whether the fit has not seen them.
 
     def between(self, share: float) -> Array:
         """Return the errors on the way from before, 0, to after, 1."""
@@ -48,19 +39,14 @@ class ErrorVectors:
 def error_vectors(folder: Path, robot: str, data: str, result: str, progress: Progress, **options: Any) -> ErrorVectors:
     """Return the errors of a result in the project.
 
-    Parameters
-    ----------
-    result
-        Folder of the result.
-    options
-        Of :func:`truearm.calibrate`, those that say what it trains on, by which loss the nominal robot is placed, and
-        what it carries.
+    Args:
+        result: Folder of the result.
+        options: Of :func:`truearm.calibrate`, those that say what it trains on, by which loss the nominal robot is
+            placed, and what it carries.
 
-    Raises
-    ------
-    InputError
-        If the result is of other measurements, they were split otherwise, or it is of another robot: the errors would
-        not be those of its figures.
+    Raises:
+        InputError: If the result is of other measurements, they were split otherwise, or it is of another robot: the
+            errors would not be those of its figures.
     """
     from truearm.jobs.calibrate import calibrate
     from truearm.library import load_robot

@@ -39,10 +39,8 @@ def evaluated_with(result: ResultFile) -> str:
 def other_evaluations(result: ResultFile | None, project: Project, robot: Robot) -> list[Notice]:
     """Return what a result is not of, though it is chosen now; of no result, whether the plan is of the robot.
 
-    Parameters
-    ----------
-    robot
-        The one that is chosen.
+    Args:
+        robot: The one that is chosen.
     """
     files = project.settings.performance
     plan = None if files.plan is None else _plan(project, files.plan)

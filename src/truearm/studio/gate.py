@@ -61,30 +61,17 @@ _WORKING: Final = _FILES | frozenset(
 
 @dataclass(eq=False)
 class Gate:
-    """Decides on requests and messages, and which window works.
+    """Decides on requests and messages, and which window works."""
 
-    Attributes
-    ----------
-    access
-        Who is let in.
-    uploads
-        Takes in the files that windows send.
-    say
-        Called with every refusal in words; from the server's thread.
-    blocked
-        Called with the connection of a window of which something was refused, why, and the message, empty where it was
-        not read; from the server's thread.
-    offers
-        Elements that a window which only reads may use: those with which it takes over.
-    fits
-        Called with the number of an element and a value: whether it can have that.
-    """
-
-    access: Access
-    uploads: Uploads
-    say: Callable[[str], None] = lambda _: None
+    access: Access  #: Who is let in.
+    uploads: Uploads  #: Takes in the files that windows send.
+    say: Callable[[str], None] = lambda _: None  #: Called with every refusal in words; from the server's thread.
+    #: Called with the connection of a window of which something was refused, why, and the message, empty where it was
+    #: not read; from the server's thread.
     blocked: Callable[[ServerConnection, str, Mapping[str, Any]], None] = lambda *_: None
+    #: Elements that a window which only reads may use: those with which it takes over.
     offers: set[str] = field(default_factory=set)
+    #: Called with the number of an element and a value: whether it can have that.
     fits: Callable[[str, object], bool] = lambda *_: True
     _working: ServerConnection | None = None
     _said: dict[str, float] = field(default_factory=dict)
@@ -160,10 +147,8 @@ class Gate:
     def passes(self, connection: ServerConnection, raw: object) -> bool:
         """Return whether a message may go on to viser.
 
-        Raises
-        ------
-        ValueError
-            If it is malformed: the connection is closed then, and the window comes again by itself.
+        Raises:
+            ValueError: If it is malformed: the connection is closed then, and the window comes again by itself.
         """
         if not isinstance(raw, bytes):
             raise ValueError("a text where messages are binary")
@@ -234,10 +219,8 @@ _starting: Final = threading.Lock()
 def start_server(gate: Gate, bound: socket.socket, title: str) -> viser.ViserServer:
     """Start viser behind a gate, on a socket that listens already.
 
-    Raises
-    ------
-    RuntimeError
-        If this viser does not listen as it is relied on: then nothing is served.
+    Raises:
+        RuntimeError: If this viser does not listen as it is relied on: then nothing is served.
     """
     served = []
 

@@ -41,38 +41,22 @@ _SEEDS, _MOST, _APART = 48, 8, 0.35
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A way to reach a pose.
+    """A way to reach a pose."""
 
-    Attributes
-    ----------
-    name
-        As ``ik`` calls it.
-    joints
-        Joint positions of the model [rad or m], ``(joints,)``.
-    status
-        Whether the arm can go there.
-    """
-
-    name: str
-    joints: Array
-    status: PoseStatus
+    name: str  #: As ``ik`` calls it.
+    joints: Array  #: Joint positions of the model [rad or m], ``(joints,)``.
+    status: PoseStatus  #: Whether the arm can go there.
 
 
 class Jogging:
     """An arm at joint positions, which are kept within its limits.
 
-    Attributes
-    ----------
-    robot
-        The arm: what poses mean is computed with its parameters and joint effects.
-    joints
-        Of the model [rad or m], ``(joints,)``.
-    tip
-        Name of the target that is moved; None for the flange.
-    whose
-        Whose numbers joint positions are given in.
-    orientation
-        How much of the orientation of poses counts.
+    Attributes:
+        robot: The arm: what poses mean is computed with its parameters and joint effects.
+        joints: Of the model [rad or m], ``(joints,)``.
+        tip: Name of the target that is moved; None for the flange.
+        whose: Whose numbers joint positions are given in.
+        orientation: How much of the orientation of poses counts.
     """
 
     def __init__(self, robot: Robot, joints: Array | None = None) -> None:
@@ -135,10 +119,8 @@ class Jogging:
     def set_number(self, joint: int, number: float) -> None:
         """Move one joint, from 0, to a number of `whose` [deg or mm], as far as the limits allow.
 
-        Raises
-        ------
-        InputError
-            If it is no finite number.
+        Raises:
+            InputError: If it is no finite number.
         """
         if not math.isfinite(number):
             raise InputError("a number belongs here", where=self.robot.joints[joint].name, came=number)
@@ -149,10 +131,8 @@ class Jogging:
     def go(self, joints: Array) -> None:
         """Go to joint positions of the model ``(joints,)`` [rad or m].
 
-        Raises
-        ------
-        InputError
-            If one is beyond its limits, with those that are.
+        Raises:
+            InputError: If one is beyond its limits, with those that are.
         """
         beyond = (joints < self.low - _ROUNDING) | (joints > self.high + _ROUNDING) | ~np.isfinite(joints)
         if beyond.any():
@@ -197,10 +177,8 @@ class Jogging:
     def go_to_numbers(self, frame: JogFrame, position: tuple[float, ...], turns: tuple[float, ...]) -> PoseStatus:
         """Go to a pose as :meth:`pose_numbers` writes it, or in the tool by so much.
 
-        Raises
-        ------
-        InputError
-            If a number is not finite, or as :meth:`go_to`.
+        Raises:
+            InputError: If a number is not finite, or as :meth:`go_to`.
         """
         if not all(math.isfinite(v) for v in (*position, *turns)):
             raise InputError("a pose is six numbers", came=", ".join(f"{v:g}" for v in (*position, *turns)))
@@ -214,10 +192,8 @@ class Jogging:
     def go_to(self, position: Array, rotation: Array, frame: Frame = "base") -> PoseStatus:
         """Go to a pose of the tip, on the branch nearest to where the arm is.
 
-        Raises
-        ------
-        InputError
-            If the arm cannot be there, with what is missing; it stays where it is.
+        Raises:
+            InputError: If the arm cannot be there, with what is missing; it stays where it is.
         """
         found = inverse(
             self.robot,

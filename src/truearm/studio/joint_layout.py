@@ -41,69 +41,37 @@ class LinkLine:
     """The axes at both ends of a link, in its own frame.
 
     The frame is right behind the joint that moves the link; for the pedestal it is the base.
-
-    Attributes
-    ----------
-    axis
-        Of the joint that moves it, through the frame's origin; None for the pedestal.
-    origin, next_axis
-        A point on the next joint's axis and its direction; the flange's place, and None, for the last link.
     """
 
-    axis: Array | None
+    axis: Array | None  #: Of the joint that moves it, through the frame's origin; None for the pedestal.
+    #: origin, next_axis: a point on the next joint's axis and its direction; the flange's place, and None, for the last
+    #: link.
     origin: Array
     next_axis: Array | None
 
 
 @dataclass(frozen=True, eq=False)
 class JointPlace:
-    """Where a joint is on its axis, counted from the origin of its frame [m].
+    """Where a joint is on its axis, counted from the origin of its frame [m]."""
 
-    Attributes
-    ----------
-    slides
-        Whether it is prismatic.
-    before, behind
-        Where the link before it ends, and the link behind it begins.
-    turns_link
-        Whether it turns the links about their own length, and does not swing them.
-    radius
-        Of its drum [m].
-    reach
-        How far a prismatic joint goes from the origin of its frame [m]; zeros for others.
-    """
-
-    slides: bool
-    before: float
+    slides: bool  #: Whether it is prismatic.
+    before: float  #: before, behind: where the link before it ends, and the link behind it begins.
     behind: float
-    turns_link: bool
-    radius: float
-    reach: tuple[float, float]
+    turns_link: bool  #: Whether it turns the links about their own length, and does not swing them.
+    radius: float  #: Of its drum [m].
+    reach: tuple[float, float]  #: How far a prismatic joint goes from the origin of its frame [m]; zeros for others.
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """An arm as lines.
+    """An arm as lines."""
 
-    Attributes
-    ----------
-    lines
-        Pedestal first, then the links.
-    joints
-        From the base on.
-    feet
-        Of each link where its common normal meets the axes at its ends [m along them]; the pedestal has no first one.
-    pedestal
-        How far below the base frame the arm stands, where its base frame is in its shoulder [m].
-    length
-        Of the arm along its links [m].
-    """
-
-    lines: tuple[LinkLine, ...]
-    joints: tuple[JointPlace, ...]
+    lines: tuple[LinkLine, ...]  #: Pedestal first, then the links.
+    joints: tuple[JointPlace, ...]  #: From the base on.
+    #: Of each link where its common normal meets the axes at its ends [m along them]; the pedestal has no first one.
     feet: tuple[tuple[float, float], ...]
-    pedestal: float
-    length: float
+    pedestal: float  #: How far below the base frame the arm stands, where its base frame is in its shoulder [m].
+    length: float  #: Of the arm along its links [m].
 
 
 def layout(robot: Robot) -> Layout:

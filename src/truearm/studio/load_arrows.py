@@ -25,22 +25,15 @@ def load_arrows(robot: Robot, at: Postures, length: float) -> tuple[Arrows, list
     A positive one turns the joint forward, as of :func:`truearm.modeling.loads.joint_loads`: an arrow along the axis,
     right-handed; a negative one against it.
 
-    Parameters
-    ----------
-    robot, at
-        With what it carries, and where it stands, bent as it is.
-    length
-        Of the arm [m]; the longest arrow is drawn by it.
+    Args:
+        robot, at: With what it carries, and where it stands, bent as it is.
+        length: Of the arm [m]; the longest arrow is drawn by it.
 
-    Returns
-    -------
-    arrows, told
-        In the world, and the figures joint by joint.
+    Returns:
+        arrows, told: In the world, and the figures joint by joint.
 
-    Raises
-    ------
-    InputError
-        If nothing loads the joints.
+    Raises:
+        InputError: If nothing loads the joints.
     """
     if not has_weight(robot):
         raise InputError(

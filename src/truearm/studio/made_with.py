@@ -24,32 +24,17 @@ _SAME: Final = 1e-12
 
 @dataclass(frozen=True)
 class MadeWith:
-    """What a result was made of and with.
+    """What a result was made of and with."""
 
-    Attributes
-    ----------
-    robot
-        The calibrated one; None if it is not there.
-    model
-        By its name, with joint effects that were added.
-    data
-        Name of the file of measurements; None if the history of the result is written otherwise, and so for the rest.
-    train, configurations
-        How many it was trained on, of how many.
-    seed, loss
-        As for :func:`truearm.calibrate`.
-    excluded
-        How many readings were excluded.
-    """
-
-    robot: Robot | None
-    model: str
+    robot: Robot | None  #: The calibrated one; None if it is not there.
+    model: str  #: By its name, with joint effects that were added.
+    #: Name of the file of measurements; None if the history of the result is written otherwise, and so for the rest.
     data: str | None
-    train: int
+    train: int  #: train, configurations: how many it was trained on, of how many.
     configurations: int
-    seed: int
+    seed: int  #: seed, loss: as for :func:`truearm.calibrate`.
     loss: str
-    excluded: int
+    excluded: int  #: How many readings were excluded.
 
     def line(self) -> str:
         """Return all of it in one line."""
@@ -66,10 +51,8 @@ class MadeWith:
     def differing(self, settings: Settings, robot: Robot) -> dict[str, tuple[str, str]]:
         """Return what differs from what is chosen now: by its name, what it was and what it is.
 
-        Parameters
-        ----------
-        robot
-            The one that is chosen, with the payload of the settings.
+        Args:
+            robot: The one that is chosen, with the payload of the settings.
         """
         found: dict[str, tuple[object, object]] = {"model": (self.model, settings.model)}
         if self.data is not None:
@@ -95,12 +78,9 @@ class MadeWith:
 def made_with(result: dict[str, Any], robot: Robot | None) -> MadeWith:
     """Return what a result was made of and with.
 
-    Parameters
-    ----------
-    result
-        The file result.json.
-    robot
-        The calibrated one of the same folder.
+    Args:
+        result: The file result.json.
+        robot: The calibrated one of the same folder.
     """
     excluded = sum(int(one["readings"]) for one in result.get("excluded", ()))
     found = _HISTORY.search(str(result.get("history", "")))

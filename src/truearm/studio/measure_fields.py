@@ -62,10 +62,8 @@ class MeasureFields(BaseModel):
     def planned(self) -> str:
         """Return the name of the plan.
 
-        Raises
-        ------
-        InputError
-            If none is chosen.
+        Raises:
+            InputError: If none is chosen.
         """
         if self.plan is None:
             raise InputError(
@@ -76,15 +74,11 @@ class MeasureFields(BaseModel):
     def said(self, payload: str | None) -> dict[str, Any]:
         """Return what is given to the command beside plan, robot and folder, by names of parameters, in its order.
 
-        Parameters
-        ----------
-        payload
-            What a virtual robot carries, as the job takes it.
+        Args:
+            payload: What a virtual robot carries, as the job takes it.
 
-        Raises
-        ------
-        InputError
-            If a folder shall be watched, and none is named.
+        Raises:
+            InputError: If a folder shall be watched, and none is named.
         """
         if self.source == "watched folder" and self.watch is None:
             raise InputError(
@@ -118,10 +112,8 @@ def names_of(text: str | None) -> tuple[str, ...] | None:
 def measure_arguments(said: dict[str, Any]) -> dict[str, Any]:
     """Return what :func:`truearm.measure` takes of what its command is given: lengths in m.
 
-    Raises
-    ------
-    InputError
-        If a length is none, with the parameter.
+    Raises:
+        InputError: If a length is none, with the parameter.
     """
     given = dict(said)
     for name in _LENGTHS:

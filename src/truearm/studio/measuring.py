@@ -40,54 +40,31 @@ HEAD: Final = ("no.", "at", "point", "dev. [mm]", "settling [mm]", "breaks", "be
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoints:
-    """Readings to draw.
+    """Readings to draw."""
 
-    Attributes
-    ----------
-    kept, aside
-        In the base frame of the nominal robot [m], ``(n, 3)`` and ``(m, 3)``.
-    colours
-        Of those that are kept, ``(n, 3)``.
-    """
-
-    kept: Array
-    colours: NDArray[np.uint8]
+    kept: Array  #: kept, aside: in the base frame of the nominal robot [m], ``(n, 3)`` and ``(m, 3)``.
+    colours: NDArray[np.uint8]  #: Of those that are kept, ``(n, 3)``.
     aside: Array
 
 
 @dataclass(frozen=True, eq=False)
 class LinesOfSight:
-    """Lines from the instrument to the targets at the next configuration, or to the nests in their round.
+    """Lines from the instrument to the targets at the next configuration, or to the nests in their round."""
 
-    Attributes
-    ----------
-    segments
-        In the base frame of the nominal robot [m], ``(n, 2, 3)``.
-    colours
-        ``(n, 3)``.
-    names
-        Of the instrument and of what is next, with their places ``(3,)``.
-    """
-
-    segments: Array
-    colours: NDArray[np.uint8]
-    names: dict[str, Array]
+    segments: Array  #: In the base frame of the nominal robot [m], ``(n, 2, 3)``.
+    colours: NDArray[np.uint8]  #: ``(n, 3)``.
+    names: dict[str, Array]  #: Of the instrument and of what is next, with their places ``(3,)``.
 
 
 class Measuring:
     """A campaign that is open; one thread at a time.
 
-    Attributes
-    ----------
-    fields
-        With which it was opened.
-    campaign
-        Of the job.
+    Attributes:
+        fields: With which it was opened.
+        campaign: Of the job.
 
-    Raises
-    ------
-    InputError
-        As the job refuses.
+    Raises:
+        InputError: As the job refuses.
     """
 
     def __init__(self, project: Project, robot: Robot) -> None:

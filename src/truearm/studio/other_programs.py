@@ -19,16 +19,11 @@ _NAMED: Final = 8
 class OtherPrograms:
     """Tells of changes of other programs: of those that are not shown yet where `said` is, of others in the notices.
 
-    Parameters
-    ----------
-    lock
-        Held while the project is looked at.
-    busy
-        Whether a long action of the studio writes there now.
-    said
-        An element of HTML.
-    tell
-        Says something in the notices.
+    Args:
+        lock: Held while the project is looked at.
+        busy: Whether a long action of the studio writes there now.
+        said: An element of HTML.
+        tell: Says something in the notices.
     """
 
     def __init__(
@@ -66,10 +61,8 @@ class OtherPrograms:
     def shown(self, before: Sequence[ChangedFile]) -> None:
         """Take note that the pages show every file as it is now, but for the project's own; that is told as well.
 
-        Parameters
-        ----------
-        before
-            The changes when the pages began to show them: what is changed meanwhile stays to be told.
+        Args:
+            before: The changes when the pages began to show them: what is changed meanwhile stays to be told.
         """
         files = [one for one in before if one.name != PROJECT_FILE]
         if files and not self._busy():

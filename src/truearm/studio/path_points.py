@@ -32,35 +32,21 @@ _KINDS: Final = ("line", "circle", "hermite")
 
 @dataclass(frozen=True, eq=False)
 class PlayedPath:
-    """A path as an arm follows it.
+    """A path as an arm follows it."""
 
-    Attributes
-    ----------
-    outcome
-        What its command prints.
-    motion
-        Joint positions over time.
-    """
-
-    outcome: Outcome
-    motion: Motion
+    outcome: Outcome  #: What its command prints.
+    motion: Motion  #: Joint positions over time.
 
 
 def new_path(start: Point, speed: float, *, frame: str, target: str | None, axis: Point | None) -> dict[str, Any]:
     """Return the entries of a path that only begins.
 
-    Parameters
-    ----------
-    start
-        Where [mm].
-    speed
-        [mm/s]
-    frame
-        ``base`` or ``world``.
-    target
-        What follows it, by its name; None for the flange.
-    axis
-        Where the tip's z axis points all along it; None where its orientation is free.
+    Args:
+        start: Where [mm].
+        speed: [mm/s]
+        frame: ``base`` or ``world``.
+        target: What follows it, by its name; None for the flange.
+        axis: Where the tip's z axis points all along it; None where its orientation is free.
     """
     made: dict[str, Any] = {"truearm": SCHEMA, "units": {"length": "mm", "angle": "deg", "time": "s"}, "frame": frame}
     made |= {} if target is None else {"target": target}
@@ -71,10 +57,8 @@ def new_path(start: Point, speed: float, *, frame: str, target: str | None, axis
 def with_section(path: dict[str, Any], kind: str, points: Sequence[Point]) -> dict[str, Any]:
     """Return a path with another section; a waypoint behind waypoints is one more of theirs.
 
-    Parameters
-    ----------
-    kind
-        ``line`` to a point, ``circle`` through two and back, or ``hermite`` through waypoints [mm].
+    Args:
+        kind: ``line`` to a point, ``circle`` through two and back, or ``hermite`` through waypoints [mm].
     """
     sections, at = list(path["sections"]), [_rounded(point) for point in points]
     if kind == "hermite" and sections and "hermite" in sections[-1]:
@@ -110,10 +94,8 @@ def with_orientation(path: dict[str, Any], axis: Point | None) -> dict[str, Any]
 def path_text(path: dict[str, Any]) -> str:
     """Return the path file of such entries.
 
-    Raises
-    ------
-    InputError
-        If they are none, as without sections.
+    Raises:
+        InputError: If they are none, as without sections.
     """
     validated(path, PathFile, "path")
     yaml, stream = YAML(), StringIO()
@@ -147,12 +129,10 @@ def in_words(path: dict[str, Any]) -> list[str]:
 def played_path(folder: Path, robot: Robot, file: str, seed: Array, progress: Progress) -> PlayedPath:
     """Return the motion of an arm along a path: :func:`truearm.path`.
 
-    Parameters
-    ----------
-    robot
-        A nominal one follows the path as its controller would; a calibrated one with the corrected joint positions.
-    seed
-        Joint positions near which it begins ``(joints,)`` [rad or m].
+    Args:
+        robot: A nominal one follows the path as its controller would; a calibrated one with the corrected joint
+            positions.
+        seed: Joint positions near which it begins ``(joints,)`` [rad or m].
     """
     from truearm.jobs.path import path as job
 

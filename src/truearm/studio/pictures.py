@@ -29,10 +29,8 @@ class Picture:
     Each picture is an element of its own. viser gives all that one element draws the same `uirevision`, so Plotly would
     take the axes, the zoom, the camera and the hidden curves of a picture over to the next one.
 
-    Attributes
-    ----------
-    place
-        The folder it stands in.
+    Attributes:
+        place: The folder it stands in.
     """
 
     def __init__(self, window: Window, title: str, aspect: float = 1.2) -> None:
@@ -44,11 +42,9 @@ class Picture:
     def show(self, drawn: dict[str, Any], of: object = None) -> None:
         """Show a picture as the report has it, in the colours of the window.
 
-        Parameters
-        ----------
-        of
-            The run that it follows while that goes on, if any: the same object with the same curves is the same
-            picture with more in it, and keeps what the user has zoomed.
+        Args:
+            of: The run that it follows while that goes on, if any: the same object with the same curves is the same
+                picture with more in it, and keeps what the user has zoomed.
         """
         import plotly.graph_objects as go
 

@@ -57,12 +57,9 @@ class PlanFields(BaseModel):
     def said(self, places: Mapping[str, str], constraints: str | None, payload: str | None) -> dict[str, Any]:
         """Return what is given to the command beside robot and poses, by the names of parameters, in its order.
 
-        Parameters
-        ----------
-        places
-            Files of tools and frames, by the names of these parameters.
-        constraints, payload
-            As the job takes them.
+        Args:
+            places: Files of tools and frames, by the names of these parameters.
+            constraints, payload: As the job takes them.
         """
         given = {
             "candidates_from": self.candidates_from,
@@ -94,10 +91,8 @@ class PlanFields(BaseModel):
 def plan_arguments(robot: str, said: dict[str, Any]) -> dict[str, Any]:
     """Return what :func:`truearm.plan` takes of what its command is given: lengths in m, joints in rad or m.
 
-    Raises
-    ------
-    InputError
-        If a text or a length is none, with the parameter.
+    Raises:
+        InputError: If a text or a length is none, with the parameter.
     """
     given = dict(said)
     for name in ("noise", "floor", "clearance"):

@@ -23,10 +23,8 @@ _NUMBER: Final = re.compile(r"\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 def other_plan_told(project: Project, table: str) -> str:
     """Return what to know of a plan that is not as it would be made now; nothing if there is none, or it is so.
 
-    Parameters
-    ----------
-    table
-        The file of the plan, in the project.
+    Args:
+        table: The file of the plan, in the project.
     """
     path = project.path(table)
     if not exists(path):
@@ -65,12 +63,9 @@ def _told(
 ) -> str:
     """Return what differs, in words.
 
-    Parameters
-    ----------
-    then, read
-        What the plan was asked for, and the hashes of the files that it read.
-    now, reads
-        The same as it would be made now.
+    Args:
+        then, read: What the plan was asked for, and the hashes of the files that it read.
+        now, reads: The same as it would be made now.
     """
     then, now = _whole(then), _whole(now)
     if "candidates_from" in then and "candidates_from" in now:  # none are drawn, however many were said

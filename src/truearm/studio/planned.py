@@ -24,22 +24,15 @@ _FLAGS: Final = ("no_floor", "approach")
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """What a plan says, and where.
+    """What a plan says, and where."""
 
-    Attributes
-    ----------
-    outcome
-        What its command prints, and the files.
-    chosen, candidates
-        Where the flange is at the chosen configurations and at those that it chose from, in the base frame [m],
-        ``(n, 3)`` each.
-    places, errors
-        Where the accuracy was predicted, in the base frame, ``(m, 3)``, and the error to expect there, ``(m,)`` [m].
-    """
-
-    outcome: Outcome
+    outcome: Outcome  #: What its command prints, and the files.
+    #: chosen, candidates: where the flange is at the chosen configurations and at those that it chose from, in the base
+    #: frame [m], ``(n, 3)`` each.
     chosen: Array
     candidates: Array
+    #: places, errors: where the accuracy was predicted, in the base frame, ``(m, 3)``, and the error to expect there,
+    #: ``(m,)`` [m].
     places: Array
     errors: Array
 
@@ -55,12 +48,9 @@ def planned(
 ) -> Planned:
     """Choose configurations and write the plan: :func:`truearm.plan`.
 
-    Parameters
-    ----------
-    fields
-        What the page says.
-    cell, constraints, payload
-        Of the project.
+    Args:
+        fields: What the page says.
+        cell, constraints, payload: Of the project.
     """
     from truearm.jobs.plan import plan
     from truearm.jobs.texts import read_poses
@@ -130,10 +120,8 @@ def asked_by(command: str) -> dict[str, str] | None:
 def cell_places(folder: Path, fields: PlanFields, cell: str | None) -> dict[str, str]:
     """Return a file of tools and frames as the job takes it: for what it has, where a program needs it.
 
-    Parameters
-    ----------
-    cell
-        Its name in the folder; None for none.
+    Args:
+        cell: Its name in the folder; None for none.
     """
     if cell is None or not fields.at_program:
         return {}

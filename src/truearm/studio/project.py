@@ -32,21 +32,11 @@ _TESTED: Final = ("plan", "poses", "paths", "settling", "forces", "alignment", "
 
 @dataclass(frozen=True)
 class ChangedFile:
-    """A file of the project that another program has changed, made or removed.
+    """A file of the project that another program has changed, made or removed."""
 
-    Attributes
-    ----------
-    name
-        In the folder.
-    how
-        ``changed``, ``new`` or ``gone``.
-    stamp
-        Size [bytes] and time of its last change [ns]; None if it is gone.
-    """
-
-    name: str
-    how: Literal["changed", "new", "gone"]
-    stamp: tuple[int, int] | None
+    name: str  #: In the folder.
+    how: Literal["changed", "new", "gone"]  #: ``changed``, ``new`` or ``gone``.
+    stamp: tuple[int, int] | None  #: Size [bytes] and time of its last change [ns]; None if it is gone.
 
 
 @dataclass(frozen=True)
@@ -74,19 +64,13 @@ class Project:
 
     Not safe for several threads: the studio holds its lock around every call.
 
-    Parameters
-    ----------
-    written
-        Hash of the file as it was before it was read: another program that writes meanwhile is noticed.
+    Args:
+        written: Hash of the file as it was before it was read: another program that writes meanwhile is noticed.
 
-    Attributes
-    ----------
-    folder
-        Its absolute path, links followed.
-    settings
-        What holds now; it is what the file says.
-    theirs
-        Files, and folders, into which other programs write as they shall: what they change there is not told.
+    Attributes:
+        folder: Its absolute path, links followed.
+        settings: What holds now; it is what the file says.
+        theirs: Files, and folders, into which other programs write as they shall: what they change there is not told.
     """
 
     def __init__(self, folder: Path, settings: Settings, written: str | None) -> None:
@@ -100,10 +84,8 @@ class Project:
     def path(self, name: str, parameter: str | None = None) -> Path:
         """Return the path of a file or folder of the project by its name.
 
-        Raises
-        ------
-        InputError
-            If the name leads out of the folder, by ``..``, as a whole path or over links.
+        Raises:
+            InputError: If the name leads out of the folder, by ``..``, as a whole path or over links.
         """
         parts = PurePosixPath(name.replace("\\", "/"))
         inside = is_one_line(name.replace(" ", "x")) and not parts.is_absolute() and ".." not in parts.parts
@@ -150,18 +132,14 @@ class Project:
     ) -> bool:
         """Change settings and write the file; return whether anything changed.
 
-        Parameters
-        ----------
-        files
-            Texts of other small files of the project that are part of the edit, by their names: they are undone too.
-        known
-            Texts that some of these files have had when the edit was made of them, None for no file; otherwise those
-            that they have now.
+        Args:
+            files: Texts of other small files of the project that are part of the edit, by their names: they are undone
+                too.
+            known: Texts that some of these files have had when the edit was made of them, None for no file; otherwise
+                those that they have now.
 
-        Raises
-        ------
-        InputError
-            For a value that cannot be, or if another program has changed a file: it is not overwritten.
+        Raises:
+            InputError: For a value that cannot be, or if another program has changed a file: it is not overwritten.
         """
         content = {**self.settings.model_dump(mode="json"), **changes}
         new = validated(content, Settings, PROJECT_FILE)
@@ -241,11 +219,9 @@ class Project:
     def take_in(self, name: str, came: Path) -> str:
         """Move a file that has come into the folder to its name there, and return that; it replaces none.
 
-        Raises
-        ------
-        InputError
-            If the name has folders in it or is one that truearm writes itself, if the file is too large, or if another
-            file of that name stands there.
+        Raises:
+            InputError: If the name has folders in it or is one that truearm writes itself, if the file is too large, or
+                if another file of that name stands there.
         """
         plain = PurePosixPath(name.replace("\\", "/"))
         if plain.name != name or name.startswith(".") or name in (PROJECT_FILE, MANIFEST):
@@ -348,15 +324,11 @@ def _is_among(name: str, names: Iterable[str]) -> bool:
 def open_project(folder: object, first: Mapping[str, Any] | None = None) -> Project:
     """Open a project's folder; a new one is made of an empty folder, or of one that is missing.
 
-    Parameters
-    ----------
-    first
-        Settings of a new project.
+    Args:
+        first: Settings of a new project.
 
-    Raises
-    ------
-    InputError
-        If the folder holds other things and no project, or its file cannot be read.
+    Raises:
+        InputError: If the folder holds other things and no project, or its file cannot be read.
     """
     with refusals_of("folder"):
         path = writable_folder(path_argument(folder, "folder"))

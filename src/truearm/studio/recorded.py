@@ -31,21 +31,11 @@ _STOP: Final = "stop"
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """Configurations in their order.
+    """Configurations in their order."""
 
-    Attributes
-    ----------
-    labels
-        One each.
-    joints
-        Of the model [rad or m], ``(n, joints)``.
-    joints_are
-        Whose joint positions the file holds.
-    """
-
-    labels: tuple[str, ...]
-    joints: Array
-    joints_are: JointsOf
+    labels: tuple[str, ...]  #: One each.
+    joints: Array  #: Of the model [rad or m], ``(n, joints)``.
+    joints_are: JointsOf  #: Whose joint positions the file holds.
 
     def with_one(self, joints: Array) -> Recorded:
         """Return the list with a configuration behind the last, named by its number."""
@@ -79,10 +69,8 @@ def read_recorded(path: Path, robot: Robot) -> Recorded:
     Of rows after each other with one label the first counts; of the ways of a plan, whose rows are stops, every one.
     Other columns are left aside.
 
-    Raises
-    ------
-    InputError
-        If the table has no joint positions, or those of another arm.
+    Raises:
+        InputError: If the table has no joint positions, or those of another arm.
     """
     text = read_text(path)
     header = 1 + next((number for number, line in enumerate(lines_of(text)) if line.strip()), 0)
@@ -133,32 +121,20 @@ def _joint_columns(cells: Cells, where: str) -> dict[str, tuple[int, str]]:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A way through configurations, all joints in step, the fastest at one speed.
+    """A way through configurations, all joints in step, the fastest at one speed."""
 
-    Attributes
-    ----------
-    joints
-        Configurations passed ``(n, joints)`` [rad or m].
-    times
-        When [s], ``(n,)``, from 0.
-    """
-
-    joints: Array
-    times: Array
+    joints: Array  #: Configurations passed ``(n, joints)`` [rad or m].
+    times: Array  #: When [s], ``(n,)``, from 0.
 
     @classmethod
     def through(cls, joints: Array, speed: float, robot: Robot) -> Motion:
         """Return the way through configurations.
 
-        Parameters
-        ----------
-        speed
-            Of the fastest joint [deg/s, or mm/s for prismatic joints].
+        Args:
+            speed: Of the fastest joint [deg/s, or mm/s for prismatic joints].
 
-        Raises
-        ------
-        InputError
-            If the speed is none.
+        Raises:
+            InputError: If the speed is none.
         """
         if not 0.1 <= speed <= 1000.0:
             raise InputError(

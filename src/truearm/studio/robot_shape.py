@@ -33,49 +33,29 @@ _ROD, _TARGET, _LARGEST_TARGET = 0.006, 0.012, 0.01905
 
 @dataclass(frozen=True, eq=False)
 class LinkShape:
-    """What is drawn of a link, in its own frame.
+    """What is drawn of a link, in its own frame."""
 
-    Attributes
-    ----------
-    name
-        ``base``, ``link_1`` and so on, ``flange`` or ``tool``.
-    bodies
-        What is light: the link itself.
-    joints
-        What is dark: drums, rails, plate and flange disc.
-    """
-
-    name: str
-    bodies: Mesh
-    joints: Mesh
+    name: str  #: ``base``, ``link_1`` and so on, ``flange`` or ``tool``.
+    bodies: Mesh  #: What is light: the link itself.
+    joints: Mesh  #: What is dark: drums, rails, plate and flange disc.
 
 
 @dataclass(frozen=True, eq=False)
 class RobotShape:
-    """All that is drawn of a robot.
+    """All that is drawn of a robot."""
 
-    Attributes
-    ----------
-    links
-        Base, the links in their order, flange, and the tool if there are targets. Their places are :func:`link_poses`.
-    layout
-        The lines that they are drawn along.
-    """
-
+    #: Base, the links in their order, flange, and the tool if there are targets. Their places are :func:`link_poses`.
     links: tuple[LinkShape, ...]
-    layout: Layout
+    layout: Layout  #: The lines that they are drawn along.
 
 
 def robot_shape(robot: Robot, meshes: Mapping[str, Mesh] | None = None) -> RobotShape:
     """Return what is drawn of a robot.
 
-    Parameters
-    ----------
-    robot
-        Its nominal geometry gives links and joints, its targets the tool.
-    meshes
-        What links look like, by name, in their own frames; None where that is not known. Links that are not named are
-        then not drawn.
+    Args:
+        robot: Its nominal geometry gives links and joints, its targets the tool.
+        meshes: What links look like, by name, in their own frames; None where that is not known. Links that are not
+            named are then not drawn.
     """
     plan = layout(robot)
     count = len(plan.joints)
@@ -101,15 +81,11 @@ def link_poses(robot: Robot, joints: Array | Postures) -> tuple[Array, Array]:
 
     With joint effects in the model they are where those have moved them: bent by loads, tilted, grown warm.
 
-    Parameters
-    ----------
-    joints
-        Joint positions ``(n, joints)`` [rad or m], or postures.
+    Args:
+        joints: Joint positions ``(n, joints)`` [rad or m], or postures.
 
-    Returns
-    -------
-    positions, quaternions
-        ``(n, links, 3)`` [m] and ``(n, links, 4)``, scalar first.
+    Returns:
+        positions, quaternions: ``(n, links, 3)`` [m] and ``(n, links, 4)``, scalar first.
     """
     kinematics = robot.forward_kinematics(joints)
     places = [len(robot.base_elements)]

@@ -48,14 +48,10 @@ _FLOOR: Final = 4.0
 class DrawnRobot:
     """A robot whose links can be moved.
 
-    Attributes
-    ----------
-    robot
-        As it is drawn.
-    length
-        Of the arm along its links [m].
-    floor
-        Where it stands in its base frame: 0, or below where its base frame is in its shoulder [m].
+    Attributes:
+        robot: As it is drawn.
+        length: Of the arm along its links [m].
+        floor: Where it stands in its base frame: 0, or below where its base frame is in its shoulder [m].
     """
 
     def __init__(
@@ -103,12 +99,9 @@ class DrawnRobot:
 class Scene:
     """What all windows of a project see.
 
-    Attributes
-    ----------
-    solid, ghost
-        The nominal and the calibrated robot, at the place of the latter; None where there is none.
-    joints
-        Joint positions of both, of the model [rad or m], ``(joints,)``.
+    Attributes:
+        solid, ghost: The nominal and the calibrated robot, at the place of the latter; None where there is none.
+        joints: Joint positions of both, of the model [rad or m], ``(joints,)``.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
@@ -144,10 +137,8 @@ class Scene:
         A calibrated robot stands where the instrument has found it. The nominal one is put there, too, so that they
         can be compared and both stand right to what was measured.
 
-        Parameters
-        ----------
-        meshes
-            What their links look like, as :func:`truearm.studio.robot_shape.robot_shape` takes it.
+        Args:
+            meshes: What their links look like, as :func:`truearm.studio.robot_shape.robot_shape` takes it.
         """
         if nominal is not None and calibrated is not None:
             nominal = standing_at(nominal, calibrated)
@@ -168,10 +159,8 @@ class Scene:
     def move(self, at: Postures, of: Robot) -> None:
         """Show the robots at joint positions.
 
-        Parameters
-        ----------
-        at, of
-            A posture, and the robot whose loads are known there; another robot bends in its own way.
+        Args:
+            at, of: A posture, and the robot whose loads are known there; another robot bends in its own way.
         """
         self.joints = at.joints[0].copy()
         with self._server.atomic():
@@ -239,12 +228,9 @@ class Scene:
     ) -> None:
         """Draw points ``(n, 3)`` [m] in the world in one upload; None takes them away.
 
-        Parameters
-        ----------
-        colours
-            One for all, or one each ``(n, 3)`` from 0 to 255.
-        size
-            By the length of the arm.
+        Args:
+            colours: One for all, or one each ``(n, 3)`` from 0 to 255.
+            size: By the length of the arm.
         """
         if points is None or not len(points):
             self._clear(name)
@@ -267,10 +253,8 @@ class Scene:
     def show_lines(self, name: str, segments: Array | None, colours: Colours = (90, 98, 106)) -> None:
         """Draw straight lines ``(n, 2, 3)`` [m] in the world in one upload; None takes them away.
 
-        Parameters
-        ----------
-        colours
-            One for all, or one each ``(n, 3)`` from 0 to 255.
+        Args:
+            colours: One for all, or one each ``(n, 3)`` from 0 to 255.
         """
         if segments is None or not len(segments):
             self._clear(name)

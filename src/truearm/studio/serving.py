@@ -38,18 +38,10 @@ _TOKEN: Final = re.compile(r"[A-Za-z0-9_-]{16,200}")
 
 @dataclass(frozen=True, eq=False)
 class Studio:
-    """A project that is served.
+    """A project that is served."""
 
-    Attributes
-    ----------
-    access
-        Where, and to whom.
-    window
-        Its pages.
-    """
-
-    access: Access
-    window: Window
+    access: Access  #: Where, and to whom.
+    window: Window  #: Its pages.
 
     def stop(self) -> None:
         """Stop serving it."""
@@ -73,31 +65,20 @@ def serve(
 ) -> Studio:
     """Serve a project.
 
-    Parameters
-    ----------
-    folder
-        Of the project; made where it is missing.
-    host
-        Name or address of this machine to listen on. More than loopback is served with a token alone.
-    port
-        To listen on; 0 for any that is free.
-    token
-        What a browser must bring; None for none on loopback, and for a new one elsewhere.
-    demo
-        Fill the folder with what :func:`truearm.demo` writes, and choose it. A folder that was filled so before is
-        opened as it is.
-    pages
-        Of the window.
-    say
-        Called with every request that is refused.
-    progress
-        Called with a few words at each step before the window is there.
+    Args:
+        folder: Of the project; made where it is missing.
+        host: Name or address of this machine to listen on. More than loopback is served with a token alone.
+        port: To listen on; 0 for any that is free.
+        token: What a browser must bring; None for none on loopback, and for a new one elsewhere.
+        demo: Fill the folder with what :func:`truearm.demo` writes, and choose it. A folder that was filled so before
+            is opened as it is.
+        pages: Of the window.
+        say: Called with every request that is refused.
+        progress: Called with a few words at each step before the window is there.
 
-    Raises
-    ------
-    InputError
-        If the folder is no project, or holds something else than the demonstration; or if host, port or token cannot be
-        used.
+    Raises:
+        InputError: If the folder is no project, or holds something else than the demonstration; or if host, port or
+            token cannot be used.
     """
     chosen = token_argument(token, host)
     # Nothing of a project is made where it cannot be served.

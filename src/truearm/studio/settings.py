@@ -14,19 +14,10 @@ _Name = Annotated[str, Field(min_length=1)]
 
 
 class TestedFiles(BaseModel):
-    """Of a project: the tests by ISO 9283.
-
-    Attributes
-    ----------
-    plan, poses, paths, settling, forces, alignment, compare
-        Files, as for :func:`truearm.iso9283_evaluate`.
-    noise_mm, noise_rot_deg
-        Of the instrument.
-    result
-        Folder of the evaluation.
-    """
+    """Of a project: the tests by ISO 9283."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    #: plan, poses, paths, settling, forces, alignment, compare: files, as for :func:`truearm.iso9283_evaluate`.
     plan: _Name | None = None
     poses: _Name | None = None
     paths: _Name | None = None
@@ -34,87 +25,46 @@ class TestedFiles(BaseModel):
     forces: _Name | None = None
     alignment: _Name | None = None
     compare: _Name | None = None
-    noise_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.01
+    noise_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.01  #: noise_mm, noise_rot_deg: of the instrument.
     noise_rot_deg: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.005
-    result: _Name = "iso9283/result"
+    result: _Name = "iso9283/result"  #: Folder of the evaluation.
 
 
 class Settings(BaseModel):
-    """Schema ``truearm-studio/1``: what the studio's pages say.
-
-    Attributes
-    ----------
-    robot
-        A library id, or a file of the folder.
-    data
-        File of measurements; None for none yet.
-    exclude
-        File of readings that are excluded; None for none.
-    payload
-        What the robot carried, as a text such as ``2.7kg,50mm,25mm,100mm``.
-    model, train, loss, seed
-        As for :func:`truearm.calibrate`.
-    result
-        Folder of the calibration's results, in the project's.
-    program
-        File of a robot program.
-    cell
-        File that says where tools and frames are; None for what the program says.
-    wrench, wrench_frame
-        What acts on the tool, six numbers or a file, and in whose axes, as for :func:`truearm.compensate`.
-    taught
-        As for :func:`truearm.compensate`; None if that was not said.
-    controller_kinematics
-        Likewise.
-    accept
-        Names of what may speak against the calibration or a correction, likewise.
-    accept_correction
-        How far targets may be moved and turned, likewise; None for what the robot's errors explain.
-    corrected
-        Folder of the corrected program.
-    constraints
-        File of boxes to keep clear of and of what else a configuration must keep; None for none.
-    path
-        File of a path that the arm follows in the scene; None for none yet.
-    meshes
-        URDF whose meshes show the robot; None for the robot's own, if it is one.
-    plan
-        What the page Plan says.
-    measure
-        What the page Measure says.
-    performance
-        Files of tests by ISO 9283.
-    dark
-        Whether the window is dark.
-    """
+    """Schema ``truearm-studio/1``: what the studio's pages say."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     truearm: Literal["truearm-studio/1"] = "truearm-studio/1"
-    robot: _Name = "irb120"
-    data: _Name | None = None
-    exclude: _Name | None = None
-    payload: _Name | None = None
-    model: _Name = "geometric"
+    robot: _Name = "irb120"  #: A library id, or a file of the folder.
+    data: _Name | None = None  #: File of measurements; None for none yet.
+    exclude: _Name | None = None  #: File of readings that are excluded; None for none.
+    payload: _Name | None = None  #: What the robot carried, as a text such as ``2.7kg,50mm,25mm,100mm``.
+    model: _Name = "geometric"  #: model, train, loss, seed: as for :func:`truearm.calibrate`.
     train: Annotated[int, Field(strict=True, ge=1)] | Literal["all"] | None = None
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     loss: _Name = "linear"
-    result: _Name = "result"
-    program: _Name | None = None
-    cell: _Name | None = None
+    result: _Name = "result"  #: Folder of the calibration's results, in the project's.
+    program: _Name | None = None  #: File of a robot program.
+    cell: _Name | None = None  #: File that says where tools and frames are; None for what the program says.
+    #: wrench, wrench_frame: what acts on the tool, six numbers or a file, and in whose axes, as for
+    #: :func:`truearm.compensate`.
     wrench: _Name | None = None
     wrench_frame: WrenchFrame | None = None
-    taught: tuple[_Name, ...] | None = None
-    controller_kinematics: _Name | None = None
+    taught: tuple[_Name, ...] | None = None  #: As for :func:`truearm.compensate`; None if that was not said.
+    controller_kinematics: _Name | None = None  #: Likewise.
+    #: Names of what may speak against the calibration or a correction, likewise.
     accept: tuple[_Name, ...] | None = None
+    #: How far targets may be moved and turned, likewise; None for what the robot's errors explain.
     accept_correction: _Name | None = None
-    corrected: _Name = "result/corrected"
+    corrected: _Name = "result/corrected"  #: Folder of the corrected program.
+    #: File of boxes to keep clear of and of what else a configuration must keep; None for none.
     constraints: _Name | None = None
-    path: _Name | None = None
-    meshes: _Name | None = None
-    plan: PlanFields = PlanFields()
-    measure: MeasureFields = MeasureFields()
-    performance: TestedFiles = TestedFiles()
-    dark: bool = False
+    path: _Name | None = None  #: File of a path that the arm follows in the scene; None for none yet.
+    meshes: _Name | None = None  #: URDF whose meshes show the robot; None for the robot's own, if it is one.
+    plan: PlanFields = PlanFields()  #: What the page Plan says.
+    measure: MeasureFields = MeasureFields()  #: What the page Measure says.
+    performance: TestedFiles = TestedFiles()  #: Files of tests by ISO 9283.
+    dark: bool = False  #: Whether the window is dark.
 
     @property
     def wrench_file(self) -> str | None:

@@ -23,18 +23,10 @@ _SHORT_LEG: Final = 1.4
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles, counter-clockwise from outside.
+    """Triangles, counter-clockwise from outside."""
 
-    Attributes
-    ----------
-    vertices
-        [m], ``(vertices, 3)``.
-    faces
-        Vertices of each triangle, ``(faces, 3)``.
-    """
-
-    vertices: Array
-    faces: Faces
+    vertices: Array  #: [m], ``(vertices, 3)``.
+    faces: Faces  #: Vertices of each triangle, ``(faces, 3)``.
 
     def moved(self, rotation: Array, translation: Array) -> Mesh:
         """Return the mesh turned and then moved."""
@@ -54,14 +46,10 @@ def together(meshes: Iterable[Mesh]) -> Mesh:
 def tube(path: Sequence[Array], radii: tuple[float, float], *, flat_end: bool = False) -> Mesh:
     """Return a tube along corners of a path, bent smoothly at them, with round ends.
 
-    Parameters
-    ----------
-    path
-        Corners, each ``(3,)`` [m]; equal ones count once.
-    radii
-        At the start and at the end [m].
-    flat_end
-        Whether it ends flat at the last corner, and not in half a ball around it.
+    Args:
+        path: Corners, each ``(3,)`` [m]; equal ones count once.
+        radii: At the start and at the end [m].
+        flat_end: Whether it ends flat at the last corner, and not in half a ball around it.
     """
     centres = _bent(_without_short_legs(_distinct(path), max(radii)), max(radii))
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
@@ -103,12 +91,9 @@ def ball(centre: Array, radius: float) -> Mesh:
 def box(centre: Array, axes: Array, half: Sequence[float]) -> Mesh:
     """Return a box.
 
-    Parameters
-    ----------
-    axes
-        Unit vectors along its edges as columns, right-handed, ``(3, 3)``.
-    half
-        Half of each edge [m].
+    Args:
+        axes: Unit vectors along its edges as columns, right-handed, ``(3, 3)``.
+        half: Half of each edge [m].
     """
     signs = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))

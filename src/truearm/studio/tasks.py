@@ -27,27 +27,13 @@ _KEPT: Final = "To replace the sound result all the same, tick 'Replace a sound 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a job said.
+    """What a job said."""
 
-    Attributes
-    ----------
-    lines
-        What its command prints.
-    notices
-        What to know about it.
-    files
-        What it wrote, by their names in the project.
-    finished
-        Whether its figures can be believed.
-    refused
-        Why nothing was written although there is a result; None where it was.
-    """
-
-    lines: tuple[str, ...]
-    notices: tuple[Notice, ...] = ()
-    files: tuple[str, ...] = ()
-    finished: bool = True
-    refused: InputError | None = None
+    lines: tuple[str, ...]  #: What its command prints.
+    notices: tuple[Notice, ...] = ()  #: What to know about it.
+    files: tuple[str, ...] = ()  #: What it wrote, by their names in the project.
+    finished: bool = True  #: Whether its figures can be believed.
+    refused: InputError | None = None  #: Why nothing was written although there is a result; None where it was.
 
 
 def calibrate(
@@ -104,12 +90,9 @@ def compensate_command(
 ) -> str:
     """Return the command that does the same in the project's folder, as the report shows it.
 
-    Parameters
-    ----------
-    places
-        The files that say where tools and frames are.
-    wrench, wrench_frame, taught, controller_kinematics, accept, accept_correction
-        As the job takes them.
+    Args:
+        places: The files that say where tools and frames are.
+        wrench, wrench_frame, taught, controller_kinematics, accept, accept_correction: As the job takes them.
     """
     words = ["truearm", "compensate", robot, program]
     for part, file in places.items():

@@ -19,10 +19,8 @@ from truearm.studio.tasks import Outcome, Progress, option_words
 def plan_tests(folder: Path, robot: str, out: str, progress: Progress, **options: Any) -> Outcome:
     """Plan tests: :func:`truearm.iso9283_plan`.
 
-    Parameters
-    ----------
-    options
-        Of the job, by its names of parameters; None where nothing is said.
+    Args:
+        options: Of the job, by its names of parameters; None where nothing is said.
     """
     from truearm.jobs.iso9283_plan import iso9283_plan
 

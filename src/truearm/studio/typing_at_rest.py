@@ -14,16 +14,11 @@ _REST: Final = 0.6
 class TypingAtRest:
     """What was typed and is not taken yet.
 
-    Parameters
-    ----------
-    lock
-        Held while something is taken.
-    sent
-        Returns the value that a window has sent for a field.
-    take
-        Takes a value that was typed into a field, by doing what follows; returns whether nothing was refused.
-    begun
-        Called with a field as often as somebody types in it.
+    Args:
+        lock: Held while something is taken.
+        sent: Returns the value that a window has sent for a field.
+        take: Takes a value that was typed into a field, by doing what follows; returns whether nothing was refused.
+        begun: Called with a field as often as somebody types in it.
     """
 
     def __init__(

@@ -34,27 +34,13 @@ _COMING: Final = re.compile(r"\.truearm-upload\.[0-9a-f]{16}")
 
 @dataclass(eq=False)
 class Upload:
-    """A file that comes, or has come.
+    """A file that comes, or has come."""
 
-    Attributes
-    ----------
-    name
-        As the window calls it: it may be anything.
-    element
-        Of the window, by which it was sent.
-    size
-        As it was announced [bytes].
-    path
-        Where it is on disk.
-    came
-        How much of it [bytes].
-    """
-
-    name: str
-    element: str
-    size: int
-    path: Path
-    came: int = 0
+    name: str  #: As the window calls it: it may be anything.
+    element: str  #: Of the window, by which it was sent.
+    size: int  #: As it was announced [bytes].
+    path: Path  #: Where it is on disk.
+    came: int = 0  #: How much of it [bytes].
     _parts: int = 0
     _stream: IO[bytes] | None = None
     _last: float = field(default_factory=time.monotonic)
@@ -71,15 +57,11 @@ class Upload:
 class Uploads:
     """Takes in files of windows.
 
-    Attributes
-    ----------
-    folder
-        Of the project.
-    takers
-        What is called with a whole file, by the element that sends it; from the server's thread.
-    told
-        Called at each step with who sends, the file by the window's number for it, and the file; from there, too. A
-        file that is refused comes as None.
+    Attributes:
+        folder: Of the project.
+        takers: What is called with a whole file, by the element that sends it; from the server's thread.
+        told: Called at each step with who sends, the file by the window's number for it, and the file; from there, too.
+            A file that is refused comes as None.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -92,10 +74,8 @@ class Uploads:
     def begins(self, sender: object, message: Mapping[str, Any]) -> str | None:
         """Let a file come; return why not, in words.
 
-        Raises
-        ------
-        ValueError
-            If the message is none that the page sends.
+        Raises:
+            ValueError: If the message is none that the page sends.
         """
         size, parts, name = message.get("size_bytes"), message.get("part_count"), message.get("transfer_uuid")
         file, element = message.get("filename"), message.get("source_component_uuid")
@@ -115,10 +95,9 @@ class Uploads:
     def goes_on(self, sender: object, message: Mapping[str, Any]) -> str | None:
         """Take a part of a file; return why it cannot go on, in words. Parts of what was refused go nowhere.
 
-        Raises
-        ------
-        ValueError
-            If there is more of the file than was announced, or less, or the message is none that the page sends.
+        Raises:
+            ValueError: If there is more of the file than was announced, or less, or the message is none that the page
+                sends.
         """
         name, content = message.get("transfer_uuid"), message.get("content")
         if not isinstance(content, bytes) or not isinstance(name, str):

@@ -28,40 +28,25 @@ _PACKAGE: Final = "package://"
 
 @dataclass(frozen=True, eq=False)
 class Looks:
-    """What the links of a URDF's chain look like.
+    """What the links of a URDF's chain look like."""
 
-    Attributes
-    ----------
-    joints
-        Names of the joints, by which the chain is known.
-    meshes
-        Of each link that has any, in the link's own frame [m], by the names of
-        :class:`truearm.studio.robot_shape.LinkShape`.
-    left_out
-        Why others have none, in words.
-    """
-
-    joints: tuple[str, ...]
+    joints: tuple[str, ...]  #: Names of the joints, by which the chain is known.
+    #: Of each link that has any, in the link's own frame [m], by the names of
+    #: :class:`truearm.studio.robot_shape.LinkShape`.
     meshes: Mapping[str, Mesh]
-    left_out: tuple[str, ...]
+    left_out: tuple[str, ...]  #: Why others have none, in words.
 
 
 def urdf_meshes(path: Path, inside: Callable[[str], Path], relative: str) -> Looks:
     """Return what the links of a URDF's chain look like.
 
-    Parameters
-    ----------
-    path
-        The URDF; a link to end at behind ``#`` counts, as :func:`truearm.load_robot` takes it.
-    inside
-        Returns the path of a name in the project, and refuses what is no place in it.
-    relative
-        The folder of the URDF in the project; empty for the project's own.
+    Args:
+        path: The URDF; a link to end at behind ``#`` counts, as :func:`truearm.load_robot` takes it.
+        inside: Returns the path of a name in the project, and refuses what is no place in it.
+        relative: The folder of the URDF in the project; empty for the project's own.
 
-    Raises
-    ------
-    InputError
-        If the URDF cannot be read, or all of them have too many triangles.
+    Raises:
+        InputError: If the URDF cannot be read, or all of them have too many triangles.
     """
     named = urdf_source(path)
     if named is None:

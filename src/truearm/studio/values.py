@@ -25,15 +25,11 @@ def fits(element: Any, value: object) -> bool:
 def checked(message: Mapping[str, Any], kind: str, *, closely: bool) -> None:
     """Refuse a message that its kind cannot be made of, as viser would stumble over it.
 
-    Parameters
-    ----------
-    closely
-        Whether its fields must be of the kinds that viser's page sends, and its numbers finite.
+    Args:
+        closely: Whether its fields must be of the kinds that viser's page sends, and its numbers finite.
 
-    Raises
-    ------
-    ValueError
-        If it cannot be.
+    Raises:
+        ValueError: If it cannot be.
     """
     if not all(isinstance(name, str) for name in message):
         raise ValueError(f"a message {kind} with a name that is no text")

@@ -43,16 +43,11 @@ class Window:
 
     Every change of the project goes through :meth:`action` or :meth:`edit`, one at a time.
 
-    Attributes
-    ----------
-    project
-        The folder.
-    gate
-        Who may talk.
-    server, gui
-        viser's; pages add their elements to `gui` inside their tab, and things to ``server.scene``.
-    pages
-        In the order of the work.
+    Attributes:
+        project: The folder.
+        gate: Who may talk.
+        server, gui: viser's; pages add their elements to `gui` inside their tab, and things to ``server.scene``.
+        pages: In the order of the work.
     """
 
     def __init__(self, project: Project, server: viser.ViserServer, gate: Gate, pages: Sequence[type[Page]]) -> None:
@@ -130,10 +125,8 @@ class Window:
     def _do(self, do: Callable[[], None], element: Any, typed: Any = None) -> bool:
         """Do something for the user, and show what is refused below the element; return whether nothing was.
 
-        Parameters
-        ----------
-        typed
-            A value of the element that somebody has typed.
+        Args:
+            typed: A value of the element that somebody has typed.
         """
         with self.lock, confined_reads(self.project.folder):
             stood, before, self._acted = self._refusals.standing(), self._acted, element
@@ -167,15 +160,11 @@ class Window:
     ) -> None:
         """Change settings of the project, and small files; pages are shown anew where something changed.
 
-        Parameters
-        ----------
-        files, known
-            As for :meth:`truearm.studio.project.Project.edit`.
+        Args:
+            files, known: As for :meth:`truearm.studio.project.Project.edit`.
 
-        Raises
-        ------
-        InputError
-            If a value cannot be.
+        Raises:
+            InputError: If a value cannot be.
         """
         with self.lock:
             if self.project.edit(files, known=known, **changes):
@@ -216,17 +205,12 @@ class Window:
 
         What it refuses in the end is shown below the element whose callback has begun it.
 
-        Parameters
-        ----------
-        done
-            Called with what it returned, under the lock.
-        told
-            Called with each word of its progress, under the lock.
+        Args:
+            done: Called with what it returned, under the lock.
+            told: Called with each word of its progress, under the lock.
 
-        Raises
-        ------
-        InputError
-            If another action still runs.
+        Raises:
+            InputError: If another action still runs.
         """
         with self.lock:
             if self._work is not None:
@@ -293,10 +277,8 @@ class Window:
     def robot(self) -> Robot:
         """Return the nominal robot, with the payload of the settings.
 
-        Raises
-        ------
-        InputError
-            If it cannot be read.
+        Raises:
+            InputError: If it cannot be read.
         """
         said = self.project.settings.payload
         payload = None if said is None else Payload.of(said, "payload")
@@ -327,10 +309,8 @@ class Window:
     def refuse_result_of_another(self) -> None:
         """Refuse to go on with the result of another robot than the one that is chosen.
 
-        Raises
-        ------
-        InputError
-            If it is of another.
+        Raises:
+            InputError: If it is of another.
         """
         if other := self.result_of_another():
             raise InputError(

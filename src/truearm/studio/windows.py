@@ -28,10 +28,8 @@ from truearm.studio.uploads import Upload
 class Windows:
     """All see the same; one works, and the others offer to take over.
 
-    Parameters
-    ----------
-    gate
-        Knows which one works; it is told of windows that come and go.
+    Args:
+        gate: Knows which one works; it is told of windows that come and go.
     """
 
     def __init__(self, server: viser.ViserServer, gate: Gate) -> None:

@@ -21,15 +21,11 @@ _PROCESSES: Final = multiprocessing.get_context("spawn")
 class Work:
     """A function that runs elsewhere.
 
-    Parameters
-    ----------
-    do
-        Called in the other process with `arguments` and a function ``progress``; it and what it returns can be
-        pickled.
-    said
-        Called with the words of its progress.
-    ended
-        Called once with what it returned, with its refusal, or with None where it was cancelled.
+    Args:
+        do: Called in the other process with `arguments` and a function ``progress``; it and what it returns can be
+            pickled.
+        said: Called with the words of its progress.
+        ended: Called once with what it returned, with its refusal, or with None where it was cancelled.
     """
 
     def __init__(

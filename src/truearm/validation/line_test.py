@@ -17,18 +17,10 @@ from truearm.simulation.twin import Twin
 
 @dataclass(frozen=True, eq=False)
 class LineErrors:
-    """How far a robot is from the poses of a line test.
+    """How far a robot is from the poses of a line test."""
 
-    Attributes
-    ----------
-    lines
-        The poses.
-    error
-        Distance from each pose ``(7 k,)`` [m], the mean over repetitions; NaN where it was not measured.
-    """
-
-    lines: SevenLines
-    error: Array
+    lines: SevenLines  #: The poses.
+    error: Array  #: Distance from each pose ``(7 k,)`` [m], the mean over repetitions; NaN where it was not measured.
 
     def largest(self, direction: str) -> float:
         """Return the largest error on a line [m]."""
@@ -44,14 +36,10 @@ def on_twin(
 ) -> LineErrors:
     """Let a twin go to joint positions and see how far its flange is from the poses, in its own base frame.
 
-    Parameters
-    ----------
-    joints
-        Joint positions that are commanded, ``(7 k, joints)`` [rad].
-    scatter
-        Standard deviation of each coordinate of a repetition: the robot's and the instrument's [m].
-    repeats
-        How often each pose is measured.
+    Args:
+        joints: Joint positions that are commanded, ``(7 k, joints)`` [rad].
+        scatter: Standard deviation of each coordinate of a repetition: the robot's and the instrument's [m].
+        repeats: How often each pose is measured.
     """
     base = twin.robot.base
     base_frame = np.eye(4)
@@ -71,17 +59,13 @@ def _flange_of(twin: Twin, joints: Array) -> list[Array]:
 def from_data(lines: SevenLines, robot: Robot, data: Dataset) -> LineErrors:
     """Return errors that were measured.
 
-    Parameters
-    ----------
-    robot
-        Where it stands before the instrument, with the targets on its flange: the poses are taken there.
-    data
-        Configurations called as the poses are, ``x-1`` to ``xyz-11``; a repetition is another reading of the same.
+    Args:
+        robot: Where it stands before the instrument, with the targets on its flange: the poses are taken there.
+        data: Configurations called as the poses are, ``x-1`` to ``xyz-11``; a repetition is another reading of the
+            same.
 
-    Raises
-    ------
-    InputError
-        If a configuration has another name, a target is not known, or a line was not measured at all.
+    Raises:
+        InputError: If a configuration has another name, a target is not known, or a line was not measured at all.
     """
     base = robot.base
     of = {label: i for i, label in enumerate(lines.labels)}

@@ -27,22 +27,14 @@ NEAR_LOCK: Final = math.radians(3.0)
 
 @dataclass(frozen=True, eq=False)
 class OrientationErrors:
-    """Errors of orientations by their parts, predicted minus measured, in the robot's base frame.
+    """Errors of orientations by their parts, predicted minus measured, in the robot's base frame."""
 
-    Attributes
-    ----------
-    reading
-        Indices of the readings, ``(n,)``: those in the instrument's own frame.
-    vector
-        Rotation vector from the measured to the predicted orientation, about the axes of the robot's base [rad],
-        ``(n, 3)``.
-    zxz
-        Errors of Phi, Theta and Psi [rad], within half a turn, ``(n, 3)``; Phi and Psi are NaN near 0 and 180 deg of
-        Theta.
-    """
-
-    reading: NDArray[np.intp]
+    reading: NDArray[np.intp]  #: Indices of the readings, ``(n,)``: those in the instrument's own frame.
+    #: Rotation vector from the measured to the predicted orientation, about the axes of the robot's base [rad], ``(n,
+    #: 3)``.
     vector: Array
+    #: Errors of Phi, Theta and Psi [rad], within half a turn, ``(n, 3)``; Phi and Psi are NaN near 0 and 180 deg of
+    #: Theta.
     zxz: Array
 
     @property
@@ -54,10 +46,8 @@ class OrientationErrors:
 def orientation_errors(robot: Robot, data: Dataset, errors: Errors) -> OrientationErrors | None:
     """Return the orientation errors of readings by their parts; None if no orientation was read.
 
-    Parameters
-    ----------
-    errors
-        Of the robot on the data.
+    Args:
+        errors: Of the robot on the data.
     """
     if errors.orientation_errors is None or data.quaternion is None:
         return None

@@ -46,44 +46,27 @@ _F = TypeVar("_F", np.float32, np.float64)
 
 @dataclass(frozen=True, eq=False)
 class PairDistances:
-    """Errors of distances: those between predicted points minus those between measured ones.
+    """Errors of distances: those between predicted points minus those between measured ones."""
 
-    Attributes
-    ----------
-    pairs
-        How many.
-    mean, deviation, maximum
-        Of the absolute error [m].
-    positive
-        Share of the errors above zero.
-    edges, counts
-        Histogram of the signed errors [m], ``(bins + 1,)`` and ``(bins,)``.
-    """
-
-    pairs: int
-    mean: float
+    pairs: int  #: How many.
+    mean: float  #: mean, deviation, maximum: of the absolute error [m].
     deviation: float
     maximum: float
-    positive: float
-    edges: Array
+    positive: float  #: Share of the errors above zero.
+    edges: Array  #: edges, counts: histogram of the signed errors [m], ``(bins + 1,)`` and ``(bins,)``.
     counts: NDArray[np.int64]
 
 
 def pair_distances(predicted: ArrayLike, measured: ArrayLike, configuration: ArrayLike | None = None) -> PairDistances:
     """Compare the distances between all pairs of points.
 
-    Parameters
-    ----------
-    predicted, measured
-        The same points twice [m], ``(n, 3)``.
-    configuration
-        Which configuration each point was measured at, ``(n,)``; pairs within one tell about the tool and are left
-        out. Each point is one of its own if None.
+    Args:
+        predicted, measured: The same points twice [m], ``(n, 3)``.
+        configuration: Which configuration each point was measured at, ``(n,)``; pairs within one tell about the tool
+            and are left out. Each point is one of its own if None.
 
-    Raises
-    ------
-    InputError
-        If the shapes differ, a coordinate is missing, or there is no pair.
+    Raises:
+        InputError: If the shapes differ, a coordinate is missing, or there is no pair.
     """
     P, M = np.asarray(predicted, float), np.asarray(measured, float)
     if P.ndim != 2 or P.shape[1] != 3 or P.shape != M.shape:
@@ -164,14 +147,11 @@ def _blocks(of: NDArray[np.generic]) -> list[list[_Block]]:
 class _Points:
     """The two sets of points, in widths of a bin, about the middle of each.
 
-    Attributes
-    ----------
-    predicted, measured
-        The points, ``(3, n)``.
-    numerator, squares
-        Two arrays each, ``(n, 8)`` and ``(8, n)``, whose product is the numerator of all pairs, and H.
-    close
-        H below which a pair is close.
+    Attributes:
+        predicted, measured: The points, ``(3, n)``.
+        numerator, squares: Two arrays each, ``(n, 8)`` and ``(8, n)``, whose product is the numerator of all pairs, and
+            H.
+        close: H below which a pair is close.
     """
 
     def __init__(self, predicted: Array, measured: Array, width: float) -> None:
@@ -189,14 +169,10 @@ class _Points:
 class _Tally:
     """Errors of groups of blocks, summed up.
 
-    Attributes
-    ----------
-    sums
-        Of each group, the sum of the absolute errors and of their squares.
-    largest, positive
-        The largest absolute error, and how many errors are above zero.
-    counts
-        Of the bins, ``(200,)``.
+    Attributes:
+        sums: Of each group, the sum of the absolute errors and of their squares.
+        largest, positive: The largest absolute error, and how many errors are above zero.
+        counts: Of the bins, ``(200,)``.
     """
 
     def __init__(self, points: _Points, groups: list[list[_Block]]) -> None:

@@ -13,37 +13,22 @@ from truearm.modeling.transform import rigid_motion, rotation_vector
 
 @dataclass(frozen=True, eq=False)
 class PoseErrors:
-    """Errors of poses.
+    """Errors of poses."""
 
-    Attributes
-    ----------
-    position
-        Of the flange's origin [m], ``(n,)``.
-    orientation
-        Angle by which the flange is turned [rad], ``(n,)``.
-    points
-        Of each point [m], ``(n, points)``.
-    """
-
-    position: Array
-    orientation: Array
-    points: Array
+    position: Array  #: Of the flange's origin [m], ``(n,)``.
+    orientation: Array  #: Angle by which the flange is turned [rad], ``(n,)``.
+    points: Array  #: Of each point [m], ``(n, points)``.
 
 
 def pose_errors(on_flange: Array, wanted: Array, reached: Array) -> PoseErrors:
     """Compare poses, each given by the same points of the tool.
 
-    Parameters
-    ----------
-    on_flange
-        The points in the flange frame [m], ``(points, 3)``.
-    wanted, reached
-        Where they should be and where they are, in one frame [m], ``(n, points, 3)``.
+    Args:
+        on_flange: The points in the flange frame [m], ``(points, 3)``.
+        wanted, reached: Where they should be and where they are, in one frame [m], ``(n, points, 3)``.
 
-    Raises
-    ------
-    InputError
-        If the shapes differ.
+    Raises:
+        InputError: If the shapes differ.
     """
     if wanted.shape != reached.shape or wanted.ndim != 3 or wanted.shape[1:] != on_flange.shape:
         raise InputError(
@@ -65,10 +50,8 @@ def repeatability(places: Array) -> float:
 
     It is the mean distance from the middle of all places, plus three standard deviations of that distance.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than two.
+    Raises:
+        InputError: If there are fewer than two.
     """
     if len(places) < 2:
         raise InputError("repeatability needs two repetitions or more", where="places", came=len(places))

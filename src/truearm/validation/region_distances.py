@@ -32,55 +32,28 @@ _WORSE: Final = 1.5
 
 @dataclass(frozen=True)
 class Span:
-    """Readings within a span of distances.
+    """Readings within a span of distances."""
 
-    Attributes
-    ----------
-    low, high
-        Of the distances [m or rad].
-    readings
-        How many.
-    mean, largest
-        Of the errors [m].
-    """
-
-    low: float
+    low: float  #: low, high: of the distances [m or rad].
     high: float
-    readings: int
-    mean: float
+    readings: int  #: How many.
+    mean: float  #: mean, largest: of the errors [m].
     largest: float
 
 
 @dataclass(frozen=True, eq=False)
 class RegionDistances:
-    """Distances of readings from where the robot was calibrated, with their errors.
+    """Distances of readings from where the robot was calibrated, with their errors."""
 
-    Attributes
-    ----------
-    reading
-        Indices of the readings, ``(n,)``.
-    error
-        Position error, or that of a distance or height, without sign [m], ``(n,)``.
-    tip
-        From the nearest place of the target in training [m], ``(n,)``.
-    joints
-        Largest difference of a revolute joint from the training configuration where it is least [rad], ``(n,)``; NaN
-        for an arm without revolute joints.
-    middle
-        From the mean of the target's places in training [m], ``(n,)``.
-    configuration
-        Of each reading, ``(n,)``.
-    training
-        How many training configurations the robot knows.
-    """
-
-    reading: NDArray[np.intp]
-    error: Array
-    tip: Array
+    reading: NDArray[np.intp]  #: Indices of the readings, ``(n,)``.
+    error: Array  #: Position error, or that of a distance or height, without sign [m], ``(n,)``.
+    tip: Array  #: From the nearest place of the target in training [m], ``(n,)``.
+    #: Largest difference of a revolute joint from the training configuration where it is least [rad], ``(n,)``; NaN for
+    #: an arm without revolute joints.
     joints: Array
-    middle: Array
-    configuration: NDArray[np.intp]
-    training: int
+    middle: Array  #: From the mean of the target's places in training [m], ``(n,)``.
+    configuration: NDArray[np.intp]  #: Of each reading, ``(n,)``.
+    training: int  #: How many training configurations the robot knows.
 
     def spans(self, distance: Array, count: int = 5) -> tuple[Span, ...]:
         """Return spans of a distance ``(n,)`` with about equally many readings each, nearest first."""
@@ -124,12 +97,9 @@ class RegionDistances:
 def region_distances(robot: Robot, data: Dataset, errors: Errors) -> RegionDistances | None:
     """Return how far readings lie from where a robot was calibrated; None where it does not know, or nothing was read.
 
-    Parameters
-    ----------
-    robot
-        Calibrated: its proof holds where it was measured.
-    errors
-        Of the robot on the data.
+    Args:
+        robot: Calibrated: its proof holds where it was measured.
+        errors: Of the robot on the data.
     """
     if robot.proof is None or not robot.proof.measured or len(robot.proof.measured[0]) != len(robot.joints):
         return None

@@ -24,18 +24,10 @@ _SETTLED: Final = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class SphereTest:
-    """Errors of distances from the centre of a sphere.
+    """Errors of distances from the centre of a sphere."""
 
-    Attributes
-    ----------
-    errors
-        Measured minus predicted distance of each reading [m], ``(n,)``.
-    centre
-        The centre that was used, in the robot's world [m], ``(3,)``.
-    """
-
-    errors: Array
-    centre: Array
+    errors: Array  #: Measured minus predicted distance of each reading [m], ``(n,)``.
+    centre: Array  #: The centre that was used, in the robot's world [m], ``(3,)``.
 
     @property
     def mean(self) -> float:
@@ -58,25 +50,18 @@ def sphere_test(
 ) -> SphereTest:
     """Compare lengths that a ballbar read with those that a model predicts.
 
-    Parameters
-    ----------
-    robot
-        The model to judge.
-    joints
-        Joint positions at which the bar was read [rad or m], ``(n, joints)``, or postures.
-    lengths
-        What the bar read [m], ``(n,)``; NaN where it was beyond its range, which is left out.
-    target
-        The target of the tool at which the bar is attached.
-    centre
-        The fixed ball in the robot's world [m], ``(3,)``: where the model says the robot was when it was taught. If
-        None, the centre that makes the sum of squared errors least; an error in teaching then does not count.
+    Args:
+        robot: The model to judge.
+        joints: Joint positions at which the bar was read [rad or m], ``(n, joints)``, or postures.
+        lengths: What the bar read [m], ``(n,)``; NaN where it was beyond its range, which is left out.
+        target: The target of the tool at which the bar is attached.
+        centre: The fixed ball in the robot's world [m], ``(3,)``: where the model says the robot was when it was
+            taught. If None, the centre that makes the sum of squared errors least; an error in teaching then does not
+            count.
 
-    Raises
-    ------
-    InputError
-        If there are not as many lengths as configurations, fewer than two are left, or fewer than five to find the
-        centre from; or if they lie so that it cannot be found.
+    Raises:
+        InputError: If there are not as many lengths as configurations, fewer than two are left, or fewer than five to
+            find the centre from; or if they lie so that it cannot be found.
     """
     q = joints if isinstance(joints, Postures) else Postures(np.asarray(joints, float))
     read = np.asarray(lengths, float)

@@ -21,21 +21,11 @@ from truearm.modeling.robot import Robot
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What one joint's assembly uses of its tolerances.
+    """What one joint's assembly uses of its tolerances."""
 
-    Attributes
-    ----------
-    delta
-        How far the axis is aside at the hole's depth: perpendicularity or parallelism [m].
-    towards
-        To which side it leans, from x towards y of the joint's frame [rad].
-    position
-        Of the joint's frame beside its place, x, y and z [m].
-    """
-
-    delta: float
-    towards: float
-    position: tuple[float, float, float]
+    delta: float  #: How far the axis is aside at the hole's depth: perpendicularity or parallelism [m].
+    towards: float  #: To which side it leans, from x towards y of the joint's frame [rad].
+    position: tuple[float, float, float]  #: Of the joint's frame beside its place, x, y and z [m].
 
 
 def tolerance_of(
@@ -76,36 +66,23 @@ def joint_tolerances(robot: Robot, depths: Sequence[float]) -> tuple[Tolerance, 
 
 @dataclass(frozen=True, eq=False)
 class FlangeError:
-    """What the tolerances of the joints may do at the flange, over many configurations.
+    """What the tolerances of the joints may do at the flange, over many configurations."""
 
-    Attributes
-    ----------
-    leaning
-        Largest position error that each joint's leaning alone may cause [m], ``(joints,)``.
-    position
-        The same of each joint's position tolerance, which moves all that is beyond alike [m], ``(joints,)``.
-    together
-        If all of them come together at the worst, and in the mean of squares: at the worst configuration [m].
-    """
-
-    leaning: Array
+    leaning: Array  #: Largest position error that each joint's leaning alone may cause [m], ``(joints,)``.
+    #: The same of each joint's position tolerance, which moves all that is beyond alike [m], ``(joints,)``.
     position: Array
+    #: If all of them come together at the worst, and in the mean of squares: at the worst configuration [m].
     together: tuple[float, float]
 
 
 def flange_error(robot: Robot, leans: Sequence[float], positions: Sequence[float], q: Array) -> FlangeError:
     """Return the largest error of the flange's position that tolerances allow, each to its worst side.
 
-    Parameters
-    ----------
-    robot
-        With joint errors, at those values around which they vary.
-    leans
-        Largest angle of each joint's axis [rad].
-    positions
-        Radius of the sphere in which each joint's frame may lie [m].
-    q
-        Configurations to look at ``(n, joints)`` [rad].
+    Args:
+        robot: With joint errors, at those values around which they vary.
+        leans: Largest angle of each joint's axis [rad].
+        positions: Radius of the sphere in which each joint's frame may lie [m].
+        q: Configurations to look at ``(n, joints)`` [rad].
     """
     count = len(robot.joints)
     names = [f"{angle}_{i}" for i in range(1, count + 1) for angle in ("ebeta", "egamma")]

@@ -50,47 +50,29 @@ _FORCES: Final = 10
 
 @dataclass(frozen=True)
 class MeasuringPrograms:
-    """Programs of all tests.
+    """Programs of all tests."""
 
-    Attributes
-    ----------
-    slow
-        All tests at the velocity of the first run.
-    faster
-        Those at the velocities of the plan.
-    share
-        Velocity of the first run, in that of the robot; that of single tests may be lower.
-    ways
-        Joint positions of the model on every way between stops, ``(n, joints)`` [rad or m], by its name: close to each
-        other where the tip is led, two where the joints move evenly.
-    """
-
-    slow: tuple[MotionProgram, ...]
-    faster: tuple[MotionProgram, ...]
-    share: float
+    slow: tuple[MotionProgram, ...]  #: All tests at the velocity of the first run.
+    faster: tuple[MotionProgram, ...]  #: Those at the velocities of the plan.
+    share: float  #: Velocity of the first run, in that of the robot; that of single tests may be lower.
+    #: Joint positions of the model on every way between stops, ``(n, joints)`` [rad or m], by its name: close to each
+    #: other where the tip is led, two where the joints move evenly.
     ways: Mapping[str, Array]
 
 
 def measuring_programs(plan: PerformancePlan, dwell: float, mark: str, language: str = "") -> MeasuringPrograms:
     """Return the programs of a plan.
 
-    Parameters
-    ----------
-    plan
-        Of the robot that the controller knows.
-    dwell
-        How long the robot stands where it is measured [s].
-    mark
-        By which the plan is known, for a comment.
-    language
-        Its name: languages say speeds of joint motions in different ways.
+    Args:
+        plan: Of the robot that the controller knows.
+        dwell: How long the robot stands where it is measured [s].
+        mark: By which the plan is known, for a comment.
+        language: Its name: languages say speeds of joint motions in different ways.
 
-    Raises
-    ------
-    InputError
-        If the robot is calibrated or has more than six joints, it is not known where its controller has its frames and
-        a test has straight moves, a pose that the tests need is not in the plan, or a
-        move cannot be made: with the move.
+    Raises:
+        InputError: If the robot is calibrated or has more than six joints, it is not known where its controller has its
+            frames and a test has straight moves, a pose that the tests need is not in the plan, or a move cannot be
+            made: with the move.
     """
     robot = plan.robot
     if len(robot.joints) != _AXES:
@@ -121,10 +103,8 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str, language:
 def driven_ways(plan: PerformancePlan) -> Mapping[str, Array]:
     """Return the ways between the stops of all tests, as :attr:`MeasuringPrograms.ways` has them.
 
-    Raises
-    ------
-    InputError
-        If a move cannot be made: with the move.
+    Raises:
+        InputError: If a move cannot be made: with the move.
     """
     # A second cycle begins where the first has ended; the others go the same ways.
     twice = replace(plan, tests=tuple(replace(test, cycles=min(2, test.cycles)) for test in plan.tests))
@@ -168,12 +148,9 @@ class _Programs:
     def joint_share(self, ways: Array | None, share: float) -> float:
         """Return the share of a joint motion in the joints' speed; in the first run the tip keeps to its speed.
 
-        Parameters
-        ----------
-        ways
-            Joint positions at both ends ``(2, joints)``; None from nobody knows where.
-        share
-            Of the velocity.
+        Args:
+            ways: Joint positions at both ends ``(2, joints)``; None from nobody knows where.
+            share: Of the velocity.
         """
         robot, speed = self.plan.robot, _SLOW_SPEED if share <= self.slow else math.inf
         if ways is None:

@@ -45,58 +45,33 @@ _BESIDE: Final = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """One move along a route.
+    """One move along a route."""
 
-    Attributes
-    ----------
-    joints
-        At its end [rad or m], ``(joints,)``.
-    via
-        At the point that an arc passes; None for a straight move.
-    pace
-        Speed of the flange, in that of the path.
-    """
-
-    joints: Array
-    via: Array | None = None
-    pace: float = 1.0
+    joints: Array  #: At its end [rad or m], ``(joints,)``.
+    via: Array | None = None  #: At the point that an arc passes; None for a straight move.
+    pace: float = 1.0  #: Speed of the flange, in that of the path.
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """Moves one after the other.
+    """Moves one after the other."""
 
-    Attributes
-    ----------
-    start
-        Joint positions where it begins, ``(joints,)``.
-    legs
-        Its moves.
-    zone
-        How near the end of a move the next may begin [m]; 0 for stops.
-    """
-
-    start: Array
-    legs: tuple[Leg, ...]
-    zone: float
+    start: Array  #: Joint positions where it begins, ``(joints,)``.
+    legs: tuple[Leg, ...]  #: Its moves.
+    zone: float  #: How near the end of a move the next may begin [m]; 0 for stops.
 
 
 class Routes:
     """Ways of a robot's tip that it can go.
 
-    Parameters
-    ----------
-    robot
-        As the controller knows it.
-    target
-        Name of what goes along them; None for the flange.
-    near
-        Joint positions in whose posture they are followed, ``(joints,)``.
+    Args:
+        robot: As the controller knows it.
+        target: Name of what goes along them; None for the flange.
+        near: Joint positions in whose posture they are followed, ``(joints,)``.
 
-    Attributes
-    ----------
-    driven
-        Joint positions on every way that was followed, close to each other, ``(n, joints)``, by the name of the way.
+    Attributes:
+        driven: Joint positions on every way that was followed, close to each other, ``(n, joints)``, by the name of the
+            way.
     """
 
     def __init__(self, robot: Robot, target: str | None, near: Array) -> None:

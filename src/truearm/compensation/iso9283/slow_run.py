@@ -47,12 +47,9 @@ class SlowRunFile(BaseModel):
 def slow_run_text(plan: str, programs: Mapping[str, str]) -> str:
     """Return the record of a slow run that is still to be done.
 
-    Parameters
-    ----------
-    plan
-        Text of the plan file.
-    programs
-        Texts of the slow programs, by their names.
+    Args:
+        plan: Text of the plan file.
+        programs: Texts of the slow programs, by their names.
     """
     lines = [
         "# Run every program below at its velocity from its first motion to its last, with nobody in reach of the",
@@ -71,20 +68,14 @@ def slow_run_text(plan: str, programs: Mapping[str, str]) -> str:
 def check_slow_run(path: Path, plan: str, programs: Mapping[str, str], today: datetime.date) -> None:
     """Refuse a record that is not of a completed slow run of a plan and its programs.
 
-    Parameters
-    ----------
-    path
-        The record.
-    plan, programs
-        As for :func:`slow_run_text`.
-    today
-        A run of a later day is not done yet; a day more is allowed, as dates differ around the world.
+    Args:
+        path: The record.
+        plan, programs: As for :func:`slow_run_text`.
+        today: A run of a later day is not done yet; a day more is allowed, as dates differ around the world.
 
-    Raises
-    ------
-    InputError
-        If it is of another plan or of other programs, not completed, does not say by whom and when, or names a day
-        that is no date or still to come.
+    Raises:
+        InputError: If it is of another plan or of other programs, not completed, does not say by whom and when, or
+            names a day that is no date or still to come.
     """
     record = read_yaml(path, SlowRunFile)
     if record.plan != hash_of(plan.encode()):

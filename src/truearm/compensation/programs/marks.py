@@ -24,14 +24,10 @@ _UNSAFE: Final = re.compile(r"[^A-Za-z0-9 ./+-]|-(?=-)")
 def correction_comment(day: date, robot: str = "", calibration: str = "") -> tuple[str, ...]:
     """Return the lines that name a program as corrected, in ASCII, 32 characters at most.
 
-    Parameters
-    ----------
-    day
-        When it was corrected.
-    robot
-        For which robot; empty if that stands there already.
-    calibration
-        Hash of the robot's file; empty if it has none.
+    Args:
+        day: When it was corrected.
+        robot: For which robot; empty if that stands there already.
+        calibration: Hash of the robot's file; empty if it has none.
     """
     made = f"{day.isoformat()}, calibration {calibration[:8]}" if calibration else day.isoformat()
     lines = [f"{MARK} {__version__}", made, *([f"for {_UNSAFE.sub('_', robot)}"] if robot else [])]
@@ -53,13 +49,10 @@ def comment_of(text: str) -> str | None:
 def with_lines_behind(text: str, place: int, lines: Sequence[str], comment: str | None) -> str:
     """Return a text with lines of comment behind the one that a place is on.
 
-    Parameters
-    ----------
-    place
-        Behind the last word that has to stand before them. What follows on its line goes to a line behind them, unless
-        it is a comment.
-    comment
-        How comments begin that last to the end of the line; None if no comment does.
+    Args:
+        place: Behind the last word that has to stand before them. What follows on its line goes to a line behind them,
+            unless it is a comment.
+        comment: How comments begin that last to the end of the line; None if no comment does.
     """
     end = _LINE_END.search(text, place)
     stop = end.start() if end else len(text)

@@ -25,91 +25,50 @@ LONGEST_WAIT: Final = 300.0
 
 @dataclass(frozen=True, slots=True)
 class JointMove:
-    """All joints go evenly to a target, and stop there.
+    """All joints go evenly to a target, and stop there."""
 
-    Attributes
-    ----------
-    target
-        Number of the target, from 0: its joint positions.
-    share
-        Of the fastest that the joints go, 0 to 1.
-    speed
-        Of the tip, for languages that say the speed of joint motions by it [m/s].
-    seconds
-        How long it takes, for languages that can say it and no share [s]; None for as long as the speeds make it.
-    turning
-        Angular velocity of the tip, beside `speed` [rad/s].
-    """
-
-    target: int
-    share: float
-    speed: float
+    target: int  #: Number of the target, from 0: its joint positions.
+    share: float  #: Of the fastest that the joints go, 0 to 1.
+    speed: float  #: Of the tip, for languages that say the speed of joint motions by it [m/s].
+    #: How long it takes, for languages that can say it and no share [s]; None for as long as the speeds make it.
     seconds: float | None = None
-    turning: float = math.radians(500.0)
+    turning: float = math.radians(500.0)  #: Angular velocity of the tip, beside `speed` [rad/s].
 
 
 @dataclass(frozen=True, slots=True)
 class StraightMove:
-    """The tip goes in a straight line.
+    """The tip goes in a straight line."""
 
-    Attributes
-    ----------
-    target
-        Number of the target, from 0: its pose.
-    speed
-        Of the tip [m/s].
-    zone
-        How near the target the next move may begin [m]; 0 for a stop.
-    """
-
-    target: int
-    speed: float
-    zone: float = 0.0
+    target: int  #: Number of the target, from 0: its pose.
+    speed: float  #: Of the tip [m/s].
+    zone: float = 0.0  #: How near the target the next move may begin [m]; 0 for a stop.
 
 
 @dataclass(frozen=True, slots=True)
 class CircleMove:
-    """The tip goes along an arc through a target to another; as :class:`StraightMove` else.
+    """The tip goes along an arc through a target to another; as :class:`StraightMove` else."""
 
-    Attributes
-    ----------
-    start, via, target
-        Numbers of the targets, from 0, where the arc begins, which it passes, and where it ends: their poses.
-    speed, zone
-        Of the tip [m/s], and how near the end the next move may begin [m].
-    """
-
+    #: start, via, target: numbers of the targets, from 0, where the arc begins, which it passes, and where it ends:
+    #: their poses.
     start: int
     via: int
     target: int
-    speed: float
+    speed: float  #: speed, zone: of the tip [m/s], and how near the end the next move may begin [m].
     zone: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """The robot stands still.
+    """The robot stands still."""
 
-    Attributes
-    ----------
-    seconds
-        How long [s].
-    """
-
-    seconds: float
+    seconds: float  #: How long [s].
 
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """A comment in the program.
+    """A comment in the program."""
 
-    Attributes
-    ----------
-    text
-        In ASCII, of :data:`LONGEST_COMMENT` characters at most.
-    """
-
-    text: str
+    text: str  #: In ASCII, of :data:`LONGEST_COMMENT` characters at most.
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,55 +76,28 @@ class InputWait:
     """The robot stands still until a digital input was off and is on; where that takes too long, the program pauses.
 
     An input that is still on from the time before does not count.
-
-    Attributes
-    ----------
-    input
-        Its number, or its name in languages that have names.
-    seconds
-        How long it waits at most [s].
-    label
-        What is waited for, for the message.
     """
 
-    input: str
-    seconds: float
-    label: str
+    input: str  #: Its number, or its name in languages that have names.
+    seconds: float  #: How long it waits at most [s].
+    label: str  #: What is waited for, for the message.
 
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """The program pauses until the operator starts it again.
+    """The program pauses until the operator starts it again."""
 
-    Attributes
-    ----------
-    label
-        Where it pauses, for the message.
-    """
-
-    label: str
+    label: str  #: Where it pauses, for the message.
 
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What the controller is told of what is mounted on its flange, in the axes of that flange.
+    """What the controller is told of what is mounted on its flange, in the axes of that flange."""
 
-    Attributes
-    ----------
-    name
-        What the tip is called; empty for the flange.
-    tip
-        The point whose speed counts [m].
-    mass
-        [kg].
-    cog
-        Centre of gravity [m].
-    """
-
-    name: str
-    tip: tuple[float, float, float]
-    mass: float
-    cog: tuple[float, float, float]
+    name: str  #: What the tip is called; empty for the flange.
+    tip: tuple[float, float, float]  #: The point whose speed counts [m].
+    mass: float  #: [kg].
+    cog: tuple[float, float, float]  #: Centre of gravity [m].
 
     @property
     def tip_mm(self) -> tuple[str, ...]:
@@ -183,20 +115,11 @@ ProgramStep = JointMove | StraightMove | CircleMove | Wait | Remark | InputWait 
 
 @dataclass(frozen=True, eq=False)
 class MotionProgram(NewTargets):
-    """Targets, and what the robot does one after the other.
+    """Targets, and what the robot does one after the other."""
 
-    Attributes
-    ----------
-    notes
-        What a person should know who opens the program.
-    steps
-        In their order.
-    carried
-        What the controller is told to carry; None tells it nothing: moves are of the flange.
-    """
-
-    notes: tuple[str, ...]
-    steps: tuple[ProgramStep, ...]
+    notes: tuple[str, ...]  #: What a person should know who opens the program.
+    steps: tuple[ProgramStep, ...]  #: In their order.
+    #: What the controller is told to carry; None tells it nothing: moves are of the flange.
     carried: Carried | None = None
 
     @property

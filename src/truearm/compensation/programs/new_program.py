@@ -29,29 +29,14 @@ class NewProgram(NewTargets):
     """The targets of a program to write, of :class:`.new_targets.NewTargets`, and how the robot goes to them.
 
     If it has poses, targets are these; else joint positions.
-
-    Attributes
-    ----------
-    durations
-        Time of the move to each target [s], ``(n,)``; that to the first is of no meaning.
-    speeds
-        Mean speed of the tip in that move [m/s], ``(n,)``.
-    spacing
-        Distance of the tip from the target before [m], ``(n,)``.
-    corrected
-        Whether the targets are corrected for one robot, which then must not be done again.
-    beside
-        How far the tip leaves the path between the targets [m].
-    simulated
-        Whether that robot was calibrated with simulated measurements.
     """
 
-    durations: Array
-    speeds: Array
-    spacing: Array
-    corrected: bool
-    beside: float
-    simulated: bool = False
+    durations: Array  #: Time of the move to each target [s], ``(n,)``; that to the first is of no meaning.
+    speeds: Array  #: Mean speed of the tip in that move [m/s], ``(n,)``.
+    spacing: Array  #: Distance of the tip from the target before [m], ``(n,)``.
+    corrected: bool  #: Whether the targets are corrected for one robot, which then must not be done again.
+    beside: float  #: How far the tip leaves the path between the targets [m].
+    simulated: bool = False  #: Whether that robot was calibrated with simulated measurements.
 
     def __len__(self) -> int:
         return len(self.joints)

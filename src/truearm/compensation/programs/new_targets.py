@@ -19,30 +19,16 @@ from truearm.modeling.inverse.branches import BRANCHES
 
 @dataclass(frozen=True, eq=False)
 class NewTargets:
-    """Targets to write.
+    """Targets to write."""
 
-    Attributes
-    ----------
-    name
-        Of the program.
-    robot
-        For whom it is, for a comment.
-    joints
-        Joint positions as the controller shows them [rad; m for sliding joints], ``(n, joints)``.
-    sliding
-        Which joints slide.
-    poses
-        Of the controller's flange in its base frame, ``(n, 4, 4)`` [m]; None where all targets are joint positions.
-    branches
-        Number of the branch of each pose, as in :data:`truearm.modeling.inverse.branches.BRANCHES`; None where they
-        are not known.
-    """
-
-    name: str
-    robot: str
-    joints: Array
-    sliding: tuple[bool, ...]
+    name: str  #: Of the program.
+    robot: str  #: For whom it is, for a comment.
+    joints: Array  #: Joint positions as the controller shows them [rad; m for sliding joints], ``(n, joints)``.
+    sliding: tuple[bool, ...]  #: Which joints slide.
+    #: Of the controller's flange in its base frame, ``(n, 4, 4)`` [m]; None where all targets are joint positions.
     poses: Array | None
+    #: Number of the branch of each pose, as in :data:`truearm.modeling.inverse.branches.BRANCHES`; None where they are
+    #: not known.
     branches: tuple[int, ...] | None
 
     def words(self, row: int) -> tuple[str, str, str]:
@@ -60,12 +46,9 @@ class NewTargets:
     def axes(self, row: int, form: Form, least: int = 6) -> list[str]:
         """Return the joint positions of a target as a language writes them, zeros for those that the arm does not have.
 
-        Parameters
-        ----------
-        form
-            What the language's numbers mean.
-        least
-            How many numbers the language writes at least.
+        Args:
+            form: What the language's numbers mean.
+            least: How many numbers the language writes at least.
         """
         units = [form.length if slides else form.angle for slides in self.sliding]
         decimals = [form.decimals[0] if slides else form.decimals[1] for slides in self.sliding]

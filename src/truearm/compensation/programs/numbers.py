@@ -27,19 +27,14 @@ def decimals_of(text: str) -> int:
 def rewritten(text: str, value: float, fewest: int) -> str:
     """Return the text of a number with another value, or the text as it is if its value is the same.
 
-    Parameters
-    ----------
-    text
-        The number as it stands in the program.
-    value
-        The new value, in the same unit.
-    fewest
-        How many decimals it gets at least. It keeps those that it has.
+    Args:
+        text: The number as it stands in the program.
+        value: The new value, in the same unit.
+        fewest: How many decimals it gets at least. It keeps those that it has.
 
-    Notes
-    -----
-    Two values are the same if they agree when written with that many decimals, or to a hundredth of the last of
-    `fewest`: what is smaller is the rounding of the arithmetic behind it.
+    Note:
+        Two values are the same if they agree when written with that many decimals, or to a hundredth of the last of
+        `fewest`: what is smaller is the rounding of the arithmetic behind it.
     """
     old = float(text)
     if abs(value - old) < 0.01 * 10.0**-fewest:

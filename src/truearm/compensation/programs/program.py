@@ -27,18 +27,10 @@ MoveKind = Literal["joint", "linear", "circular"]
 
 @dataclass(frozen=True)
 class Source:
-    """The text of one file of a program.
+    """The text of one file of a program."""
 
-    Attributes
-    ----------
-    path
-        Of the file.
-    text
-        Its bytes as Latin-1, so that every character is one byte and no byte is lost, whatever its encoding.
-    """
-
-    path: Path
-    text: str
+    path: Path  #: Of the file.
+    text: str  #: Its bytes as Latin-1, so that every character is one byte and no byte is lost, whatever its encoding.
 
     def where(self, line: int) -> str:
         """Return file and line, for a message."""
@@ -55,62 +47,39 @@ class Form:
 
     A pose is x, y, z and the numbers of its orientation, in the order that `orientation` has; joints are joint
     positions as the controller shows them, one for each joint of the robot.
-
-    Attributes
-    ----------
-    name
-        What the language calls it.
-    kind
-        ``pose``; ``joints``, angles of turning joints and lengths of sliding ones; ``pulses``, of the motors.
-    length
-        Metres in one unit of a length.
-    angle
-        Radians in one unit of an angle; of no meaning for quaternions and pulses.
-    orientation
-        How a pose is turned; None if its numbers are a position alone.
-    decimals
-        Fewest decimals of a number that is written: of lengths, and of angles or of a quaternion's numbers.
-    absent
-        For languages that do not write zeros: what to put into the text for a number that is not written, with ``{}``
-        where the number goes, one for each number. Such a number is 0 and its place is empty, where the text belongs.
     """
 
-    name: str
+    name: str  #: What the language calls it.
+    #: ``pose``; ``joints``, angles of turning joints and lengths of sliding ones; ``pulses``, of the motors.
     kind: Literal["pose", "joints", "pulses"]
-    length: float = 1e-3
-    angle: float = 1.0
-    orientation: Orientation | None = None
+    length: float = 1e-3  #: Metres in one unit of a length.
+    angle: float = 1.0  #: Radians in one unit of an angle; of no meaning for quaternions and pulses.
+    orientation: Orientation | None = None  #: How a pose is turned; None if its numbers are a position alone.
+    #: Fewest decimals of a number that is written: of lengths, and of angles or of a quaternion's numbers.
     decimals: tuple[int, int] = (3, 4)
+    #: For languages that do not write zeros: what to put into the text for a number that is not written, with ``{}``
+    #: where the number goes, one for each number. Such a number is 0 and its place is empty, where the text belongs.
     absent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """Which of the postures that reach a pose the program means; what is not said may be anything.
+    """Which of the postures that reach a pose the program means; what is not said may be anything."""
 
-    Attributes
-    ----------
-    shoulder, elbow, wrist
-        Words of the branches of :mod:`truearm.modeling.inverse.branches`.
-    ranges
-        ``(joint, low, high)``: the joint, from 1, reads `low` or more and less than `high` [rad], as the controller
-        shows it.
-    outside
-        ``(joint, low, high)``: the joint reads less than `low`, or `high` or more [rad].
-    literal
-        Whether the controller takes the ranges to the letter. Others take the nearest posture where a joint is
-        a little beyond.
-    near
-        Joint positions [rad or m], as the controller shows them, that the posture is nearest to; if None, and the rest
-        leaves a choice, nearest to where the robot comes from.
-    """
-
+    #: shoulder, elbow, wrist: words of the branches of :mod:`truearm.modeling.inverse.branches`.
     shoulder: Literal["front", "back"] | None = None
     elbow: Literal["up", "down"] | None = None
     wrist: Literal["noflip", "flip"] | None = None
+    #: ``(joint, low, high)``: the joint, from 1, reads `low` or more and less than `high` [rad], as the controller
+    #: shows it.
     ranges: tuple[tuple[int, float, float], ...] = ()
+    #: ``(joint, low, high)``: the joint reads less than `low`, or `high` or more [rad].
     outside: tuple[tuple[int, float, float], ...] = ()
+    #: Whether the controller takes the ranges to the letter. Others take the nearest posture where a joint is a little
+    #: beyond.
     literal: bool = False
+    #: Joint positions [rad or m], as the controller shows them, that the posture is nearest to; if None, and the rest
+    #: leaves a choice, nearest to where the robot comes from.
     near: tuple[float, ...] | None = None
 
 
@@ -119,139 +88,76 @@ ANY_POSTURE = Configuration()
 
 @dataclass(frozen=True, slots=True)
 class ProgramTarget:
-    """A place in a program that the robot is sent to.
+    """A place in a program that the robot is sent to."""
 
-    Attributes
-    ----------
-    source
-        Which file of the program it stands in, from 0.
-    line
-        Line in that file, from 1.
-    name
-        As the program calls it; empty where it has no name.
-    form
-        What its numbers mean.
-    values
-        Its numbers, in the file's units.
-    places
-        Where each of `values` stands in the text: ``(start, stop)``; ``(place, place)`` for a number that is not
-        written and can be put in there, see :attr:`Form.absent`; None for one that cannot.
-    tool, frame
-        Names of the tool and of the work object, base or user frame that hold; empty for the flange and the robot's
-        own base.
-    configuration
-        In which posture the target is reached.
-    parent
-        Index of the target that this one is an offset from, None for none. A target and its parent have the same tool
-        and frame.
-    turned
-        Whether the offset is in the axes of the parent itself (RelTool, the colon of KRL) and not of the frame (Offs).
-    """
-
-    source: int
-    line: int
-    name: str
-    form: Form
-    values: tuple[float, ...]
+    source: int  #: Which file of the program it stands in, from 0.
+    line: int  #: Line in that file, from 1.
+    name: str  #: As the program calls it; empty where it has no name.
+    form: Form  #: What its numbers mean.
+    values: tuple[float, ...]  #: Its numbers, in the file's units.
+    #: Where each of `values` stands in the text: ``(start, stop)``; ``(place, place)`` for a number that is not written
+    #: and can be put in there, see :attr:`Form.absent`; None for one that cannot.
     places: tuple[tuple[int, int] | None, ...]
+    #: tool, frame: names of the tool and of the work object, base or user frame that hold; empty for the flange and the
+    #: robot's own base.
     tool: str = ""
     frame: str = ""
-    configuration: Configuration = ANY_POSTURE
+    configuration: Configuration = ANY_POSTURE  #: In which posture the target is reached.
+    #: Index of the target that this one is an offset from, None for none. A target and its parent have the same tool
+    #: and frame.
     parent: int | None = None
+    #: Whether the offset is in the axes of the parent itself (RelTool, the colon of KRL) and not of the frame (Offs).
     turned: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """An instruction that moves the robot.
+    """An instruction that moves the robot."""
 
-    Attributes
-    ----------
-    kind
-        How the tip goes.
-    target
-        Index of the target that it ends at.
-    source, line
-        File of the program, from 0, and line in it, from 1.
-    via
-        Index of the target that a circle passes.
-    routine
-        Which stretch of the program, from 0: the moves of a stretch follow each other in the text, and nothing between
-        them jumps, calls or moves the robot. Where the robot is before the first of them is not known.
-    statement
-        Where the whole instruction stands in the text, ``(start, stop)``, from its first to after its last character.
-    target_text, via_text
-        Where the words for the targets stand in the text, inside of `statement`. ``(0, 0)`` for a move that cannot be
-        split.
-    """
-
-    kind: MoveKind
-    target: int
-    source: int
+    kind: MoveKind  #: How the tip goes.
+    target: int  #: Index of the target that it ends at.
+    source: int  #: source, line: file of the program, from 0, and line in it, from 1.
     line: int
-    via: int | None = None
+    via: int | None = None  #: Index of the target that a circle passes.
+    #: Which stretch of the program, from 0: the moves of a stretch follow each other in the text, and nothing between
+    #: them jumps, calls or moves the robot. Where the robot is before the first of them is not known.
     routine: int = 0
+    #: Where the whole instruction stands in the text, ``(start, stop)``, from its first to after its last character.
     statement: tuple[int, int] = (0, 0)
+    #: target_text, via_text: where the words for the targets stand in the text, inside of `statement`. ``(0, 0)`` for a
+    #: move that cannot be split.
     target_text: tuple[int, int] = (0, 0)
     via_text: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
 class Skipped:
-    """A target that is left as it is.
+    """A target that is left as it is."""
 
-    Attributes
-    ----------
-    source, line
-        File of the program, from 0, and line in it, from 1.
-    reason
-        Why, in plain words.
-    """
-
-    source: int
+    source: int  #: source, line: file of the program, from 0, and line in it, from 1.
     line: int
-    reason: str
+    reason: str  #: Why, in plain words.
 
 
 @dataclass(frozen=True)
 class Program:
-    """A robot program: its texts, and what was found in them.
+    """A robot program: its texts, and what was found in them."""
 
-    Attributes
-    ----------
-    language
-        Name of the language.
-    sources
-        Its files.
-    targets
-        In the order of the text.
-    moves
-        In the order of the text.
-    tools
-        By name, ``T_flange_tip`` as the program defines it, in the controller's flange frame.
-    frames
-        By name, ``T_base_frame`` as the program defines it, in the controller's base frame.
-    skipped
-        What looks like a target and cannot be corrected, with the reason.
-    unknown
-        How often an instruction occurs that the reader does not know and leaves alone, by its first word.
-    loads
-        By the name of a tool, what the program says that the robot carries with it; the centre of gravity in the
-        controller's flange frame.
-    load_changes
-        Whether instructions change what the robot carries.
-    """
-
-    language: str
-    sources: tuple[Source, ...]
-    targets: tuple[ProgramTarget, ...]
-    moves: tuple[Move, ...] = ()
+    language: str  #: Name of the language.
+    sources: tuple[Source, ...]  #: Its files.
+    targets: tuple[ProgramTarget, ...]  #: In the order of the text.
+    moves: tuple[Move, ...] = ()  #: In the order of the text.
+    #: By name, ``T_flange_tip`` as the program defines it, in the controller's flange frame.
     tools: Mapping[str, Transform] = field(default_factory=dict)
+    #: By name, ``T_base_frame`` as the program defines it, in the controller's base frame.
     frames: Mapping[str, Transform] = field(default_factory=dict)
-    skipped: tuple[Skipped, ...] = ()
+    skipped: tuple[Skipped, ...] = ()  #: What looks like a target and cannot be corrected, with the reason.
+    #: How often an instruction occurs that the reader does not know and leaves alone, by its first word.
     unknown: Mapping[str, int] = field(default_factory=dict)
+    #: By the name of a tool, what the program says that the robot carries with it; the centre of gravity in the
+    #: controller's flange frame.
     loads: Mapping[str, Payload] = field(default_factory=dict)
-    load_changes: bool = False
+    load_changes: bool = False  #: Whether instructions change what the robot carries.
 
     def by_file(self) -> dict[Path, list[ProgramTarget]]:
         """Return its targets by the files in which they stand."""
@@ -262,130 +168,74 @@ class Program:
 
 
 class Edit(NamedTuple):
-    """Text to put in the place of other text.
+    """Text to put in the place of other text."""
 
-    Attributes
-    ----------
-    source
-        File of the program, from 0.
-    start, stop
-        What is replaced, in the text as it was; nothing if they are the same, and the new text is put before it.
-    text
-        The new text.
-    """
-
-    source: int
+    source: int  #: File of the program, from 0.
+    #: start, stop: what is replaced, in the text as it was; nothing if they are the same, and the new text is put
+    #: before it.
     start: int
     stop: int
-    text: str
+    text: str  #: The new text.
 
 
 @dataclass(frozen=True)
 class Split:
-    """A linear or circular move that is split into segments.
+    """A linear or circular move that is split into segments."""
 
-    Attributes
-    ----------
-    move
-        Index of the move.
-    points
-        One entry for each instruction to insert before the move: the numbers of its target, and of its via for a
-        circle (else None), in the form and units of the move's target.
-    last_via
-        For a circle the numbers of the via of its last segment, which is the move itself.
-    """
-
-    move: int
+    move: int  #: Index of the move.
+    #: One entry for each instruction to insert before the move: the numbers of its target, and of its via for a circle
+    #: (else None), in the form and units of the move's target.
     points: tuple[tuple[tuple[float, ...], tuple[float, ...] | None], ...]
+    #: For a circle the numbers of the via of its last segment, which is the move itself.
     last_via: tuple[float, ...] | None = None
 
 
 class SplitEdits(NamedTuple):
-    """How the text of a program changes when moves are split.
+    """How the text of a program changes when moves are split."""
 
-    Attributes
-    ----------
-    edits
-        What changes in the text.
-    unsplit
-        Indices of moves that stay whole, because segments of them would do something else.
-    """
-
-    edits: list[Edit]
-    unsplit: list[int]
+    edits: list[Edit]  #: What changes in the text.
+    unsplit: list[int]  #: Indices of moves that stay whole, because segments of them would do something else.
 
 
 class MakersCalibration(NamedTuple):
-    """How the maker of a controller may have calibrated the arm itself.
+    """How the maker of a controller may have calibrated the arm itself."""
 
-    Attributes
-    ----------
-    maker
-        Of robot and controller.
-    name
-        What the maker calls it.
-    always
-        Whether every arm is delivered so, or only where it was ordered.
-    """
-
-    maker: str
-    name: str
-    always: bool = False
+    maker: str  #: Of robot and controller.
+    name: str  #: What the maker calls it.
+    always: bool = False  #: Whether every arm is delivered so, or only where it was ordered.
 
 
 @dataclass(frozen=True)
 class Language:
-    """A robot language.
+    """A robot language."""
 
-    Attributes
-    ----------
-    name
-        Its name.
-    suffixes
-        Of its files, lower case with the dot. The suffix decides the language; what is in the file has to agree.
-    makers
-        Whose controllers run it, by the names that the maker has; the first is the usual one.
-    is_one
-        Whether a text looks like this language.
-    read
-        Read the files of one program, given together.
-    comment
-        Put lines of comment into a text of the language: ASCII, 32 characters at most. Every other byte stays, but for
-        a count of lines; the text stays as it is where it has no place for them.
-    split
-        Split moves; None if the language's programs cannot be split.
-    new
-        Write a program from scratch: texts of its files by their names.
-    motion
-        The same for a program with stops, waits and circles.
-    together
-        Whether files that are given together are one program and share names; else each is one for itself.
-    companions
-        Pairs of suffixes: beside a file of the first may lie one of the second that belongs to it.
-    calibration
-        How controllers that run it may have been calibrated by their maker; None if nothing is known of that.
-    flange, base
-        What the language calls the robot's own flange and base, in small letters. Every cell file may call them
-        ``flange`` and ``base``.
-    reads
-        Where a text reads numbers of a place: the first group is the name of the place, without an index that follows;
-        None where comments and strings are matched instead. None if the language's programs cannot.
-    """
-
-    name: str
+    name: str  #: Its name.
+    #: Of its files, lower case with the dot. The suffix decides the language; what is in the file has to agree.
     suffixes: tuple[str, ...]
-    makers: tuple[str, ...]
-    is_one: Callable[[str], bool]
-    read: Callable[[Sequence[Source]], Program]
+    makers: tuple[str, ...]  #: Whose controllers run it, by the names that the maker has; the first is the usual one.
+    is_one: Callable[[str], bool]  #: Whether a text looks like this language.
+    read: Callable[[Sequence[Source]], Program]  #: Read the files of one program, given together.
+    #: Put lines of comment into a text of the language: ASCII, 32 characters at most. Every other byte stays, but for a
+    #: count of lines; the text stays as it is where it has no place for them.
     comment: Callable[[str, Sequence[str]], str]
+    #: Split moves; None if the language's programs cannot be split.
     split: Callable[[Program, Sequence[Split]], SplitEdits] | None = None
+    #: Write a program from scratch: texts of its files by their names.
     new: Callable[[NewProgram], Mapping[str, str]] | None = None
+    #: The same for a program with stops, waits and circles.
     motion: Callable[[MotionProgram], Mapping[str, str]] | None = None
+    #: Whether files that are given together are one program and share names; else each is one for itself.
     together: bool = False
+    #: Pairs of suffixes: beside a file of the first may lie one of the second that belongs to it.
     companions: tuple[tuple[str, str], ...] = ()
+    #: How controllers that run it may have been calibrated by their maker; None if nothing is known of that.
     calibration: MakersCalibration | None = None
+    #: flange, base: what the language calls the robot's own flange and base, in small letters. Every cell file may call
+    #: them ``flange`` and ``base``.
     flange: tuple[str, ...] = ()
     base: tuple[str, ...] = ()
+    #: Where a text reads numbers of a place: the first group is the name of the place, without an index that follows;
+    #: None where comments and strings are matched instead. None if the language's programs cannot.
     reads: re.Pattern[str] | None = None
 
     def runs_on(self, maker: str) -> bool:

@@ -18,26 +18,15 @@ SURE: Final = 0.95
 
 @dataclass(frozen=True)
 class Quantile:
-    """An error below which a share of the robots is.
+    """An error below which a share of the robots is."""
 
-    Attributes
-    ----------
-    share
-        Of the robots.
-    value
-        The error; None where the robots are too few to expect one of them beyond it.
-    low, high
-        Ends of the interval of 95 %, two of the errors found (order statistics); None where no error that was found
-        is sure to be beyond.
-    needed
-        So many robots give both ends.
-    """
-
-    share: float
-    value: float | None
+    share: float  #: Of the robots.
+    value: float | None  #: The error; None where the robots are too few to expect one of them beyond it.
+    #: low, high: ends of the interval of 95 %, two of the errors found (order statistics); None where no error that was
+    #: found is sure to be beyond.
     low: float | None
     high: float | None
-    needed: int
+    needed: int  #: So many robots give both ends.
 
 
 def quantiles(values: Array, shares: tuple[float, ...] = SHARES) -> tuple[Quantile, ...]:

@@ -23,19 +23,12 @@ ACCURACIES: Final = ("nominal", "held_out", "truth")
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors of robots, one machine an entry, by its last measurement that can be used [m].
+    """Errors of robots, one machine an entry, by its last measurement that can be used [m]."""
 
-    Attributes
-    ----------
-    mean, largest
-        Over the configurations of each robot that its calibration has not seen, ``(machines,)``.
-    names
-        Of these measurements.
-    """
-
+    #: mean, largest: over the configurations of each robot that its calibration has not seen, ``(machines,)``.
     mean: Array
     largest: Array
-    names: tuple[str, ...]
+    names: tuple[str, ...]  #: Of these measurements.
 
     @property
     def of_means(self) -> tuple[Quantile, ...]:
@@ -60,31 +53,17 @@ class KindFound:
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """All that a fleet says.
+    """All that a fleet says."""
 
-    Attributes
-    ----------
-    measurements, machines
-        How many there are.
-    failed
-        Names of those that could not be calibrated, with the reason.
-    left_out
-        Names of those whose result should not be used as it is: nothing of it is in the figures.
-    errors
-        By what they are of, see :data:`ACCURACIES`; those that were not judged are left out.
-    kinds
-        Robots of one kind each, the kind with most first.
-    looks
-        Which to look at first.
-    """
-
-    measurements: int
+    measurements: int  #: measurements, machines: how many there are.
     machines: int
-    failed: tuple[tuple[str, str], ...]
+    failed: tuple[tuple[str, str], ...]  #: Names of those that could not be calibrated, with the reason.
+    #: Names of those whose result should not be used as it is: nothing of it is in the figures.
     left_out: tuple[str, ...]
+    #: By what they are of, see :data:`ACCURACIES`; those that were not judged are left out.
     errors: Mapping[str, Errors]
-    kinds: tuple[KindFound, ...]
-    looks: tuple[Look, ...]
+    kinds: tuple[KindFound, ...]  #: Robots of one kind each, the kind with most first.
+    looks: tuple[Look, ...]  #: Which to look at first.
 
     @property
     def usable(self) -> int:

@@ -20,37 +20,17 @@ Beside = Literal["series", "prior"]
 
 @dataclass(frozen=True)
 class Difference:
-    """A parameter of a robot that is not like that of the others.
+    """A parameter of a robot that is not like that of the others."""
 
-    Attributes
-    ----------
-    robot
-        Name of the measurement.
-    parameter, unit
-        Its name and SI unit.
-    off
-        How far it is from the median of the series, or from nominal [SI].
-    times
-        So many of the deviations to be expected.
-    chance
-        How often a series in which no robot differs shows one so far off anywhere, 1 at most.
-    beside
-        What it was compared with: the other robots, or the prior where these are few.
-    alone
-        Whether the value is the parameter's own; False where it is told together with others.
-    together
-        With which, as far as that is known.
-    """
-
-    robot: str
-    parameter: str
+    robot: str  #: Name of the measurement.
+    parameter: str  #: parameter, unit: its name and SI unit.
     unit: str
-    off: float
-    times: float
-    chance: float
-    beside: Beside
-    alone: bool
-    together: tuple[str, ...] = ()
+    off: float  #: How far it is from the median of the series, or from nominal [SI].
+    times: float  #: So many of the deviations to be expected.
+    chance: float  #: How often a series in which no robot differs shows one so far off anywhere, 1 at most.
+    beside: Beside  #: What it was compared with: the other robots, or the prior where these are few.
+    alone: bool  #: Whether the value is the parameter's own; False where it is told together with others.
+    together: tuple[str, ...] = ()  #: With which, as far as that is known.
 
 
 def differences(kind: Kind) -> tuple[Difference, ...]:

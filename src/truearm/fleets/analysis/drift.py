@@ -41,51 +41,28 @@ _BENT: Final = 0.01
 
 @dataclass(frozen=True)
 class Drift:
-    """How a parameter of a machine went on from campaign to campaign; everything in SI units.
+    """How a parameter of a machine went on from campaign to campaign; everything in SI units."""
 
-    Attributes
-    ----------
-    machine
-        Which one.
-    parameter, unit
-        Its name and unit.
-    campaigns
-        So many measurements of it.
-    months
-        From the first to the last.
-    slope, low, high
-        Change in a month with its interval, in which the true ones of all comparisons together lie in 95 % of fleets:
-        it holds no zero where the change is more than chance.
-    times
-        The slope in its deviations.
-    chance
-        How often a fleet in which nothing changes shows one so large anywhere, 1 at most.
-    steady
-        Whether a straight line fits; None of two campaigns, which any line fits.
-    campaign_months, changes, deviations
-        When each campaign was, in months after the first, what had changed by then, and the standard deviation of that.
-    alone
-        Whether the value is the parameter's own; False where it is told together with others.
-    together
-        With which, as far as that is known.
-    """
-
-    machine: str
-    parameter: str
+    machine: str  #: Which one.
+    parameter: str  #: parameter, unit: its name and unit.
     unit: str
-    campaigns: int
-    months: float
+    campaigns: int  #: So many measurements of it.
+    months: float  #: From the first to the last.
+    #: slope, low, high: change in a month with its interval, in which the true ones of all comparisons together lie in
+    #: 95 % of fleets: it holds no zero where the change is more than chance.
     slope: float
     low: float
     high: float
-    times: float
-    chance: float
-    steady: bool | None
+    times: float  #: The slope in its deviations.
+    chance: float  #: How often a fleet in which nothing changes shows one so large anywhere, 1 at most.
+    steady: bool | None  #: Whether a straight line fits; None of two campaigns, which any line fits.
+    #: campaign_months, changes, deviations: when each campaign was, in months after the first, what had changed by
+    #: then, and the standard deviation of that.
     campaign_months: tuple[float, ...]
     changes: tuple[float, ...]
     deviations: tuple[float, ...]
-    alone: bool
-    together: tuple[str, ...] = ()
+    alone: bool  #: Whether the value is the parameter's own; False where it is told together with others.
+    together: tuple[str, ...] = ()  #: With which, as far as that is known.
 
     @property
     def significant(self) -> bool:
@@ -112,31 +89,18 @@ class AllDrift:
 
 @dataclass(frozen=True)
 class Drifts:
-    """Machines that were measured again.
+    """Machines that were measured again."""
 
-    Attributes
-    ----------
-    found
-        Their parameters, the surest change first; of many machines those that changed by more than chance, and the
-        surest of each.
-    compared
-        How many parameters of machines were looked at.
-    alike
-        Parameters that change alike in all machines: what measured them may have changed instead.
-    undated
-        Machines with several measurements, but not at two known dates.
-    others
-        Machines whose results differ as those of two robots do: their serial numbers may be wrong.
-    unknown
-        Parameters of which no change can be seen, because nothing but priors holds them.
-    """
-
+    #: Their parameters, the surest change first; of many machines those that changed by more than chance, and the
+    #: surest of each.
     found: tuple[Drift, ...] = ()
-    compared: int = 0
+    compared: int = 0  #: How many parameters of machines were looked at.
+    #: Parameters that change alike in all machines: what measured them may have changed instead.
     alike: tuple[AllDrift, ...] = ()
-    undated: tuple[str, ...] = ()
+    undated: tuple[str, ...] = ()  #: Machines with several measurements, but not at two known dates.
+    #: Machines whose results differ as those of two robots do: their serial numbers may be wrong.
     others: tuple[str, ...] = ()
-    unknown: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()  #: Parameters of which no change can be seen, because nothing but priors holds them.
 
     @property
     def significant(self) -> tuple[Drift, ...]:
@@ -202,29 +166,15 @@ def _is_another(kind: Kind, machine_rows: list[int]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Lines through the campaigns of a machine, one for each parameter, the surest first.
+    """Lines through the campaigns of a machine, one for each parameter, the surest first."""
 
-    Attributes
-    ----------
-    numbers
-        Of the parameters, ``(parameters,)``.
-    months
-        Of the campaigns after the first, ``(campaigns,)``.
-    slopes, errors
-        In a month with their standard deviations [SI], ``(parameters,)``.
-    changes, deviations
-        Since the first campaign [SI], ``(parameters, campaigns)``.
-    bent
-        How rarely chance bends a line so far, ``(parameters,)``; NaN of two campaigns.
-    """
-
-    numbers: NDArray[np.intp]
-    months: Array
-    slopes: Array
+    numbers: NDArray[np.intp]  #: Of the parameters, ``(parameters,)``.
+    months: Array  #: Of the campaigns after the first, ``(campaigns,)``.
+    slopes: Array  #: slopes, errors: in a month with their standard deviations [SI], ``(parameters,)``.
     errors: Array
-    changes: Array
+    changes: Array  #: changes, deviations: since the first campaign [SI], ``(parameters, campaigns)``.
     deviations: Array
-    bent: Array
+    bent: Array  #: How rarely chance bends a line so far, ``(parameters,)``; NaN of two campaigns.
 
     @property
     def times(self) -> Array:

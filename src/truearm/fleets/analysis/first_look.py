@@ -33,32 +33,16 @@ _SOUND: Final = ("converged", "at-bound")
 
 @dataclass(frozen=True)
 class Judged:
-    """What is kept of a robot to tell whether to look at it.
+    """What is kept of a robot to tell whether to look at it."""
 
-    Attributes
-    ----------
-    name, machine
-        Of the measurement, and of what was measured.
-    message
-        Why it was not calibrated; empty if it was.
-    errors
-        Codes of notices of the level error.
-    fit_status
-        How the fit ended.
-    mean, largest
-        Mean and largest held-out error [m]; NaN where nothing was held out.
-    before
-        Mean error of the nominal robot [m].
-    """
-
-    name: str
+    name: str  #: name, machine: of the measurement, and of what was measured.
     machine: str
-    message: str
-    errors: tuple[str, ...]
-    fit_status: str | None
-    mean: float
+    message: str  #: Why it was not calibrated; empty if it was.
+    errors: tuple[str, ...]  #: Codes of notices of the level error.
+    fit_status: str | None  #: How the fit ended.
+    mean: float  #: mean, largest: mean and largest held-out error [m]; NaN where nothing was held out.
     largest: float
-    before: float
+    before: float  #: Mean error of the nominal robot [m].
 
     @classmethod
     def of(cls, row: Row) -> Judged:
@@ -78,26 +62,16 @@ class Judged:
 
 @dataclass(frozen=True)
 class Reason:
-    """Why to look at a robot.
+    """Why to look at a robot."""
 
-    Attributes
-    ----------
-    why
-        Which kind of reason.
-    message, codes
-        For ``failed`` and ``error``, ``unsound``.
-    error, beside
-        Mean held-out error [m], and what it is held against: of the nominal robot, or the median of the series.
-    differences, drifts
-        The parameters, the surest first.
-    """
-
-    why: Why
-    message: str = ""
+    why: Why  #: Which kind of reason.
+    message: str = ""  #: message, codes: for ``failed`` and ``error``, ``unsound``.
     codes: tuple[str, ...] = ()
+    #: error, beside: mean held-out error [m], and what it is held against: of the nominal robot, or the median of the
+    #: series.
     error: float = 0.0
     beside: float = 0.0
-    differences: tuple[Difference, ...] = ()
+    differences: tuple[Difference, ...] = ()  #: differences, drifts: the parameters, the surest first.
     drifts: tuple[Drift, ...] = ()
 
     @property

@@ -35,46 +35,24 @@ _AT_ONCE: Final = 1000
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Robots of one kind that were calibrated, one row a measurement.
+    """Robots of one kind that were calibrated, one row a measurement."""
 
-    Attributes
-    ----------
-    robot
-        Its name.
-    names
-        Of the measurements, ``rows`` of them.
-    machines
-        The machine of each: several measurements may be of one.
-    days
-        When, in days; NaN where that is not known, ``(rows,)``.
-    parameters, units
-        Those of the arm that were identified in any row, with their SI units.
-    nominal, prior
-        Value before and its standard deviation [SI], ``(parameters,)``; NaN where robots disagree about them.
-    difference
-        What was found less nominal [SI], ``(rows, parameters)``; NaN where it was not identified.
-    deviation
-        Standard deviation of that [SI], ``(rows, parameters)``.
-    informed
-        Share of the prior variance that the readings removed, ``(rows, parameters)``.
-    drawn
-        Whether priors drew the values towards nominal, ``(rows,)``.
-    covariances
-        Of each row, in priors, ``(parameters, parameters)``; None where it is not known.
-    """
-
-    robot: str
-    names: tuple[str, ...]
-    machines: tuple[str, ...]
-    days: Array
+    robot: str  #: Its name.
+    names: tuple[str, ...]  #: Of the measurements, ``rows`` of them.
+    machines: tuple[str, ...]  #: The machine of each: several measurements may be of one.
+    days: Array  #: When, in days; NaN where that is not known, ``(rows,)``.
+    #: parameters, units: those of the arm that were identified in any row, with their SI units.
     parameters: tuple[str, ...]
     units: tuple[str, ...]
+    #: nominal, prior: value before and its standard deviation [SI], ``(parameters,)``; NaN where robots disagree about
+    #: them.
     nominal: Array
     prior: Array
-    difference: Array
-    deviation: Array
-    informed: Array
-    drawn: NDArray[np.bool_]
+    difference: Array  #: What was found less nominal [SI], ``(rows, parameters)``; NaN where it was not identified.
+    deviation: Array  #: Standard deviation of that [SI], ``(rows, parameters)``.
+    informed: Array  #: Share of the prior variance that the readings removed, ``(rows, parameters)``.
+    drawn: NDArray[np.bool_]  #: Whether priors drew the values towards nominal, ``(rows,)``.
+    #: Of each row, in priors, ``(parameters, parameters)``; None where it is not known.
     covariances: tuple[Array | None, ...]
 
     def together(self, number: int) -> tuple[str, ...]:

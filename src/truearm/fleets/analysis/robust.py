@@ -19,14 +19,11 @@ FREEDOM: Final = 0.6
 def robust_spread(values: Array) -> tuple[Array, Array]:
     """Return median and standard deviation of each column, the latter by the biweight midvariance.
 
-    Parameters
-    ----------
-    values
-        ``(n, columns)``, NaN where there is none.
+    Args:
+        values: ``(n, columns)``, NaN where there is none.
 
-    Returns
-    -------
-    Both ``(columns,)``; where more than half of the values are the same the deviation is 0.
+    Returns:
+        Both ``(columns,)``; where more than half of the values are the same the deviation is 0.
     """
     centre = np.nanmedian(values, axis=0)
     off = values - centre

@@ -21,40 +21,22 @@ Verdict = Literal["agrees", "wider", "narrower", "too few", "shared", "prior onl
 
 @dataclass(frozen=True)
 class ParameterSpread:
-    """How a parameter scatters over the robots of a series; everything in SI units.
+    """How a parameter scatters over the robots of a series; everything in SI units."""
 
-    Attributes
-    ----------
-    parameter, unit
-        Its name and unit.
-    nominal, prior
-        As the robot file has them; NaN where the robots' files disagree.
-    share
-        Typical informed share.
-    robots
-        How many count: those that identified it, without those that differ.
-    mean, mean_low, mean_high
-        Mean difference from nominal with its interval of 95 %; None if it is not told.
-    beside
-        Whether the whole series lies beside nominal.
-    spread, low, high
-        Standard deviation of the robots about their mean, without what the estimates are uncertain by, with its
-        interval of 95 %; None if it is not told.
-    verdict
-        The spread beside the prior, or why it is not told.
-    """
-
-    parameter: str
+    parameter: str  #: parameter, unit: its name and unit.
     unit: str
-    nominal: float
+    nominal: float  #: nominal, prior: as the robot file has them; NaN where the robots' files disagree.
     prior: float
-    share: float
-    robots: int
-    verdict: Verdict
+    share: float  #: Typical informed share.
+    robots: int  #: How many count: those that identified it, without those that differ.
+    verdict: Verdict  #: The spread beside the prior, or why it is not told.
+    #: mean, mean_low, mean_high: mean difference from nominal with its interval of 95 %; None if it is not told.
     mean: float | None = None
     mean_low: float | None = None
     mean_high: float | None = None
-    beside: bool = False
+    beside: bool = False  #: Whether the whole series lies beside nominal.
+    #: spread, low, high: standard deviation of the robots about their mean, without what the estimates are uncertain
+    #: by, with its interval of 95 %; None if it is not told.
     spread: float | None = None
     low: float | None = None
     high: float | None = None
@@ -82,10 +64,8 @@ def spreads(kind: Kind, differing: Collection[str] = ()) -> tuple[ParameterSprea
     has an interval by the chi-squared distribution, with fewer degrees of freedom where values far from the mean are
     more frequent than in a normal distribution (Box 1953).
 
-    Parameters
-    ----------
-    differing
-        Names of measurements that are left out: robots with a fault say nothing of the kind.
+    Args:
+        differing: Names of measurements that are left out: robots with a fault say nothing of the kind.
     """
     left_out = set(differing)
     rows = [row for row in kind.latest.tolist() if kind.names[row] not in left_out]

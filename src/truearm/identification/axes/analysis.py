@@ -34,33 +34,15 @@ _LARGEST_MISFIT: Final = 2.0
 
 @dataclass(frozen=True, eq=False)
 class AxisAnalysis:
-    """What circles say about a robot.
+    """What circles say about a robot."""
 
-    Attributes
-    ----------
-    nominal
-        The robot as its file has it.
-    data
-        The readings.
-    found
-        The circles.
-    measured
-        The axes with all joints at zero, four numbers each.
-    calibrated
-        The robot in its own convention.
-    errors
-        The robot as its design with joint errors.
-    in_robot_frame
-        Whether the data are given in the robot's base frame; if not, axes 1 and 2 say where it is.
-    """
-
-    nominal: Robot
-    data: Dataset
-    found: AxisCircles
-    measured: AxisFit
-    calibrated: AxisFit
-    errors: AxisFit
-    in_robot_frame: bool
+    nominal: Robot  #: The robot as its file has it.
+    data: Dataset  #: The readings.
+    found: AxisCircles  #: The circles.
+    measured: AxisFit  #: The axes with all joints at zero, four numbers each.
+    calibrated: AxisFit  #: The robot in its own convention.
+    errors: AxisFit  #: The robot as its design with joint errors.
+    in_robot_frame: bool  #: Whether the data are given in the robot's base frame; if not, axes 1 and 2 say where it is.
 
     @cached_property
     def robot(self) -> Robot:
@@ -161,10 +143,8 @@ class AxisAnalysis:
     def table(self, convention_name: str) -> list[dict[str, tuple[float, float]]]:
         """Return the rows of the measured axes in a convention, each number with its deviation [SI].
 
-        Raises
-        ------
-        InputError
-            If the convention cannot describe the axes: nearly parallel ones in a DH table or the S-model.
+        Raises:
+            InputError: If the convention cannot describe the axes: nearly parallel ones in a DH table or the S-model.
         """
         columns = [list(joint.row) for joint in converted(self.framed(self.measured.robot), convention_name).joints]
 
@@ -214,19 +194,15 @@ class AxisAnalysis:
 def analyse(robot: Robot, data: Dataset, *, in_robot_frame: bool = False) -> AxisAnalysis:
     """Find a robot's axes from measurements in which one joint moves at a time.
 
-    Parameters
-    ----------
-    robot
-        Its current values are the nominal ones. Joint effects are kept, and deflect the axes as they say.
-    data
-        Runs of every joint; see :func:`truearm.measurement.turns.find_runs`.
-    in_robot_frame
-        Whether the data are given in the frame of the robot's base, as set up before (KR5 paper, section 3.1).
+    Args:
+        robot: Its current values are the nominal ones. Joint effects are kept, and deflect the axes as they say.
+        data: Runs of every joint; see :func:`truearm.measurement.turns.find_runs`.
+        in_robot_frame: Whether the data are given in the frame of the robot's base, as set up before (KR5 paper,
+            section 3.1).
 
-    Raises
-    ------
-    InputError
-        If a joint has no run, slides, turns the other way or too little, or axes 1 and 2 or the last two are parallel.
+    Raises:
+        InputError: If a joint has no run, slides, turns the other way or too little, or axes 1 and 2 or the last two
+            are parallel.
     """
     if len(robot.joints) != data.joints.shape[1]:
         raise InputError(

@@ -30,24 +30,12 @@ _SMALLEST_DEVIATION: Final = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class AxisCircle:
-    """The circle of one target in one run.
+    """The circle of one target in one run."""
 
-    Attributes
-    ----------
-    joint
-        Number of the joint that turned, from 1.
-    target
-        Name of the target.
-    posture
-        Positions of all joints [rad], ``(joints,)``; that of the one that turned does not count.
-    turn
-        Circle and errors.
-    """
-
-    joint: int
-    target: str
-    posture: Array
-    turn: Turn
+    joint: int  #: Number of the joint that turned, from 1.
+    target: str  #: Name of the target.
+    posture: Array  #: Positions of all joints [rad], ``(joints,)``; that of the one that turned does not count.
+    turn: Turn  #: Circle and errors.
 
     @property
     def circle(self) -> Circle:
@@ -57,27 +45,15 @@ class AxisCircle:
 
 @dataclass(frozen=True, eq=False)
 class AxisCircles:
-    """All circles of a campaign.
+    """All circles of a campaign."""
 
-    Attributes
-    ----------
-    circles
-        One a run and target.
-    left_out
-        Configurations that belong to no run.
-    refused
-        Why a target made no circle in a run where another one did: it is too near to the axis, or was seen too little.
-    declared
-        Whether the data declare deviations.
-    excess
-        How much larger the distances from the circles are than the declared deviations allow; 1 if they agree or
-        nothing was declared. The circles' deviations contain it.
-    """
-
-    circles: tuple[AxisCircle, ...]
-    left_out: int
+    circles: tuple[AxisCircle, ...]  #: One a run and target.
+    left_out: int  #: Configurations that belong to no run.
+    #: Why a target made no circle in a run where another one did: it is too near to the axis, or was seen too little.
     refused: tuple[InputError, ...]
-    declared: bool
+    declared: bool  #: Whether the data declare deviations.
+    #: How much larger the distances from the circles are than the declared deviations allow; 1 if they agree or nothing
+    #: was declared. The circles' deviations contain it.
     excess: float
 
 
@@ -86,10 +62,8 @@ def axis_circles(data: Dataset) -> AxisCircles:
 
     Deviations are declared by the data, or found from what all circles leave together.
 
-    Raises
-    ------
-    InputError
-        If there is no run, a joint slides, or no target makes a circle in a run.
+    Raises:
+        InputError: If there is no run, a joint slides, or no target makes a circle in a run.
     """
     if "prismatic" in data.joint_kinds:
         raise InputError(
@@ -163,21 +137,11 @@ def _by_chance(freedom: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class AxisProblem:
-    """A robot's axes against measured circles.
+    """A robot's axes against measured circles."""
 
-    Attributes
-    ----------
-    robot
-        Gives the value of every parameter that is not free.
-    circles
-        What was measured.
-    free
-        What the solver changes.
-    """
-
-    robot: Robot
-    circles: Sequence[AxisCircle]
-    free: FreeParameters
+    robot: Robot  #: Gives the value of every parameter that is not free.
+    circles: Sequence[AxisCircle]  #: What was measured.
+    free: FreeParameters  #: What the solver changes.
     priors: bool = False
 
     @property

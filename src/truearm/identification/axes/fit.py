@@ -32,30 +32,17 @@ _STEP: Final = 1e-2  # of a deviation, for derivatives of what is derived from a
 
 @dataclass(frozen=True, eq=False)
 class AxisFit:
-    """A robot identified from circles.
+    """A robot identified from circles."""
 
-    Attributes
-    ----------
-    robot
-        With the values found and their deviations.
-    free
-        The parameters that were identified, in the order of `covariance`.
-    covariance
-        Of them [SI], ``(parameters, parameters)``.
-    redundancies
-        Parameters held because circles cannot tell them apart, with the combination.
-    moving_flange
-        Those of `redundancies` whose combination moves the flange somewhere: not a matter of convention, but a loss.
-    residual
-        Root mean square of the whitened differences between axes and circles over their degrees of freedom; None
-        where there are no more numbers than parameters.
-    """
-
-    robot: Robot
-    free: FreeParameters
-    covariance: Array
+    robot: Robot  #: With the values found and their deviations.
+    free: FreeParameters  #: The parameters that were identified, in the order of `covariance`.
+    covariance: Array  #: Of them [SI], ``(parameters, parameters)``.
+    #: Parameters held because circles cannot tell them apart, with the combination.
     redundancies: tuple[Redundancy, ...]
+    #: Those of `redundancies` whose combination moves the flange somewhere: not a matter of convention, but a loss.
     moving_flange: tuple[str, ...]
+    #: Root mean square of the whitened differences between axes and circles over their degrees of freedom; None where
+    #: there are no more numbers than parameters.
     residual: float | None
 
     def derived(self, function: Callable[[Robot], Array]) -> tuple[Array, Array]:
@@ -88,21 +75,14 @@ def fit_axes(
 ) -> AxisFit:
     """Identify a robot's parameters from circles.
 
-    Parameters
-    ----------
-    robot
-        Where it stands, and with its axes near to the measured ones; what is held stays at its values.
-    circles
-        One or more of every joint.
-    groups
-        Which parameters are free; without ``base`` the robot stands where it is said to.
-    known
-        What an earlier fit of the same runs found redundant, to spare the search in repetitions.
+    Args:
+        robot: Where it stands, and with its axes near to the measured ones; what is held stays at its values.
+        circles: One or more of every joint.
+        groups: Which parameters are free; without ``base`` the robot stands where it is said to.
+        known: What an earlier fit of the same runs found redundant, to spare the search in repetitions.
 
-    Raises
-    ------
-    InputError
-        If a joint has no circle, or one turns the other way.
+    Raises:
+        InputError: If a joint has no circle, or one turns the other way.
     """
     missing = [i for i in range(1, len(robot.joints) + 1) if i not in {c.joint for c in circles}]
     if missing:
@@ -166,10 +146,8 @@ def fit_axes(
 def measured_axes(robot: Robot, circles: Sequence[AxisCircle]) -> AxisFit:
     """Return the axes themselves, with all joints at zero: four numbers a joint, none of them redundant.
 
-    Parameters
-    ----------
-    robot
-        Where it stands, and with its axes near to the measured ones.
+    Args:
+        robot: Where it stands, and with its axes near to the measured ones.
     """
     return fit_axes(converted(robot, "zero-reference"), circles, ("geometry",))
 

@@ -30,10 +30,8 @@ _SAME: Final = 1.0
 def refuse_balancers_that_are_not_there(robot: Robot, effects: Sequence[str]) -> None:
     """Refuse to identify balancers of a robot that has none.
 
-    Raises
-    ------
-    InputError
-        Naming the robot.
+    Raises:
+        InputError: Naming the robot.
     """
     if Balancing.name in effects and not robot.balancers:
         raise InputError(
@@ -47,10 +45,8 @@ def refuse_balancers_that_are_not_there(robot: Robot, effects: Sequence[str]) ->
 def without_unseen_balancers(model: Model, data: Dataset) -> tuple[Model, list[Notice]]:
     """Return a model without balancers where all readings were taken under one load, and what to know of that.
 
-    Parameters
-    ----------
-    data
-        The training part.
+    Args:
+        data: The training part.
     """
     if Balancing.name not in model.effects or _load_changes(data):
         return model, []

@@ -77,29 +77,16 @@ def loads_bend(robot: Robot, data: Dataset) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class CurveColumns:
-    """The columns of the joints' curves, and what is needed to find how stiff these are without a fold.
+    """The columns of the joints' curves, and what is needed to find how stiff these are without a fold."""
 
-    Attributes
-    ----------
-    columns
-        Weighed derivatives by the coefficients [1/rad], ``(rows, k)``.
-    joint, period
-        Of each coefficient: the index of its joint, and its periods in a turn.
-    moments
-        Products of the derivatives by other parameters and by the coefficients and of the residuals, for rows of no
-        fold and then fold by fold.
-    rows
-        How many rows those are.
-    others
-        How many other parameters there are.
-    """
-
-    columns: Array
-    joint: NDArray[np.intp]
+    columns: Array  #: Weighed derivatives by the coefficients [1/rad], ``(rows, k)``.
+    joint: NDArray[np.intp]  #: joint, period: of each coefficient: the index of its joint, and its periods in a turn.
     period: NDArray[np.intp]
+    #: Products of the derivatives by other parameters and by the coefficients and of the residuals, for rows of no fold
+    #: and then fold by fold.
     moments: Array
-    rows: NDArray[np.intp]
-    others: int
+    rows: NDArray[np.intp]  #: How many rows those are.
+    others: int  #: How many other parameters there are.
 
     def scaled(self, without: int | None = None) -> Array | None:
         """Return the columns per prior, ``(rows, k)``; None where the data show no curve, or not how large it is.
@@ -107,10 +94,8 @@ class CurveColumns:
         The priors are the likeliest ones, band by band: so few numbers say little of the readings that they were found
         from. Those of single lines would be praised for what they took from the folds that are held out.
 
-        Parameters
-        ----------
-        without
-            A fold that has no say in the priors.
+        Args:
+            without: A fold that has no say in the priors.
         """
         found = self._variance if without is None else self._found(without)
         bands = np.stack([self.joint, np.searchsorted(BANDS, self.period, side="right")])
@@ -138,18 +123,10 @@ class CurveColumns:
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """A fit with the linear loss' view of it, and folds: what candidates are added to.
+    """A fit with the linear loss' view of it, and folds: what candidates are added to."""
 
-    Attributes
-    ----------
-    solved
-        The fit.
-    folds
-        Which configurations are held out together.
-    """
-
-    solved: Solved
-    folds: Folds
+    solved: Solved  #: The fit.
+    folds: Folds  #: Which configurations are held out together.
 
     @property
     def problem(self) -> Problem:
@@ -197,12 +174,9 @@ class Ground:
     def pulls(self, rows: Array, spent: float, among: NDArray[np.bool_] | None = None) -> Pulls | None:
         """Return what weighed residuals ``(rows,)`` say of errors of the joints; None where no position was read.
 
-        Parameters
-        ----------
-        spent
-            How many equations' worth of residual the fit used up.
-        among
-            Rows that are looked at, ``(rows,)``; all if None.
+        Args:
+            spent: How many equations' worth of residual the fit used up.
+            among: Rows that are looked at, ``(rows,)``; all if None.
         """
         compared, components = self.compared
         if components != 3:
@@ -250,10 +224,8 @@ class Ground:
     def by_configuration(self, left: Array) -> Array:
         """Return the mean error of each configuration [m], NaN where nothing is compared, ``(n,)``.
 
-        Parameters
-        ----------
-        left
-            Of the rows that are compared [m], ``(compared rows,)``.
+        Args:
+            left: Of the rows that are compared [m], ``(compared rows,)``.
         """
         rows, components = self.compared
         of = self.configuration[rows][::components]
@@ -295,12 +267,9 @@ class Ground:
     def curves(self, without: Sequence[str], beside: Array) -> CurveColumns:
         """Return the columns of the joints' curves.
 
-        Parameters
-        ----------
-        without
-            Effects of the fit that are left out of account.
-        beside
-            Columns of what the curves shall not say themselves, ``(rows, m)``.
+        Args:
+            without: Effects of the fit that are left out of account.
+            beside: Columns of what the curves shall not say themselves, ``(rows, m)``.
         """
         columns, joint, period = self._curve
         residual, base, offset, _ = self.linear(without)
@@ -314,14 +283,10 @@ class Ground:
     def columns(self, names: Sequence[str], robot: Robot | None = None, *, ordered: bool = True) -> dict[str, Array]:
         """Return the columns of joint effects per prior, weighed as the fit is, ``(rows, parameters)`` each.
 
-        Parameters
-        ----------
-        names
-            Effects; those that the fit has already, too.
-        robot
-            The fitted robot with other facts about its joints, if not itself.
-        ordered
-            Whether the order of the configurations is known.
+        Args:
+            names: Effects; those that the fit has already, too.
+            robot: The fitted robot with other facts about its joints, if not itself.
+            ordered: Whether the order of the configurations is known.
         """
         robot = in_the_middle((robot or self.solved.robot).with_effects(names), self.problem.data)
         grouped = {name: [p for p in robot.parameters.values() if p.group == name] for name in names}

@@ -24,83 +24,45 @@ ORDERED: Final = frozenset(effect.name for effect in EFFECTS if effect.ordered)
 
 @dataclass(frozen=True)
 class Candidate:
-    """A joint effect that could have been chosen.
+    """A joint effect that could have been chosen."""
 
-    Attributes
-    ----------
-    effect
-        Its name.
-    taken
-        Whether it was.
-    gain
-        What the chosen model gains by it, or would; None if it was not tried.
-    reason
-        Why it was left out; empty if it was not.
-    """
-
-    effect: str
-    taken: bool
-    gain: Gain | None
-    reason: str = ""
+    effect: str  #: Its name.
+    taken: bool  #: Whether it was.
+    gain: Gain | None  #: What the chosen model gains by it, or would; None if it was not tried.
+    reason: str = ""  #: Why it was left out; empty if it was not.
 
 
 @dataclass(frozen=True)
 class Confirmation:
-    """A model that was fitted in every fold, held against a smaller one.
+    """A model that was fitted in every fold, held against a smaller one."""
 
-    Attributes
-    ----------
-    effects, smaller
-        The effects of both.
-    error, smaller_error
-        Mean held-out errors [m].
-    gain
-        Of the paired differences.
-    """
-
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  #: effects, smaller: the effects of both.
     smaller: tuple[str, ...]
-    error: float
+    error: float  #: error, smaller_error: mean held-out errors [m].
     smaller_error: float
-    gain: Gain
+    gain: Gain  #: Of the paired differences.
 
 
 @dataclass(frozen=True)
 class Selection:
-    """How a model was chosen.
+    """How a model was chosen."""
 
-    Attributes
-    ----------
-    model
-        What was chosen.
-    layout, blocks
-        How the configurations lie, see :data:`truearm.identification.choosing.folds.Layout`, and in how many blocks of
-        neighbours they were held out; 0 where one by one.
-    geometric, elastic, error
-        Mean held-out errors of these models and of the chosen one, in closed form [m]; the second is None where no
-        loads bend the joints.
-    candidates
-        Every joint effect that can be chosen.
-    confirmations
-        What was fitted in every fold.
-    lines
-        Periodic errors that were found, whose numbers of periods nobody had given.
-    smaller
-        Smaller models, the next one first.
-    passed_over
-        Models that were chosen first and whose fits were not sound, with the statuses.
-    """
-
-    model: Model
+    model: Model  #: What was chosen.
+    #: layout, blocks: how the configurations lie, see :data:`truearm.identification.choosing.folds.Layout`, and in how
+    #: many blocks of neighbours they were held out; 0 where one by one.
     layout: str
     blocks: int
+    #: geometric, elastic, error: mean held-out errors of these models and of the chosen one, in closed form [m]; the
+    #: second is None where no loads bend the joints.
     geometric: float
     elastic: float | None
     error: float
-    candidates: tuple[Candidate, ...]
-    confirmations: tuple[Confirmation, ...] = ()
+    candidates: tuple[Candidate, ...]  #: Every joint effect that can be chosen.
+    confirmations: tuple[Confirmation, ...] = ()  #: What was fitted in every fold.
+    #: Periodic errors that were found, whose numbers of periods nobody had given.
     lines: tuple[PeriodicError, ...] = ()
-    smaller: tuple[Model, ...] = ()
+    smaller: tuple[Model, ...] = ()  #: Smaller models, the next one first.
+    #: Models that were chosen first and whose fits were not sound, with the statuses.
     passed_over: tuple[tuple[tuple[str, ...], str], ...] = ()
 
     def prepared(self, robot: Robot) -> Robot:

@@ -40,16 +40,13 @@ def identify_chosen(
     Where that ends in ``rank-loss`` or ``not-converged``, the next smaller model is taken; where none is sound, the
     first one stays. Where no joint gets a curve, joint curves are no part of the model.
 
-    Parameters
-    ----------
-    robot, data, loss, redundancy, bounds, bounds_file, held, bootstrap, seed, progress
-        As :func:`truearm.identification.solving.fit.identify` takes them.
-    selection
-        Of these data.
+    Args:
+        robot, data, loss, redundancy, bounds, bounds_file, held, bootstrap, seed, progress: As
+            :func:`truearm.identification.solving.fit.identify` takes them.
+        selection: Of these data.
 
-    Returns
-    -------
-        The choice that holds, and its fit.
+    Returns:
+            The choice that holds, and its fit.
     """
     first: tuple[Selection, Fit] | None = None
     while True:

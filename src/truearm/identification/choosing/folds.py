@@ -37,21 +37,12 @@ _MOST: Final = 600  # configurations whose distances are looked at
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """Which configurations are held out together.
+    """Which configurations are held out together."""
 
-    Attributes
-    ----------
-    layout
-        How the configurations lie.
-    of
-        Fold of each configuration, ``(configurations,)``.
-    group
-        Group of each configuration, ``(configurations,)``: its block, or itself where folds are drawn one by one. What
-        configurations of a group gain hangs together.
-    """
-
-    layout: Layout
-    of: NDArray[np.intp]
+    layout: Layout  #: How the configurations lie.
+    of: NDArray[np.intp]  #: Fold of each configuration, ``(configurations,)``.
+    #: Group of each configuration, ``(configurations,)``: its block, or itself where folds are drawn one by one. What
+    #: configurations of a group gain hangs together.
     group: NDArray[np.intp]
 
     @property
@@ -63,10 +54,8 @@ class Folds:
 def folds_of(data: Dataset, seed: int, again: int = 0) -> Folds:
     """Return the folds of a dataset.
 
-    Parameters
-    ----------
-    again
-        Number of the draw, from 0: others draw other folds.
+    Args:
+        again: Number of the draw, from 0: others draw other folds.
     """
     n, rng = data.configurations, np.random.default_rng([seed, again] if again else seed)
     layout = layout_of(data)

@@ -27,34 +27,21 @@ from truearm.modeling.chain import Array
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """A linear problem at its solution.
+    """A linear problem at its solution."""
 
-    Attributes
-    ----------
-    Q
-        Orthonormal basis of its columns, ``(rows + penalties, columns)``: rows of the readings first.
-    residual
-        Of the stacked rows at the solution, ``(rows + penalties,)``.
-    fold
-        Fold of each row of the readings, from 0, ``(rows,)``; -1 for rows that no fold leaves out.
-    """
-
-    Q: Array
-    residual: Array
+    Q: Array  #: Orthonormal basis of its columns, ``(rows + penalties, columns)``: rows of the readings first.
+    residual: Array  #: Of the stacked rows at the solution, ``(rows + penalties,)``.
+    #: Fold of each row of the readings, from 0, ``(rows,)``; -1 for rows that no fold leaves out.
     fold: NDArray[np.intp]
 
     @classmethod
     def of(cls, residual: Array, columns: Array, offset: Array, penalty: Array, fold: NDArray[np.intp]) -> LinearFit:
         """Return the fit that minimises ``|residual + columns u|^2 + |penalty (u + offset)|^2``.
 
-        Parameters
-        ----------
-        residual, columns
-            ``(rows,)`` and ``(rows, p)``.
-        offset, penalty
-            Of each unknown, ``(p,)``.
-        fold
-            Of each row, ``(rows,)``.
+        Args:
+            residual, columns: ``(rows,)`` and ``(rows, p)``.
+            offset, penalty: Of each unknown, ``(p,)``.
+            fold: Of each row, ``(rows,)``.
         """
         Q = np.linalg.qr(np.concatenate([columns, np.diag(penalty)]))[0]
         target = np.concatenate([residual, penalty * offset])
@@ -95,28 +82,16 @@ class LinearFit:
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """A fold, with the fit's own columns taken out: all that a choice among the candidates needs.
+    """A fold, with the fit's own columns taken out: all that a choice among the candidates needs."""
 
-    Attributes
-    ----------
-    rows
-        Held-out rows.
-    residual
-        What the fit without them leaves of them, ``(m,)``.
-    columns
-        What one of each candidate column adds to that, ``(m, k)``.
-    inner, pull
-        Normal equations of the candidates on the other rows, with their priors, ``(k, k)`` and ``(k,)``.
-    by_fit, by_columns
-        How the solution moves in the basis of the fit's own columns, ``(p,)``, and ``(p, k)`` with one of each
-        candidate.
-    """
-
-    rows: NDArray[np.intp]
-    residual: Array
-    columns: Array
+    rows: NDArray[np.intp]  #: Held-out rows.
+    residual: Array  #: What the fit without them leaves of them, ``(m,)``.
+    columns: Array  #: What one of each candidate column adds to that, ``(m, k)``.
+    #: inner, pull: normal equations of the candidates on the other rows, with their priors, ``(k, k)`` and ``(k,)``.
     inner: Array
     pull: Array
+    #: by_fit, by_columns: how the solution moves in the basis of the fit's own columns, ``(p,)``, and ``(p, k)`` with
+    #: one of each candidate.
     by_fit: Array
     by_columns: Array
 
@@ -127,20 +102,11 @@ class Fold:
 
 @dataclass(frozen=True, eq=False)
 class Extensions:
-    """A fit and candidate columns, any of which could be added.
+    """A fit and candidate columns, any of which could be added."""
 
-    Attributes
-    ----------
-    fit
-        What they are added to.
-    columns
-        Of all candidates, per prior, ``(rows, k)``.
-    predicting
-        What the columns are where held-out rows are predicted, if they are others there, ``(rows, k)``.
-    """
-
-    fit: LinearFit
-    columns: Array
+    fit: LinearFit  #: What they are added to.
+    columns: Array  #: Of all candidates, per prior, ``(rows, k)``.
+    #: What the columns are where held-out rows are predicted, if they are others there, ``(rows, k)``.
     predicting: Array | None = None
 
     @cached_property

@@ -52,28 +52,15 @@ class How:
 
 @dataclass(frozen=True, eq=False)
 class Refits:
-    """Real fits of models in the folds, each made once.
+    """Real fits of models in the folds, each made once."""
 
-    Attributes
-    ----------
-    robot, data
-        The robot and its training data.
-    draws
-        Which configurations are held out together, as often as that was drawn.
-    how
-        How parameters are identified.
-    model_of
-        The model with some joint effects.
-    robot_of
-        The robot as a fold knows it, by the numbers of the draw and of the fold and the effects: with the periods found
-        without the fold.
-    """
-
-    robot: Robot
+    robot: Robot  #: robot, data: the robot and its training data.
     data: Dataset
-    draws: tuple[Folds, ...]
-    how: How
-    model_of: Callable[[Sequence[str]], Model]
+    draws: tuple[Folds, ...]  #: Which configurations are held out together, as often as that was drawn.
+    how: How  #: How parameters are identified.
+    model_of: Callable[[Sequence[str]], Model]  #: The model with some joint effects.
+    #: The robot as a fold knows it, by the numbers of the draw and of the fold and the effects: with the periods found
+    #: without the fold.
     robot_of: Callable[[int, int, Sequence[str]], Robot]
     _known: dict[tuple[str, ...], Array | None] = field(default_factory=dict)
 

@@ -33,19 +33,11 @@ _NEGLIGIBLE: Final = 0.02
 
 @dataclass(frozen=True)
 class Gain:
-    """What a choice gains over another.
+    """What a choice gains over another."""
 
-    Attributes
-    ----------
-    mean, error
-        Mean and standard error of the paired differences of held-out errors [m].
-    before
-        Mean held-out error of the other [m].
-    """
-
-    mean: float
+    mean: float  #: mean, error: mean and standard error of the paired differences of held-out errors [m].
     error: float
-    before: float = 0.0
+    before: float = 0.0  #: Mean held-out error of the other [m].
 
     @property
     def believed(self) -> bool:
@@ -108,24 +100,12 @@ def _standard_error(apart: Array, group: NDArray[np.intp]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """Folds as they were drawn once: held-out errors of every choice among some columns.
+    """Folds as they were drawn once: held-out errors of every choice among some columns."""
 
-    Attributes
-    ----------
-    ground
-        What turns rows into errors.
-    fit
-        What columns are added to.
-    columns
-        Of all effects beside each other, per prior.
-    unordered
-        The same where the order of a campaign is not known.
-    """
-
-    ground: Ground
-    fit: LinearFit
-    columns: Array
-    unordered: Array
+    ground: Ground  #: What turns rows into errors.
+    fit: LinearFit  #: What columns are added to.
+    columns: Array  #: Of all effects beside each other, per prior.
+    unordered: Array  #: The same where the order of a campaign is not known.
 
     @cached_property
     def extensions(self) -> Extensions:
@@ -175,23 +155,12 @@ class Draw:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A linear fit, effects that could be added to it, and the held-out errors of every choice asked for.
+    """A linear fit, effects that could be added to it, and the held-out errors of every choice asked for."""
 
-    Attributes
-    ----------
-    grounds
-        What turns rows into errors: one for each draw of the folds.
-    fit
-        What effects are added to.
-    columns
-        Of each effect, per prior.
-    unordered
-        Columns of the effects that follow the order of a campaign, where the order is not known.
-    """
-
-    grounds: tuple[Ground, ...]
-    fit: LinearFit
-    columns: dict[str, Array]
+    grounds: tuple[Ground, ...]  #: What turns rows into errors: one for each draw of the folds.
+    fit: LinearFit  #: What effects are added to.
+    columns: dict[str, Array]  #: Of each effect, per prior.
+    #: Columns of the effects that follow the order of a campaign, where the order is not known.
     unordered: dict[str, Array] = field(default_factory=dict)
     _errors: dict[frozenset[str], Array] = field(default_factory=dict, init=False)
     _means: dict[frozenset[str], float] = field(default_factory=dict, init=False)
@@ -302,17 +271,10 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class Choices:
-    """All choices among joint effects: those with joint curves, which contain much, and those without.
+    """All choices among joint effects: those with joint curves, which contain much, and those without."""
 
-    Attributes
-    ----------
-    plain
-        The search without curves.
-    curved
-        The search among what curves do not contain, added to a fit with curves; None where there are none.
-    """
-
-    plain: Search
+    plain: Search  #: The search without curves.
+    #: The search among what curves do not contain, added to a fit with curves; None where there are none.
     curved: Search | None = None
 
     def _of(self, chosen: frozenset[str]) -> tuple[Search, frozenset[str]]:

@@ -81,21 +81,15 @@ def select(
 ) -> Selection:
     """Choose the joint effects for a robot and its training data.
 
-    Parameters
-    ----------
-    robot, data, loss, redundancy, bounds, bounds_file, held
-        As :func:`truearm.identification.solving.fit.identify` takes them.
-    seed
-        Of the folds.
-    candidates
-        Joint effects that may be chosen besides compliance.
-    progress
-        Called with a few words at each step.
+    Args:
+        robot, data, loss, redundancy, bounds, bounds_file, held: As :func:`truearm.identification.solving.fit.identify`
+            takes them.
+        seed: Of the folds.
+        candidates: Joint effects that may be chosen besides compliance.
+        progress: Called with a few words at each step.
 
-    Raises
-    ------
-    InputError
-        If there are too few configurations for the folds.
+    Raises:
+        InputError: If there are too few configurations for the folds.
     """
     if data.configurations < 2 * FOLDS:
         raise InputError(

@@ -33,27 +33,17 @@ _SHA256: Final = "^[0-9a-f]{64}$"
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A box of the workspace.
+    """A box of the workspace."""
 
-    Attributes
-    ----------
-    name
-        Of the zone.
-    low, high
-        Its corners in the base frame [m], ``(3,)``; infinite where nothing lies beyond.
-    """
-
-    name: str
-    low: Array
+    name: str  #: Of the zone.
+    low: Array  #: low, high: its corners in the base frame [m], ``(3,)``; infinite where nothing lies beyond.
     high: Array
 
     def holds(self, places: Array, overlap: float = 0.0) -> NDArray[np.bool_]:
         """Return which places in the base frame ``(n, 3)`` lie in it; the lower sides belong to it.
 
-        Parameters
-        ----------
-        overlap
-            How far beyond its sides it reaches [m].
+        Args:
+            overlap: How far beyond its sides it reaches [m].
         """
         return np.asarray(((places >= self.low - overlap) & (places < self.high + overlap)).all(axis=1))
 
@@ -103,10 +93,8 @@ def read_zones(path: Path) -> ZonesFile:
 def boxes_of(content: ZonesFile, where: str) -> tuple[tuple[Box, ...], float]:
     """Return the boxes of a file, and how far each takes in configurations beyond its sides [m].
 
-    Raises
-    ------
-    InputError
-        For a zone without extent, one without limits, and zones that share a part of the workspace.
+    Raises:
+        InputError: For a zone without extent, one without limits, and zones that share a part of the workspace.
     """
     unit = content.units.length
     boxes = []
@@ -147,12 +135,9 @@ def boxes_of(content: ZonesFile, where: str) -> tuple[tuple[Box, ...], float]:
 def cut_boxes(places: Array, divisions: tuple[int, int, int]) -> tuple[Box, ...]:
     """Return boxes that fill the space, cut so that as many places lie on either side of each cut.
 
-    Parameters
-    ----------
-    places
-        ``(n, 3)`` [m].
-    divisions
-        Into how many slices the space is cut along x, y and z.
+    Args:
+        places: ``(n, 3)`` [m].
+        divisions: Into how many slices the space is cut along x, y and z.
     """
     cuts = [np.quantile(places[:, axis], np.linspace(0.0, 1.0, n + 1)[1:-1]) for axis, n in enumerate(divisions)]
     edges = [np.concatenate([[-np.inf], cut, [np.inf]]) for cut in cuts]

@@ -39,25 +39,13 @@ _CHANCE: Final = 0.025
 
 @dataclass(frozen=True, eq=False)
 class Zone:
-    """A box of the workspace with a model of its own.
+    """A box of the workspace with a model of its own."""
 
-    Attributes
-    ----------
-    low, high
-        Its corners in the base frame [m], ``(3,)``; infinite where nothing lies beyond.
-    fit
-        Of its training configurations.
-    configurations
-        How many these were, with those of the overlap.
-    name
-        Of the zone.
-    """
-
-    low: Array
+    low: Array  #: low, high: its corners in the base frame [m], ``(3,)``; infinite where nothing lies beyond.
     high: Array
-    fit: Fit
-    configurations: int
-    name: str = ""
+    fit: Fit  #: Of its training configurations.
+    configurations: int  #: How many these were, with those of the overlap.
+    name: str = ""  #: Of the zone.
 
     def holds(self, places: Array) -> NDArray[np.bool_]:
         """Return which places in the base frame ``(n, 3)`` lie in it; the lower sides belong to it."""
@@ -66,21 +54,11 @@ class Zone:
 
 @dataclass(frozen=True, eq=False)
 class Zones:
-    """A workspace cut into boxes.
+    """A workspace cut into boxes."""
 
-    Attributes
-    ----------
-    nominal
-        Says where the flange is.
-    whole
-        The model of the whole workspace; it stands in where a box had too few training configurations.
-    zones
-        Boxes with a model of their own; they do not overlap.
-    """
-
-    nominal: Robot
-    whole: Fit
-    zones: tuple[Zone, ...]
+    nominal: Robot  #: Says where the flange is.
+    whole: Fit  #: The model of the whole workspace; it stands in where a box had too few training configurations.
+    zones: tuple[Zone, ...]  #: Boxes with a model of their own; they do not overlap.
 
     def of(self, q: Array | Postures) -> IntArray:
         """Return the index of the zone for joint positions ``(n, joints)``, -1 for the whole, ``(n,)``."""
@@ -93,10 +71,8 @@ class Zones:
     def positions(self, joints: Array, target: str) -> Array:
         """Return where a target is in the world by the model of each zone [m], ``(n, 3)``.
 
-        Parameters
-        ----------
-        joints
-            Joint positions ``(n, joints)``.
+        Args:
+            joints: Joint positions ``(n, joints)``.
         """
         zone = self.of(joints)
         made = np.empty((len(joints), 3))
@@ -116,27 +92,18 @@ def identify_zones(
 ) -> Zones:
     """Identify a model for the whole workspace and one for each of its zones.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot.
-    data
-        Training readings, in the instrument's own frame.
-    model
-        What is free, in the whole and in every zone. A zone's priors are centred on what the whole found.
-    divisions
-        Into how many slices the workspace is cut along x, y and z of the base. Cuts leave as many training
-        configurations on either side.
-    overlap
-        How far beyond its box a zone takes training configurations [m].
-    least
-        A box with fewer training configurations, overlap included, gets no model of its own.
+    Args:
+        robot: The nominal robot.
+        data: Training readings, in the instrument's own frame.
+        model: What is free, in the whole and in every zone. A zone's priors are centred on what the whole found.
+        divisions: Into how many slices the workspace is cut along x, y and z of the base. Cuts leave as many training
+            configurations on either side.
+        overlap: How far beyond its box a zone takes training configurations [m].
+        least: A box with fewer training configurations, overlap included, gets no model of its own.
 
-    Raises
-    ------
-    InputError
-        If there is nothing to cut, the overlap is negative, or the data do not say where the robot stands: each
-        zone would then have a world of its own.
+    Raises:
+        InputError: If there is nothing to cut, the overlap is negative, or the data do not say where the robot stands:
+            each zone would then have a world of its own.
     """
     if min(divisions) < 1 or max(divisions) < 2:
         raise InputError(
@@ -164,36 +131,20 @@ def identify_zones(
 
 @dataclass(frozen=True, eq=False)
 class ZoneVerdict:
-    """Whether a model of its own is better in a zone.
+    """Whether a model of its own is better in a zone."""
 
-    Attributes
-    ----------
-    box
-        Where it is.
-    training, held_out
-        Configurations that it was identified from, with those of the overlap, and judged by.
-    whole, zone
-        Mean error of its held-out readings by the model of the whole workspace, and by its own [m]; None where there
-        was nothing to judge by.
-    error
-        Standard error of their difference, by the scatter of the configurations [m].
-    kept
-        Whether it stays.
-    why
-        In words.
-    fit
-        Its own model; None where there were too few configurations for one.
-    """
-
-    box: Box
+    box: Box  #: Where it is.
+    #: training, held_out: configurations that it was identified from, with those of the overlap, and judged by.
     training: int
     held_out: int
+    #: whole, zone: mean error of its held-out readings by the model of the whole workspace, and by its own [m]; None
+    #: where there was nothing to judge by.
     whole: float | None
     zone: float | None
-    error: float | None
-    kept: bool
-    why: str
-    fit: Fit | None
+    error: float | None  #: Standard error of their difference, by the scatter of the configurations [m].
+    kept: bool  #: Whether it stays.
+    why: str  #: In words.
+    fit: Fit | None  #: Its own model; None where there were too few configurations for one.
 
 
 def judge_zones(
@@ -212,16 +163,11 @@ def judge_zones(
     A zone is kept if its mean error there is lower by more than chance: by a one-sided t test of the paired differences
     in which any of the zones passes in one case of forty if all are as good as the whole.
 
-    Parameters
-    ----------
-    overlap
-        How far beyond its box a zone takes training configurations [m].
-    parts
-        Training and held-out readings, in the instrument's own frame.
-    places
-        Where the flange is at each of their configurations, ``(n, 3)`` [m].
-    loss, redundancy, bounds
-        Of the fits.
+    Args:
+        overlap: How far beyond its box a zone takes training configurations [m].
+        parts: Training and held-out readings, in the instrument's own frame.
+        places: Where the flange is at each of their configurations, ``(n, 3)`` [m].
+        loss, redundancy, bounds: Of the fits.
     """
     training, held_out = parts
     verdicts = []
@@ -280,10 +226,8 @@ def _verdict(
 def zoned_mean(whole: Fit, verdicts: Sequence[ZoneVerdict], held_out: Dataset, places: Array) -> tuple[float, float]:
     """Return the mean held-out error with one model, and with the zones that are kept [m].
 
-    Parameters
-    ----------
-    places
-        Where the flange is at the held-out configurations, ``(n, 3)`` [m].
+    Args:
+        places: Where the flange is at the held-out configurations, ``(n, 3)`` [m].
     """
     errors = error_sizes(errors_of(whole.robot, held_out))
     zoned = errors.copy()

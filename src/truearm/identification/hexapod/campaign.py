@@ -32,34 +32,16 @@ from truearm.simulation.twin import Twin
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """Both steps.
+    """Both steps."""
 
-    Attributes
-    ----------
-    touches
-        Joint positions at the three base cups [rad or m], ``(3, joints)``.
-    base_cups
-        True places of the base cups in the twin's world [m], ``(3, 3)``.
-    sides
-        Measured distances 12, 23, 31 of the base [m].
-    first, second
-        Which rows were measured in each step.
-    out_of_range
-        Rows that no step could measure.
-    data
-        All readings, those of the first step first; the frame is that of the base fixture.
-    preliminary, final
-        Fits of the first step's readings and of all.
-    """
-
-    touches: Array
-    base_cups: Array
-    sides: Array
-    first: tuple[int, ...]
+    touches: Array  #: Joint positions at the three base cups [rad or m], ``(3, joints)``.
+    base_cups: Array  #: True places of the base cups in the twin's world [m], ``(3, 3)``.
+    sides: Array  #: Measured distances 12, 23, 31 of the base [m].
+    first: tuple[int, ...]  #: first, second: which rows were measured in each step.
     second: tuple[int, ...]
-    out_of_range: tuple[int, ...]
-    data: Dataset
-    preliminary: Fit
+    out_of_range: tuple[int, ...]  #: Rows that no step could measure.
+    data: Dataset  #: All readings, those of the first step first; the frame is that of the base fixture.
+    preliminary: Fit  #: preliminary, final: fits of the first step's readings and of all.
     final: Fit
 
     def frame_by(self, robot: Robot, target: str) -> WorldFrame:
@@ -70,23 +52,15 @@ class Campaign:
 def touching(robot: Robot, target: str, fixture: Transform, side: float, towards: Array) -> Array:
     """Return joint positions that bring a target to the three base cups by the robot's own model, ``(3, joints)``.
 
-    Parameters
-    ----------
-    robot
-        With the target.
-    target
-        The cup of the tool with which the robot touches.
-    fixture
-        Of the base fixture in the robot's base frame.
-    side
-        Distance between the cups [m].
-    towards
-        Orientation of the flange in the robot's base frame, ``(3, 3)``.
+    Args:
+        robot: With the target.
+        target: The cup of the tool with which the robot touches.
+        fixture: Of the base fixture in the robot's base frame.
+        side: Distance between the cups [m].
+        towards: Orientation of the flange in the robot's base frame, ``(3, 3)``.
 
-    Raises
-    ------
-    InputError
-        If the robot does not reach a cup.
+    Raises:
+        InputError: If the robot does not reach a cup.
     """
     cups = triangle([side] * 3, "B") @ fixture.rotation.T + np.array(fixture.translation)
     found = inverse(robot, cups, np.broadcast_to(towards, (3, 3, 3)), target=target)
@@ -112,27 +86,17 @@ def two_steps(
 ) -> Campaign:
     """Simulate both steps.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot, with the tool's three cups as targets.
-    twin
-        The true one; its targets are the cups, in the same order.
-    touches
-        Joint positions at the base cups, from :func:`touching` with the first target.
-    wanted
-        The device's poses for this tool.
-    rows
-        Configurations to measure, planned with the nominal robot.
-    model
-        What both calibrations free.
-    bar
-        The ballbar; it is initialised before every pose.
+    Args:
+        robot: The nominal robot, with the tool's three cups as targets.
+        twin: The true one; its targets are the cups, in the same order.
+        touches: Joint positions at the base cups, from :func:`touching` with the first target.
+        wanted: The device's poses for this tool.
+        rows: Configurations to measure, planned with the nominal robot.
+        model: What both calibrations free.
+        bar: The ballbar; it is initialised before every pose.
 
-    Raises
-    ------
-    InputError
-        If a distance of a fixture, or every pose, is beyond the ballbar's range.
+    Raises:
+        InputError: If a distance of a fixture, or every pose, is beyond the ballbar's range.
     """
     by_number = {pose.number: pose for pose in wanted}
     fixtures = set_up(twin, touches, bar)

@@ -33,23 +33,16 @@ _SETTLED: Final = 2e-6
 def identify_placements(robot: Robot, places: Sequence[Dataset], model: Model) -> Fit:
     """Identify a robot from positions measured at several places of the base fixture.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot, with the tool's cups as targets.
-    places
-        Cups measured at each place, in the frame of the fixture there.
-    model
-        What is free.
+    Args:
+        robot: The nominal robot, with the tool's cups as targets.
+        places: Cups measured at each place, in the frame of the fixture there.
+        model: What is free.
 
-    Returns
-    -------
-    The fit; its world is the frame of the first place.
+    Returns:
+        The fit; its world is the frame of the first place.
 
-    Raises
-    ------
-    InputError
-        If there is no place, or the places cannot be put together.
+    Raises:
+        InputError: If there is no place, or the places cannot be put together.
     """
     if not places:
         raise InputError("a calibration needs at least one place of the base fixture", where="places")

@@ -50,36 +50,22 @@ SEAT: Final = math.radians(0.5)
 
 @dataclass(frozen=True, eq=False)
 class TiltingFit:
-    """What pairs of postures tell about the joints.
+    """What pairs of postures tell about the joints."""
 
-    Attributes
-    ----------
-    robot
-        The robot with the effects `compliance`, `backlash` and `clearance` at the values found, with deviations and
-        informed shares. Everything else is as it was given.
-    names
-        Of the effects' parameters, in the order of `covariance`.
-    covariance
-        Of the effects' parameters [SI], ``(parameters, parameters)``; what is not known about geometry and seats is
-        in it.
-    excess
-        How much larger the changes that are left are than their declared deviations, 1 at least. The covariance
-        contains it.
-    converged
-        Whether the last step was too small to matter.
-    left
-        What is left of each change of inclination [rad], ``(n, instruments, 3)``; NaN where one was not used.
-    seats
-        Small turns from where each instrument is mounted to how it sits [rad], ``(instruments, 3)``.
-    """
-
+    #: The robot with the effects `compliance`, `backlash` and `clearance` at the values found, with deviations and
+    #: informed shares. Everything else is as it was given.
     robot: Robot
-    names: tuple[str, ...]
+    names: tuple[str, ...]  #: Of the effects' parameters, in the order of `covariance`.
+    #: Of the effects' parameters [SI], ``(parameters, parameters)``; what is not known about geometry and seats is in
+    #: it.
     covariance: Array
+    #: How much larger the changes that are left are than their declared deviations, 1 at least. The covariance contains
+    #: it.
     excess: float
-    converged: bool
+    converged: bool  #: Whether the last step was too small to matter.
+    #: What is left of each change of inclination [rad], ``(n, instruments, 3)``; NaN where one was not used.
     left: Array
-    seats: Array
+    seats: Array  #: Small turns from where each instrument is mounted to how it sits [rad], ``(instruments, 3)``.
 
     @property
     def with_priors(self) -> Robot:
@@ -91,21 +77,16 @@ class TiltingFit:
 def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Dataset | None = None) -> TiltingFit:
     """Find compliance, backlash and clearance of every joint.
 
-    Parameters
-    ----------
-    robot
-        Nominal, or as far as it is known. The effects are looked for anew, within their priors; joint zeros and
-        twists are uncertain by their priors.
-    readings
-        Changes of inclination.
-    poses
-        Positions of targets in pairs: configurations 0 and 1, 2 and 3 and so on have the same joint positions under
-        two loads. Base and targets are found from them.
+    Args:
+        robot: Nominal, or as far as it is known. The effects are looked for anew, within their priors; joint zeros and
+            twists are uncertain by their priors.
+        readings: Changes of inclination.
+        poses: Positions of targets in pairs: configurations 0 and 1, 2 and 3 and so on have the same joint positions
+            under two loads. Base and targets are found from them.
 
-    Raises
-    ------
-    InputError
-        For changes or poses none of which can be used, and for poses that are not in pairs or declare no deviation.
+    Raises:
+        InputError: For changes or poses none of which can be used, and for poses that are not in pairs or declare no
+            deviation.
     """
     start = robot.with_effects(TILTING)
     start = start.with_parameters(p.restarted() for p in start.parameters.values() if p.group in TILTING)

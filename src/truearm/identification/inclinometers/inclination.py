@@ -32,13 +32,10 @@ def inclinations_of(
 ) -> Array:
     """Return the angles of the instruments' axes above the horizontal, ``(n, instruments, 3)`` [rad].
 
-    Parameters
-    ----------
-    seats
-        Small turns about x, y and z from where each instrument is mounted to how it sits, ``(instruments, 3)`` [rad];
-        none if None.
-    instruments
-        One on each link, aligned with its frame, if None.
+    Args:
+        seats: Small turns about x, y and z from where each instrument is mounted to how it sits, ``(instruments, 3)``
+            [rad]; none if None.
+        instruments: One on each link, aligned with its frame, if None.
     """
     return np.asarray(np.arcsin(np.clip(_axes(robot, q, seats, instruments) @ upwards(robot), -1.0, 1.0)))
 
@@ -55,10 +52,8 @@ def inclination_derivatives(
     An axis `a` that turns with angular velocity w rises by ``w . (a x up) / cos(inclination)``. That ratio has no
     limit for a vertical axis, where 0 is returned: see how steep an axis is before trusting it.
 
-    Returns
-    -------
-    derivatives
-        ``(n, instruments, 3, len(names) + 3 * instruments)``, seats instrument by instrument.
+    Returns:
+        derivatives: ``(n, instruments, 3, len(names) + 3 * instruments)``, seats instrument by instrument.
     """
     at = robot.loaded(q)
     mounted = instruments or Instruments.on_every_link(len(robot.joints))
@@ -101,10 +96,8 @@ def readable(robot: Robot, pairs: Pairs, instruments: Instruments | None = None)
 def decided(robot: Robot, posture: Postures, *, upright: bool) -> NDArray[np.bool_]:
     """Return whether the loads decide to which side each joint leans, ``(n, joints)``.
 
-    Parameters
-    ----------
-    upright
-        Whether a joint may turn to either side about an axis along gravity, which inclinometers do not see.
+    Args:
+        upright: Whether a joint may turn to either side about an axis along gravity, which inclinometers do not see.
     """
     at = robot.loaded(posture)
     kinematics, up = robot.forward_kinematics(at), upwards(robot)
@@ -126,10 +119,8 @@ def change_derivatives(
 ) -> Array:
     """Return the derivative of changes of inclination by parameters and seats.
 
-    Returns
-    -------
-    derivatives
-        ``(n, instruments, 3, len(names) + 3 * instruments)``.
+    Returns:
+        derivatives: ``(n, instruments, 3, len(names) + 3 * instruments)``.
     """
     first, second = (inclination_derivatives(robot, p, names, seats, instruments) for p in (pairs.first, pairs.second))
     return np.asarray(second - first)

@@ -35,12 +35,9 @@ def seen(parameter: Parameter) -> bool:
 def check_tilting(start: Robot, fit: TiltingFit, read: Inclinations, *, pushed: bool) -> tuple[Notice, ...]:
     """Return what to know about the first stage.
 
-    Parameters
-    ----------
-    start
-        The robot before.
-    pushed
-        Whether poses under loads were given beside the inclinations.
+    Args:
+        start: The robot before.
+        pushed: Whether poses under loads were given beside the inclinations.
     """
     return (
         *_not_converged(fit),

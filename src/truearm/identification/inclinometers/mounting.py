@@ -44,22 +44,13 @@ _LEAST: Final = 8
 
 @dataclass(frozen=True, eq=False)
 class Mounting:
-    """How instruments sit.
+    """How instruments sit."""
 
-    Attributes
-    ----------
-    mounts
-        Rotation from each link's frame to its instrument's, ``(instruments, 3, 3)``.
-    zeros
-        What each axis reads more than it stands above the horizontal [rad], ``(instruments, 3)``; NaN where it was
-        never read.
-    notices
-        What to know about them.
-    """
-
-    mounts: Array
+    mounts: Array  #: Rotation from each link's frame to its instrument's, ``(instruments, 3, 3)``.
+    #: What each axis reads more than it stands above the horizontal [rad], ``(instruments, 3)``; NaN where it was never
+    #: read.
     zeros: Array
-    notices: tuple[Notice, ...]
+    notices: tuple[Notice, ...]  #: What to know about them.
 
     @property
     def turns(self) -> Array:
@@ -70,18 +61,13 @@ class Mounting:
 def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
     """Find how instruments sit on their links.
 
-    Parameters
-    ----------
-    robot
-        Nominal, or as far as it is known.
-    read
-        With the joint positions of the model.
+    Args:
+        robot: Nominal, or as far as it is known.
+        read: With the joint positions of the model.
 
-    Raises
-    ------
-    InputError
-        If the angles of an instrument do not follow the robot as stated: its axes are exchanged or reversed, it sits
-        on another link, or the joint positions are not this robot's.
+    Raises:
+        InputError: If the angles of an instrument do not follow the robot as stated: its axes are exchanged or
+            reversed, it sits on another link, or the joint positions are not this robot's.
     """
     at = robot.loaded(read.postures(robot))
     kinematics, up = robot.forward_kinematics(at), upwards(robot)
@@ -134,19 +120,14 @@ def _ways() -> Array:
 def _turned(plumb: Array, angle: Array, start: Array) -> tuple[Array, Array, Array]:
     """Turn an instrument from each of some ways until its angles follow the robot.
 
-    Parameters
-    ----------
-    plumb
-        Upwards in the link's frame, ``(n, 3)``.
-    angle
-        ``(n, 3)`` [rad], NaN where none was read.
-    start
-        ``(ways, 3, 3)``.
+    Args:
+        plumb: Upwards in the link's frame, ``(n, 3)``.
+        angle: ``(n, 3)`` [rad], NaN where none was read.
+        start: ``(ways, 3, 3)``.
 
-    Returns
-    -------
-    Rotations ``(ways, 3, 3)``, zeros ``(ways, 3)`` [rad], and what is left of the angles, root mean square [rad],
-    ``(ways,)``.
+    Returns:
+        Rotations ``(ways, 3, 3)``, zeros ``(ways, 3)`` [rad], and what is left of the angles, root mean square [rad],
+        ``(ways,)``.
     """
     there = np.isfinite(angle)
     M, w, zero = start.copy(), np.zeros((len(start), 3)), np.zeros((len(start), 3))

@@ -29,12 +29,10 @@ _LARGEST_UNINFORMED_SHARE: Final = 0.05
 def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> list[Notice]:
     """Return what a fit says about its model, its data and its parameters.
 
-    Parameters
-    ----------
-    expected
-        Of the fit, over the workspace.
-    doubted
-        Whether the data, or the robot, are known to be wrong: nothing is said of where its parameters went then.
+    Args:
+        expected: Of the fit, over the workspace.
+        doubted: Whether the data, or the robot, are known to be wrong: nothing is said of where its parameters went
+            then.
     """
     found = []
     robot = fit.robot

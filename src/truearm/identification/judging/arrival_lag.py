@@ -27,21 +27,13 @@ _LARGEST_CHANCE: Final = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ArrivalLag:
-    """What the arrival direction explains.
+    """What the arrival direction explains."""
 
-    Attributes
-    ----------
-    share
-        Part of the residual's root mean square that it explains, corrected for the number of joints.
-    chance
-        Probability that noise alone shows as much. The targets of a configuration share what the model leaves, so it
-        counts as one reading of three coordinates.
-    lags
-        True minus recorded position of each joint, times the sign of the last move [rad; m for sliding joints].
-    """
-
-    share: float
+    share: float  #: Part of the residual's root mean square that it explains, corrected for the number of joints.
+    #: Probability that noise alone shows as much. The targets of a configuration share what the model leaves, so it
+    #: counts as one reading of three coordinates.
     chance: float
+    #: True minus recorded position of each joint, times the sign of the last move [rad; m for sliding joints].
     lags: Array
 
     @property

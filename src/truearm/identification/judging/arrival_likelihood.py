@@ -31,21 +31,11 @@ _CONFIGURATIONS: Final = 100
 
 @dataclass(frozen=True, eq=False)
 class ArrivalLikelihood:
-    """The likelihood of what a fit leaves.
+    """The likelihood of what a fit leaves."""
 
-    Attributes
-    ----------
-    left
-        What it leaves.
-    at
-        The fit linearised there, with arrivals as they are taken; outliers left out.
-    factors
-        What the variances of readings are counted under.
-    """
-
-    left: LeftOver
-    at: Linearised
-    factors: tuple[str, ...]
+    left: LeftOver  #: What it leaves.
+    at: Linearised  #: The fit linearised there, with arrivals as they are taken; outliers left out.
+    factors: tuple[str, ...]  #: What the variances of readings are counted under.
 
     @classmethod
     def of(cls, left: LeftOver, *, each_reading: bool = False) -> ArrivalLikelihood:
@@ -73,12 +63,9 @@ class ArrivalLikelihood:
     def largest(self, known: tuple[str, ...] = (), joints: Array | None = None) -> tuple[Variances, float]:
         """Return the likeliest variances, by those that the fit took, and the logarithm of their likelihood.
 
-        Parameters
-        ----------
-        known
-            Factors whose variance is what the fit took.
-        joints
-            Variances of the joints' errors where they are known, ``(joints,)``.
+        Args:
+            known: Factors whose variance is what the fit took.
+            joints: Variances of the joints' errors where they are known, ``(joints,)``.
         """
         kinds = np.array([joint.kind for joint in self.left.fit.robot.joints])
         alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]

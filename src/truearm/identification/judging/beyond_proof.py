@@ -35,14 +35,10 @@ def check_proof(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
     Nothing is said of robots without a proof, or whose values were changed since, nor of readings against fixtures. A
     proof that is a lower bound is doubted later.
 
-    Parameters
-    ----------
-    robot
-        With base and targets.
-    data
-        Readings of those.
-    errors
-        Of the robot on them.
+    Args:
+        robot: With base and targets.
+        data: Readings of those.
+        errors: Of the robot on them.
     """
     proof = robot.proof
     if proof is None or not is_intact(robot) or not proof.names or not len(errors.position_norms):

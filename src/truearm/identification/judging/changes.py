@@ -48,49 +48,25 @@ _COARSE: Final = 64
 
 @dataclass(frozen=True)
 class Change:
-    """What happened during a campaign.
+    """What happened during a campaign."""
 
-    Attributes
-    ----------
-    kind
-        Code of the notice.
-    what
-        Name of the target or number of the joint; empty for the others.
-    first
-        Index of the first configuration, in the dataset, at which it had happened; of the first measured for a drift.
-    share
-        Of the squared residuals that it explains.
-    values
-        What changed, in the parameters of its columns [SI].
-    chance
-        Probability that noise alone shows one as large anywhere.
-    by_file
-        Whether the order of measurement is not known, and that of the file was taken.
-    follows
-        Number of the joint that moved on with the order of measurement; 0 if none did.
-    """
-
-    kind: Kind
-    what: str
+    kind: Kind  #: Code of the notice.
+    what: str  #: Name of the target or number of the joint; empty for the others.
+    #: Index of the first configuration, in the dataset, at which it had happened; of the first measured for a drift.
     first: int
-    share: float
-    values: tuple[float, ...]
-    chance: float
-    by_file: bool = False
-    follows: int = 0
+    share: float  #: Of the squared residuals that it explains.
+    values: tuple[float, ...]  #: What changed, in the parameters of its columns [SI].
+    chance: float  #: Probability that noise alone shows one as large anywhere.
+    by_file: bool = False  #: Whether the order of measurement is not known, and that of the file was taken.
+    follows: int = 0  #: Number of the joint that moved on with the order of measurement; 0 if none did.
 
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """Sums over the equations of configurations from a change point on, for all columns at once.
+    """Sums over the equations of configurations from a change point on, for all columns at once."""
 
-    Attributes
-    ----------
-    pull, inner, taken
-        Columns times residual ``(k, m)``, columns times columns ``(k, m, m)``, and what the free parameters take of the
-        columns ``(k, rank, m)``.
-    """
-
+    #: pull, inner, taken: columns times residual ``(k, m)``, columns times columns ``(k, m, m)``, and what the free
+    #: parameters take of the columns ``(k, rank, m)``.
     pull: Array
     inner: Array
     taken: Array
@@ -188,12 +164,9 @@ def _hypotheses(left: LeftOver) -> Iterator[tuple[Kind, str, tuple[int, ...]]]:
 def _sums(C: Array, r: Array, Q: Array, at: NDArray[np.intp], points: NDArray[np.intp]) -> _Sums:
     """Return the sums of rows from each change point on.
 
-    Parameters
-    ----------
-    at
-        Place of each row's configuration in the order of measurement, ascending, ``(rows,)``.
-    points
-        Change points, ascending, ``(k,)``.
+    Args:
+        at: Place of each row's configuration in the order of measurement, ascending, ``(rows,)``.
+        points: Change points, ascending, ``(k,)``.
     """
     edges = [*np.searchsorted(at, points).tolist(), len(at)]
     parts = [slice(a, b) for a, b in pairwise(edges)]

@@ -30,10 +30,8 @@ def has_curves(fit: Fit) -> bool:
 def about_curves(fit: Fit, configurations: int) -> str:
     """Say what is not known of joint curves, where a fit has none; empty where they are known to be none.
 
-    Parameters
-    ----------
-    configurations
-        That the fit was made from.
+    Args:
+        configurations: That the fit was made from.
     """
     if has_curves(fit) or not JointCurve(fit.robot.layout).parameters:
         return ""
@@ -63,10 +61,8 @@ def about_curves(fit: Fit, configurations: int) -> str:
 def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
     """Say which joints got no curve, and where the others are known.
 
-    Parameters
-    ----------
-    training
-        The readings that were fitted.
+    Args:
+        training: The readings that were fitted.
     """
     if JointCurve.name not in fit.model.effects:
         return []

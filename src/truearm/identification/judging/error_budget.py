@@ -47,27 +47,14 @@ _LENGTHS: Final = ("distance", "height")
 
 @dataclass(frozen=True)
 class Share:
-    """What one source adds to the mean square of the errors.
+    """What one source adds to the mean square of the errors."""
 
-    Attributes
-    ----------
-    source
-        Which.
-    square
-        Mean square [m^2]; negative where a difference of estimates came out so; None where it was not measured.
-    deviation
-        Standard deviation of the square [m^2].
-    words
-        What it was estimated from, what it may hold besides, or why it is not known.
-    apparent
-        Whether it is the scatter of readings whose deviations were not declared.
-    """
-
-    source: Source
+    source: Source  #: Which.
+    #: Mean square [m^2]; negative where a difference of estimates came out so; None where it was not measured.
     square: float | None
-    deviation: float
-    words: str
-    apparent: bool = False
+    deviation: float  #: Standard deviation of the square [m^2].
+    words: str  #: What it was estimated from, what it may hold besides, or why it is not known.
+    apparent: bool = False  #: Whether it is the scatter of readings whose deviations were not declared.
 
     @property
     def rms(self) -> float | None:
@@ -77,39 +64,22 @@ class Share:
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """The mean square of the errors of a calibrated robot by its sources.
+    """The mean square of the errors of a calibrated robot by its sources."""
 
-    Attributes
-    ----------
-    held_out
-        Whether it is that of held-out readings; else it is what readings at configurations like the training ones let
-        expect, and there is no remainder.
-    kind
-        Of readings: ``position``, or ``length`` where no position was read.
-    square
-        Mean square of the errors [m^2]: the sum of all shares.
-    deviation
-        Standard deviation of it, by the scatter of the configurations [m^2].
-    readings, configurations
-        How many were judged.
-    shares
-        What each source adds to it.
-    workspace
-        Shares of the mean square to expect over the whole workspace, without the noise of a reading; None if it cannot
-        be told.
-    removed
-        Root mean square by which the table's motion moved the readings before it was taken out of them [m]; None where
-        it was not measured.
-    """
-
+    #: Whether it is that of held-out readings; else it is what readings at configurations like the training ones let
+    #: expect, and there is no remainder.
     held_out: bool
-    kind: Literal["position", "length"]
-    square: float
-    deviation: float
-    readings: int
+    kind: Literal["position", "length"]  #: Of readings: ``position``, or ``length`` where no position was read.
+    square: float  #: Mean square of the errors [m^2]: the sum of all shares.
+    deviation: float  #: Standard deviation of it, by the scatter of the configurations [m^2].
+    readings: int  #: readings, configurations: how many were judged.
     configurations: int
-    shares: tuple[Share, ...]
+    shares: tuple[Share, ...]  #: What each source adds to it.
+    #: Shares of the mean square to expect over the whole workspace, without the noise of a reading; None if it cannot
+    #: be told.
     workspace: tuple[Share, ...] | None
+    #: Root mean square by which the table's motion moved the readings before it was taken out of them [m]; None where
+    #: it was not measured.
     removed: float | None
 
     @property
@@ -130,28 +100,14 @@ class ErrorBudget:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Readings of a part of the data that are compared, in metres.
+    """Readings of a part of the data that are compared, in metres."""
 
-    Attributes
-    ----------
-    error, variance
-        Of each equation [m], and its variance by the instrument [m^2], ``(rows,)``.
-    derivative
-        By the uncertain parameters, ``(rows, parameters)``.
-    configuration
-        Of each equation, ``(rows,)``.
-    readings
-        How many.
-    declared
-        Whether all deviations are declared.
-    """
-
-    error: Array
+    error: Array  #: error, variance: of each equation [m], and its variance by the instrument [m^2], ``(rows,)``.
     variance: Array
-    derivative: Array
-    configuration: Array
-    readings: int
-    declared: bool
+    derivative: Array  #: By the uncertain parameters, ``(rows, parameters)``.
+    configuration: Array  #: Of each equation, ``(rows,)``.
+    readings: int  #: How many.
+    declared: bool  #: Whether all deviations are declared.
 
     @property
     def square(self) -> float:
@@ -176,10 +132,8 @@ class _Part:
     def moved(self, root: Array) -> tuple[float, float]:
         """Return the mean square of what errors of the parameters do, and its standard deviation.
 
-        Parameters
-        ----------
-        root
-            Of the covariance of the parameters, ``(parameters, k)``.
+        Args:
+            root: Of the covariance of the parameters, ``(parameters, k)``.
         """
         moved = self.derivative @ root
         value = np.linalg.eigvalsh(moved.T @ moved) / self.readings
@@ -191,16 +145,11 @@ def error_budget(
 ) -> ErrorBudget | None:
     """Return what limits the accuracy of a calibrated robot; None if there is nothing to compare.
 
-    Parameters
-    ----------
-    data
-        All readings, the table's motion taken out.
-    training
-        What the fit was made from.
-    held_out
-        What it is judged by; None if nothing was held out.
-    expected
-        The error to expect over the workspace.
+    Args:
+        data: All readings, the table's motion taken out.
+        training: What the fit was made from.
+        held_out: What it is judged by; None if nothing was held out.
+        expected: The error to expect over the workspace.
     """
     kind: Literal["position", "length"] = "position" if Position().present(training).any() else "length"
     seen = _part(fit, training, kind)

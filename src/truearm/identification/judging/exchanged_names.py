@@ -32,10 +32,8 @@ _ALIKE: Final = 0.9
 def exchanged_names(fit: Fit, data: Dataset) -> list[Suspect]:
     """Doubt readings of two targets that lie the other way round than at most configurations.
 
-    Parameters
-    ----------
-    fit
-        Of the robot; it need not be a good one.
+    Args:
+        fit: Of the robot; it need not be a good one.
     """
     names = data.targets
     if not 2 <= len(names) <= _MOST:
@@ -65,10 +63,8 @@ def _length(line: Array) -> float:
 def _turned_round(line: Array) -> list[int]:
     """Return the configurations at which a line from one target to another points the opposite way.
 
-    Parameters
-    ----------
-    line
-        In axes of the flange [m], ``(configurations, 3)``, NaN where one of the targets was not read.
+    Args:
+        line: In axes of the flange [m], ``(configurations, 3)``, NaN where one of the targets was not read.
     """
     read = np.flatnonzero(np.isfinite(line).all(axis=1))
     if len(read) < _LEAST:

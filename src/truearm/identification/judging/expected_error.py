@@ -56,56 +56,29 @@ _INTERVAL: Final = (5.0, 95.0)
 
 @dataclass(frozen=True)
 class Expectation:
-    """What to expect of an error over the workspace [m].
+    """What to expect of an error over the workspace [m]."""
 
-    Attributes
-    ----------
-    mean
-        Expected mean error.
-    p95
-        Expected 95th percentile over the configurations.
-    interval_90
-        From where to where the mean error of this robot lies with a probability of 90 %.
-    """
-
-    mean: float
-    p95: float
+    mean: float  #: Expected mean error.
+    p95: float  #: Expected 95th percentile over the configurations.
+    #: From where to where the mean error of this robot lies with a probability of 90 %.
     interval_90: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class ExpectedError:
-    """The error of the targets' positions to expect over the workspace, without the noise of a reading [m].
+    """The error of the targets' positions to expect over the workspace, without the noise of a reading [m]."""
 
-    Attributes
-    ----------
-    overall
-        Of all targets together.
-    without_scale
-        The same without errors of the scale, where no length was measured: what more configurations can lower.
-    targets
-        Of each, by its name.
-    joint_error
-        Error of each joint in every arrival that is in it, a standard deviation [rad or m]: repeatability plus what the
-        model leaves.
-    remainder
-        Root mean square of what that does to the targets.
-    payload
-        What the robot carries there.
-    located
-        Whether a reading locates the robot; otherwise its base pose does not count.
-    omissions
-        What the figures cannot contain, in words; they are lower bounds if there is any.
-    """
-
-    overall: Expectation
+    overall: Expectation  #: Of all targets together.
+    #: The same without errors of the scale, where no length was measured: what more configurations can lower.
     without_scale: Expectation
-    targets: dict[str, Expectation]
+    targets: dict[str, Expectation]  #: Of each, by its name.
+    #: Error of each joint in every arrival that is in it, a standard deviation [rad or m]: repeatability plus what the
+    #: model leaves.
     joint_error: Array
-    remainder: float
-    payload: Payload
-    located: bool
-    omissions: tuple[str, ...]
+    remainder: float  #: Root mean square of what that does to the targets.
+    payload: Payload  #: What the robot carries there.
+    located: bool  #: Whether a reading locates the robot; otherwise its base pose does not count.
+    omissions: tuple[str, ...]  #: What the figures cannot contain, in words; they are lower bounds if there is any.
 
     @property
     def lower_bound(self) -> bool:
@@ -120,24 +93,12 @@ class ExpectedError:
 
 @dataclass(frozen=True, eq=False)
 class PositionErrors:
-    """Errors of the targets' positions that the covariance of a fit lets expect, drawn at random.
+    """Errors of the targets' positions that the covariance of a fit lets expect, drawn at random."""
 
-    Attributes
-    ----------
-    fit
-        Whose.
-    draws
-        How many.
-    seed
-        Of the draws.
-    scale_counts
-        Whether errors of the scale count where no length was measured.
-    """
-
-    fit: Fit
-    draws: int
-    seed: int = 0
-    scale_counts: bool = True
+    fit: Fit  #: Whose.
+    draws: int  #: How many.
+    seed: int = 0  #: Of the draws.
+    scale_counts: bool = True  #: Whether errors of the scale count where no length was measured.
 
     @cached_property
     def _errors(self) -> dict[str, Array]:
@@ -213,14 +174,11 @@ class PositionErrors:
 def moved_lengths(fit: Fit, joints: Array, errors: Mapping[str, Array]) -> Array:
     """Return how far errors of parameters ``(draws,)`` move the targets, by the kinematics themselves.
 
-    Parameters
-    ----------
-    joints
-        Where, ``(n, joints)``.
+    Args:
+        joints: Where, ``(n, joints)``.
 
-    Returns
-    -------
-    Lengths [m], ``(draws, targets, n)``.
+    Returns:
+        Lengths [m], ``(draws, targets, n)``.
     """
     at = fit.robot.loaded(joints)
     moves: Iterable[Array] = _moves(fit, at, errors, exact=True)
@@ -236,14 +194,10 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True, doubted: 
     and targets are as fitted, with their own uncertainty. What depends on the order of measurement or the temperature
     is in its middle.
 
-    Parameters
-    ----------
-    seed
-        Of joint positions and draws.
-    plausible
-        Whether what was fitted can be this robot.
-    doubted
-        Whether readings are doubted: then nothing is said of the robot for what they leave.
+    Args:
+        seed: Of joint positions and draws.
+        plausible: Whether what was fitted can be this robot.
+        doubted: Whether readings are doubted: then nothing is said of the robot for what they leave.
     """
     robot = fit.robot
     few, many = _CONFIGURATIONS
@@ -274,10 +228,8 @@ def as_residuals_allow(fit: Fit, data: Dataset) -> Fit:
     Residuals that hang together in another way than errors of the joints make them are not explained by any: what was
     found for the joints is then too large in some directions.
 
-    Parameters
-    ----------
-    data
-        The training readings.
+    Args:
+        data: The training readings.
     """
     off = errors_of(fit.robot, data).position_norms
     if not fit.joint_error.any() or fit.gauge_freedoms or not len(off):
@@ -292,15 +244,11 @@ def as_residuals_allow(fit: Fit, data: Dataset) -> Fit:
 def expected_map(fit: Fit, positions: int, seed: int = 0) -> tuple[Array, Array]:
     """Return where the targets are at random configurations and the mean error to expect there.
 
-    Parameters
-    ----------
-    positions
-        About how many, over all targets.
+    Args:
+        positions: About how many, over all targets.
 
-    Returns
-    -------
-    places, error
-        In the robot's base frame [m], ``(positions, 3)``, and [m], ``(positions,)``.
+    Returns:
+        places, error: In the robot's base frame [m], ``(positions, 3)``, and [m], ``(positions,)``.
     """
     robot = fit.robot
     count = max(_LEAST_MAPPED, positions // max(len(robot.targets), 1))
@@ -379,12 +327,9 @@ def covariance_root(fit: Fit, covariance: Array, *, held: bool = True) -> Array:
     the priors of all that take part allow, along combinations that no reading sees: nothing at the configurations that
     were measured, but perhaps elsewhere.
 
-    Parameters
-    ----------
-    covariance
-        Of the free parameters and the unfitted ones, ``(free, free)``.
-    held
-        Whether that of the held ones is added.
+    Args:
+        covariance: Of the free parameters and the unfitted ones, ``(free, free)``.
+        held: Whether that of the held ones is added.
     """
     names = uncertain_names(fit)
     size = np.array([fit.start.parameters[name].prior for name in names])
@@ -413,14 +358,10 @@ def _moves(
 ) -> Iterator[Array]:
     """Go through the targets: how each moves with errors of the parameters and joints, ``(draws, 3, n)`` [m].
 
-    Parameters
-    ----------
-    errors
-        Of the parameters by name, ``(draws,)`` each.
-    shared
-        Of the joints, ``(draws, n, joints)``.
-    exact
-        By the kinematics themselves with other parameters; otherwise by their derivatives.
+    Args:
+        errors: Of the parameters by name, ``(draws,)`` each.
+        shared: Of the joints, ``(draws, n, joints)``.
+        exact: By the kinematics themselves with other parameters; otherwise by their derivatives.
     """
     robot = fit.robot
     draws = len(next(iter(errors.values())))

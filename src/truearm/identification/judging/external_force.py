@@ -36,38 +36,25 @@ _LISTED: Final = 4
 
 @dataclass(frozen=True)
 class _Bending:
-    """What a force does at the worst of some configurations.
+    """What a force does at the worst of some configurations."""
 
-    Attributes
-    ----------
-    moved, uncertain
-        Of the tip, and its standard deviation [m].
-    unseen
-        How uncertain the tip is by each parameter that the data did not determine [m], the most first.
-    efforts
-        Load that the force adds on each joint [N m or N].
-    beyond
-        Joints that are loaded beyond what they carried in calibration, from 0: with the load that reaches farthest.
-    rigid
-        Whether no joint gives way although the force loads some.
-    """
-
-    moved: float
+    moved: float  #: moved, uncertain: of the tip, and its standard deviation [m].
     uncertain: float | None
+    #: How uncertain the tip is by each parameter that the data did not determine [m], the most first.
     unseen: dict[str, float]
-    efforts: Array
+    efforts: Array  #: Load that the force adds on each joint [N m or N].
+    #: Joints that are loaded beyond what they carried in calibration, from 0: with the load that reaches farthest.
     beyond: dict[int, float]
-    rigid: bool
+    rigid: bool  #: Whether no joint gives way although the force loads some.
 
 
 def check_force(cases: Sequence[tuple[Robot, Array | Postures]]) -> list[Notice]:
     """Return what is to be said of forces at the tool, or at the flange.
 
-    Parameters
-    ----------
-    cases
-        Robots, with what acts on their tools, and the joint positions ``(n, joints)``, or postures with what acts on
-        the flange, at which it does; those where nothing acts are left out. They are one robot with several forces.
+    Args:
+        cases: Robots, with what acts on their tools, and the joint positions ``(n, joints)``, or postures with what
+            acts on the flange, at which it does; those where nothing acts are left out. They are one robot with several
+            forces.
     """
     acting = [(robot, at) for robot, q in cases if len(at := _some(Postures.of(q))) and _pushed(robot, at)]
     if not acting:

@@ -44,12 +44,9 @@ _LONG: Final = 3.0
 def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> tuple[list[Notice], list[Suspect]]:
     """Doubt readings that a robust geometric fit leaves far off, and joint positions that do not belong to theirs.
 
-    Parameters
-    ----------
-    off
-        How far off each reading is [m], ``(readings,)``.
-    turned
-        Which orientations are far off, ``(readings,)``.
+    Args:
+        off: How far off each reading is [m], ``(readings,)``.
+        turned: Which orientations are far off, ``(readings,)``.
     """
     allowed = allowed_off(off)
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed)
@@ -83,12 +80,9 @@ def _doubted(
 ) -> Suspect:
     """Say what a single reading is that is far off.
 
-    Parameters
-    ----------
-    predicted
-        Places of the targets at its configuration [m], ``(targets, 3)``.
-    points, known
-        Where targets were read, and other points that could have been.
+    Args:
+        predicted: Places of the targets at its configuration [m], ``(targets, 3)``.
+        points, known: Where targets were read, and other points that could have been.
     """
     c, t = int(data.configuration[reading]), int(data.target[reading])
     label, name, at = data.labels[c], data.targets[t], data.position[reading]
@@ -109,10 +103,8 @@ def _hang_together(
 ) -> bool:
     """Return whether all readings of a configuration are far off and keep their distances, or are turned as well.
 
-    Parameters
-    ----------
-    predicted
-        Places of the targets [m], ``(configurations, targets, 3)``.
+    Args:
+        predicted: Places of the targets [m], ``(configurations, targets, 3)``.
     """
     mine = np.flatnonzero((data.configuration == c) & data.has_position)
     if len(mine) != len(doubted):
@@ -127,12 +119,9 @@ def _hang_together(
 def _in_another_length(data: Dataset, predicted: Array, doubted: IntArray, allowed: float) -> tuple[Dataset, Array]:
     """Return the data with positions in another unit of length mended, and by what factors, ``(readings,)``.
 
-    Parameters
-    ----------
-    predicted
-        Places of the targets [m], ``(configurations, targets, 3)``.
-    doubted
-        The readings that are far off.
+    Args:
+        predicted: Places of the targets [m], ``(configurations, targets, 3)``.
+        doubted: The readings that are far off.
     """
     factors = np.ones(len(data.target))
     there = predicted[data.configuration[doubted], data.target[doubted]]
@@ -145,14 +134,10 @@ def _in_another_unit(
 ) -> tuple[set[int], list[Notice]]:
     """Return the configurations whose readings fit their joint positions in the other unit of angle, and say so.
 
-    Parameters
-    ----------
-    off
-        How far off each reading is [m], ``(readings,)``.
-    doubted
-        The readings that are far off.
-    left_out
-        Configurations that are explained.
+    Args:
+        off: How far off each reading is [m], ``(readings,)``.
+        doubted: The readings that are far off.
+        left_out: Configurations that are explained.
     """
     found: dict[str, list[int]] = {}
     explained: set[int] = set()
@@ -215,14 +200,10 @@ def _joints_mistaken(
 ) -> list[Notice]:
     """Say which joint positions do not belong to their readings.
 
-    Parameters
-    ----------
-    others
-        Configurations whose readings fit the joint positions of another one, and which.
-    signs
-        Those whose readings fit with the opposite sign of a joint, and of which.
-    unlike
-        Those whose readings hang together and are elsewhere, and how far [m].
+    Args:
+        others: Configurations whose readings fit the joint positions of another one, and which.
+        signs: Those whose readings fit with the opposite sign of a joint, and of which.
+        unlike: Those whose readings hang together and are elsewhere, and how far [m].
     """
     found = []
     if others:
@@ -285,10 +266,8 @@ def often_off(data: Dataset, off: Array) -> list[Notice]:
 def _joints_of_others(data: Dataset, predicted: Array, doubted: IntArray, allowed: float) -> dict[int, int]:
     """Return the configurations all of whose readings fit the joint positions of another one, and which.
 
-    Parameters
-    ----------
-    predicted
-        Places of the targets [m], ``(configurations, targets, 3)``.
+    Args:
+        predicted: Places of the targets [m], ``(configurations, targets, 3)``.
     """
     off = np.zeros(len(data.target), dtype=bool)
     off[doubted] = True

@@ -29,19 +29,11 @@ _NOTHING: Final = 1e-9
 
 @dataclass(frozen=True)
 class Periods:
-    """Neighbouring numbers of periods in a turn at which a curve is strong.
+    """Neighbouring numbers of periods in a turn at which a curve is strong."""
 
-    Attributes
-    ----------
-    lowest, highest
-        Periods in a turn, both included.
-    amplitude
-        Root of the sum of the squares of their amplitudes [rad].
-    """
-
-    lowest: int
+    lowest: int  #: lowest, highest: periods in a turn, both included.
     highest: int
-    amplitude: float
+    amplitude: float  #: Root of the sum of the squares of their amplitudes [rad].
 
     @property
     def range(self) -> str:
@@ -51,30 +43,15 @@ class Periods:
 
 @dataclass(frozen=True, eq=False)
 class FoundCurve:
-    """The curve of one joint, as a fit found it.
+    """The curve of one joint, as a fit found it."""
 
-    Attributes
-    ----------
-    number
-        Of the joint, from 1.
-    name
-        Of the joint.
-    amounts
-        Sine and cosine of 1, 2 .. periods in turns [rad], ``(2 periods,)``.
-    covariance
-        Of them [rad^2], ``(2 periods, 2 periods)``.
-    shown
-        From where to where the joint is looked at [rad]: its limits, or one turn where they are wider or there are
-        none.
-    places
-        Where it was in the training part [rad], in order, ``(n,)``; moved by whole turns into `shown` if that is one.
-    """
-
-    number: int
-    name: str
-    amounts: Array
-    covariance: Array
+    number: int  #: Of the joint, from 1.
+    name: str  #: Of the joint.
+    amounts: Array  #: Sine and cosine of 1, 2 .. periods in turns [rad], ``(2 periods,)``.
+    covariance: Array  #: Of them [rad^2], ``(2 periods, 2 periods)``.
+    #: From where to where the joint is looked at [rad]: its limits, or one turn where they are wider or there are none.
     shown: tuple[float, float]
+    #: Where it was in the training part [rad], in order, ``(n,)``; moved by whole turns into `shown` if that is one.
     places: Array
 
     @property
@@ -145,10 +122,8 @@ class FoundCurve:
 def found_curves(fit: Fit, training: Dataset) -> tuple[FoundCurve, ...]:
     """Return the curves that a fit found, joint by joint; none of joints whose curve is zero.
 
-    Parameters
-    ----------
-    training
-        The readings that it was made from.
+    Args:
+        training: The readings that it was made from.
     """
     return tuple(_curves(fit, training))
 

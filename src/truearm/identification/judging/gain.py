@@ -39,15 +39,12 @@ _SAME: Final = math.radians(0.01)
 def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = False) -> list[Notice]:
     """Say if the calibrated robot is significantly worse than the nominal one, no better, or if that is not known.
 
-    Parameters
-    ----------
-    before, after
-        Errors of the nominal and of the calibrated robot on the held-out part, both with base and targets found from
-        the training part.
-    data
-        The held-out part.
-    doubted
-        Whether base and targets of the nominal robot were found by a robust loss, because readings are doubted.
+    Args:
+        before, after: Errors of the nominal and of the calibrated robot on the held-out part, both with base and
+            targets found from the training part.
+        data: The held-out part.
+        doubted: Whether base and targets of the nominal robot were found by a robust loss, because readings are
+            doubted.
     """
     old, new = (_by_posture(errors, data) for errors in (before, after))
     postures = counted(len(new), "posture")
@@ -91,10 +88,8 @@ def signed_rank_probability(differences: Array) -> float:
     The distribution is that of differences which are symmetric about zero: exact for up to a hundred of them, a normal
     one for more. Differences of zero are left out, and equal ones share their ranks.
 
-    Parameters
-    ----------
-    differences
-        One for each pair, ``(n,)``.
+    Args:
+        differences: One for each pair, ``(n,)``.
     """
     from scipy.special import ndtr  # scipy.stats.wilcoxon is the same, but takes half a second to import
 

@@ -55,14 +55,10 @@ def check_held(
 ) -> list[Notice]:
     """Return a notice if the places that a fit holds contradict its readings.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot.
-    data
-        The training readings.
-    loss, redundancy, bounds, bounds_file
-        Of the fit.
+    Args:
+        robot: The nominal robot.
+        data: The training readings.
+        loss, redundancy, bounds, bounds_file: Of the fit.
     """
     if not fit.held:
         return []

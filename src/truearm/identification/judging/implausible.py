@@ -55,10 +55,8 @@ CAUSES: Final = (
 def implausible(fit: Fit, data: Dataset) -> str | None:
     """Return in words why a fit cannot be this robot, None if it can.
 
-    Parameters
-    ----------
-    data
-        The readings it was made from.
+    Args:
+        data: The readings it was made from.
     """
     errors, robot = errors_of(fit.robot, data), fit.robot
     reach = float(
@@ -123,10 +121,8 @@ def _geometry_moved(fit: Fit, data: Dataset) -> float:
 def check_plausible(fit: Fit, data: Dataset, others: Iterable[Notice] = ()) -> list[Notice]:
     """Return a notice if a fit cannot be this robot.
 
-    Parameters
-    ----------
-    others
-        What else was noticed: the cause is looked for there.
+    Args:
+        others: What else was noticed: the cause is looked for there.
     """
     why = implausible(fit, data)
     if why is None:

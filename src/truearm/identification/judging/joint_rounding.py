@@ -53,10 +53,8 @@ def step_of(data: Dataset) -> tuple[float, str] | None:
 def check_rounding(fit: Fit, data: Dataset) -> list[Notice]:
     """Return a notice if joint positions are multiples of a step and are off as rounding to it makes them.
 
-    Parameters
-    ----------
-    fit
-        Of the data, or of a part of them.
+    Args:
+        fit: Of the data, or of a part of them.
     """
     found = step_of(data)
     if found is None or not data.has_position.any():

@@ -49,21 +49,11 @@ PULLED: Final = frozenset({"linear", "huber"})
 
 @dataclass(frozen=True)
 class Judgement:
-    """What is said of a fit.
+    """What is said of a fit."""
 
-    Attributes
-    ----------
-    expected
-        How accurate the robot is where it was not measured.
-    warnings
-        What speaks against it, worst first.
-    next
-        What to do next.
-    """
-
-    expected: ExpectedError
-    warnings: tuple[Notice, ...]
-    next: tuple[NextStep, ...]
+    expected: ExpectedError  #: How accurate the robot is where it was not measured.
+    warnings: tuple[Notice, ...]  #: What speaks against it, worst first.
+    next: tuple[NextStep, ...]  #: What to do next.
 
 
 def judge(
@@ -79,18 +69,12 @@ def judge(
 ) -> Judgement:
     """Judge a fit.
 
-    Parameters
-    ----------
-    data
-        All readings, training and held out.
-    errors
-        By which it is judged: of what was held out, if `held_out`, of the training readings otherwise.
-    noticed
-        What was said of the data before they were fitted.
-    of_split
-        What speaks against the split.
-    loss
-        Of the fit.
+    Args:
+        data: All readings, training and held out.
+        errors: By which it is judged: of what was held out, if `held_out`, of the training readings otherwise.
+        noticed: What was said of the data before they were fitted.
+        of_split: What speaks against the split.
+        loss: Of the fit.
     """
     # What the robust fit of the check could not explain, the fit itself may.
     # How many readings it is made from, it knows itself.

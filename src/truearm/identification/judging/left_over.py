@@ -23,39 +23,18 @@ _ALL_EXPLAINED: Final = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class LeftOver:
-    """The whitened residuals of a fit on readings, linearised at its solution.
+    """The whitened residuals of a fit on readings, linearised at its solution."""
 
-    Attributes
-    ----------
-    fit
-        What left them.
-    problem
-        The readings; what is known of fixtures is left out.
-    residual
-        ``(rows,)``.
-    jacobian
-        Derivative by the free parameters, ``(rows, parameters)``.
-    basis
-        Orthonormal directions of residuals that the free parameters can take, ``(rows, rank)``.
-    strength
-        Singular values of the Jacobian per prior, of those directions, ``(rank,)``.
-    turns
-        Directions of the parameters per prior that belong to them, ``(rank, parameters)``.
-    given
-        The readings asked about.
-    chosen
-        Which of their configurations these are: all, or of very many as many as the limit of derivatives has room for,
-        evenly spaced.
-    """
-
-    fit: Fit
-    problem: Problem
-    residual: Array
-    jacobian: Array
-    basis: Array
-    strength: Array
-    turns: Array
-    given: Dataset
+    fit: Fit  #: What left them.
+    problem: Problem  #: The readings; what is known of fixtures is left out.
+    residual: Array  #: ``(rows,)``.
+    jacobian: Array  #: Derivative by the free parameters, ``(rows, parameters)``.
+    basis: Array  #: Orthonormal directions of residuals that the free parameters can take, ``(rows, rank)``.
+    strength: Array  #: Singular values of the Jacobian per prior, of those directions, ``(rank,)``.
+    turns: Array  #: Directions of the parameters per prior that belong to them, ``(rank, parameters)``.
+    given: Dataset  #: The readings asked about.
+    #: Which of their configurations these are: all, or of very many as many as the limit of derivatives has room for,
+    #: evenly spaced.
     chosen: NDArray[np.intp]
 
     @classmethod
@@ -124,12 +103,9 @@ def _without_size(R: Array, c: Array, square: float) -> Array:
     Of a tip that is held at points the residual is then a length like any other: a robot without size would leave
     nothing. That is no explanation.
 
-    Parameters
-    ----------
-    R, c
-        Triangle of the Jacobian per prior, and the part of the residual that its columns span.
-    square
-        Sum of the squares of the residual.
+    Args:
+        R, c: Triangle of the Jacobian per prior, and the part of the residual that its columns span.
+        square: Sum of the squares of the residual.
     """
     if square == 0.0 or square - float(c @ c) > _ALL_EXPLAINED * square:
         return R

@@ -37,10 +37,8 @@ _ROUNDS: Final = 2
 def mixed_length_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     """Try another unit of length of those positions that it explains, where it explains no whole target.
 
-    Parameters
-    ----------
-    robot
-        At the origin, with no targets.
+    Args:
+        robot: At the origin, with no targets.
     """
     some = data
     if data.configurations > _MOST_PLACED:

@@ -28,31 +28,20 @@ _SMALL: Final = 1e-9  # priors
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
-    """Simulated calibrations of one robot at one set of configurations.
+    """Simulated calibrations of one robot at one set of configurations."""
 
-    Attributes
-    ----------
-    problem
-        The calibration of the nominal robot from readings of itself.
-    readings
-        How far the readings of each trial lie from those, in their standard deviations, ``(trials, rows)``.
-    truth, estimate, deviation
-        True values of the problem's free parameters, identified values, and the standard deviations that the
-        calibration states for these [SI], each ``(trials, parameters)``. Base and targets are true at the robot's
-        own values.
-    converged
-        Whether the steps of a trial settled, ``(trials,)``.
-    position_error
-        Distance from the true to the predicted position at configurations that no calibration saw [m],
-        ``(trials, targets, configurations)``.
-    """
-
-    problem: Problem
+    problem: Problem  #: The calibration of the nominal robot from readings of itself.
+    #: How far the readings of each trial lie from those, in their standard deviations, ``(trials, rows)``.
     readings: Array
+    #: truth, estimate, deviation: true values of the problem's free parameters, identified values, and the standard
+    #: deviations that the calibration states for these [SI], each ``(trials, parameters)``. Base and targets are true
+    #: at the robot's own values.
     truth: Array
     estimate: Array
     deviation: Array
-    converged: NDArray[np.bool_]
+    converged: NDArray[np.bool_]  #: Whether the steps of a trial settled, ``(trials,)``.
+    #: Distance from the true to the predicted position at configurations that no calibration saw [m], ``(trials,
+    #: targets, configurations)``.
     position_error: Array
 
     @property
@@ -80,20 +69,13 @@ def monte_carlo(
 ) -> MonteCarlo:
     """Simulate calibrations from position readings of all targets of a robot.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot, with its targets; its priors say what true robots are like.
-    q
-        Joint positions of the calibration, ``(configurations, joints)``.
-    model
-        Which parameters are free. Those of joints and links are drawn, base and targets are only identified.
-    sigma
-        Standard deviation of each measured coordinate [m].
-    trials
-        Number of calibrations.
-    held_out
-        Joint positions at which the calibrated robots are judged, ``(configurations, joints)``.
+    Args:
+        robot: The nominal robot, with its targets; its priors say what true robots are like.
+        q: Joint positions of the calibration, ``(configurations, joints)``.
+        model: Which parameters are free. Those of joints and links are drawn, base and targets are only identified.
+        sigma: Standard deviation of each measured coordinate [m].
+        trials: Number of calibrations.
+        held_out: Joint positions at which the calibrated robots are judged, ``(configurations, joints)``.
     """
     problem = of_itself(model.prepared(robot), q, model, sigma)
     free = problem.free
@@ -130,14 +112,11 @@ def of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
 def calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Calibrate many robots at once, each as if it were alone: whatever stands beside it, to the last digit.
 
-    Parameters
-    ----------
-    readings
-        As in :class:`MonteCarlo`.
+    Args:
+        readings: As in :class:`MonteCarlo`.
 
-    Returns
-    -------
-    Estimates and deviations [SI], ``(trials, parameters)``, and whether they settled, ``(trials,)``.
+    Returns:
+        Estimates and deviations [SI], ``(trials, parameters)``, and whether they settled, ``(trials,)``.
     """
     nominal, prior = problem.free.nominal, problem.free.prior
     x = np.tile(nominal, (len(readings), 1))

@@ -53,14 +53,10 @@ def check_narrow_data_without_geometry(
 
     Joints must have moved little: else the geometry is seen where the readings are.
 
-    Parameters
-    ----------
-    measured
-        The training part.
-    judged
-        Errors of the calibrated robot: held out, or of the training part if nothing was.
-    loss
-        Of the fit.
+    Args:
+        measured: The training part.
+        judged: Errors of the calibrated robot: held out, or of the training part if nothing was.
+        loss: Of the fit.
     """
     if not joints_that_moved_little(fit, measured):
         return []
@@ -92,12 +88,9 @@ def check_narrow_data(
 ) -> list[Notice]:
     """Say if the workspace is known much worse than the readings that judge the fit say.
 
-    Parameters
-    ----------
-    measured
-        The training part.
-    judged
-        Errors of the calibrated robot: held out, or of the training part if nothing was.
+    Args:
+        measured: The training part.
+        judged: Errors of the calibrated robot: held out, or of the training part if nothing was.
     """
     of_readings = judged.position or judged.length
     if of_readings is None:
@@ -136,12 +129,9 @@ def _beyond_curves(fit: Fit, expected: ExpectedError, measured: Dataset, known: 
     With curves hardly more than the noise of the readings is left there, which hides how much better the robot is there
     than elsewhere: the errors to expect are compared, both without noise.
 
-    Parameters
-    ----------
-    known
-        Error of the readings that judge the fit [m].
-    few
-        Joints that moved little, in words.
+    Args:
+        known: Error of the readings that judge the fit [m].
+        few: Joints that moved little, in words.
     """
     mean, (low, high) = expected.overall.mean, expected.overall.interval_90
     if not has_curves(fit) or not few or fit.gauge_freedoms or mean <= max(known, _NEGLIGIBLE):

@@ -12,20 +12,11 @@ MOST: Final = 3
 
 @dataclass(frozen=True)
 class NextStep:
-    """What to do next.
+    """What to do next."""
 
-    Attributes
-    ----------
-    code
-        Stable short name, for programs: ``other-model``, ``stop``.
-    message
-        What to do, and why.
-    gain
-        By how much the mean held-out error is expected to fall [m]; None where that cannot be told.
-    """
-
-    code: str
-    message: str
+    code: str  #: Stable short name, for programs: ``other-model``, ``stop``.
+    message: str  #: What to do, and why.
+    #: By how much the mean held-out error is expected to fall [m]; None where that cannot be told.
     gain: float | None = None
 
     @property

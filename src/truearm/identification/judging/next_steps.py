@@ -98,42 +98,19 @@ _OF_CONFIGURATIONS: Final = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A fit and what is known of it.
+    """A fit and what is known of it."""
 
-    Attributes
-    ----------
-    left
-        What it leaves of all readings.
-    status
-        How it ended.
-    notices
-        What was noticed about data and fit.
-    off
-        The configurations that are off one by one.
-    moved
-        What it leaves of the others, and what moved during the campaign; None if nothing did.
-    errors
-        Of the readings that judge it.
-    held_out
-        Whether the fit has not seen these.
-    expected
-        Error to expect over the workspace.
-    training
-        The readings that the fit was made from.
-    bent
-        Whether wrong readings, of which a notice says which, pulled the fit away.
-    """
-
-    left: LeftOver
-    status: Status
-    notices: Sequence[Notice]
-    off: Off
+    left: LeftOver  #: What it leaves of all readings.
+    status: Status  #: How it ended.
+    notices: Sequence[Notice]  #: What was noticed about data and fit.
+    off: Off  #: The configurations that are off one by one.
+    #: What it leaves of the others, and what moved during the campaign; None if nothing did.
     moved: tuple[LeftOver, Change] | None
-    errors: Errors
-    held_out: bool
-    expected: ExpectedError
-    training: Dataset
-    bent: bool = False
+    errors: Errors  #: Of the readings that judge it.
+    held_out: bool  #: Whether the fit has not seen these.
+    expected: ExpectedError  #: Error to expect over the workspace.
+    training: Dataset  #: The readings that the fit was made from.
+    bent: bool = False  #: Whether wrong readings, of which a notice says which, pulled the fit away.
 
 
 def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
@@ -173,14 +150,10 @@ def steps_after_check(
 ) -> tuple[NextStep, ...]:
     """Return at most three things to do after a check, the most useful first; one at least.
 
-    Parameters
-    ----------
-    left
-        What a robust geometric fit leaves of the readings; None without one.
-    errors
-        Of that fit.
-    robot
-        Whether the data were compared with a robot.
+    Args:
+        left: What a robust geometric fit leaves of the readings; None without one.
+        errors: Of that fit.
+        robot: Whether the data were compared with a robot.
     """
     mend = _to_mend(notices)
     if mend:
@@ -367,10 +340,8 @@ def _unexplained(first: str, untold: str, last: str) -> str:
 def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
     """Say that it is done, or that nothing known here explains what is left.
 
-    Parameters
-    ----------
-    configurations
-        That the fit was made from; all of the readings if None.
+    Args:
+        configurations: That the fit was made from; all of the readings if None.
     """
     fit = left.fit
     untold = about_curves(fit, left.problem.data.configurations if configurations is None else configurations)

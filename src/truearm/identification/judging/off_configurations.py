@@ -37,67 +37,38 @@ _LEAST_SHARE_OF_PARAMETERS: Final = 0.5
 
 @dataclass(frozen=True)
 class OffConfiguration:
-    """A configuration whose readings are far from those of a fit without it.
+    """A configuration whose readings are far from those of a fit without it."""
 
-    Attributes
-    ----------
-    index
-        In the dataset.
-    joint
-        The joint whose position alone explains the readings, clearly better than each other one; None if none does.
-    target
-        Name of the target that alone is off; empty if several are.
-    distance
-        How far the positions of its targets are off [m], root mean square, or that of the one target; of distances and
-        heights likewise.
-    """
-
-    index: int
+    index: int  #: In the dataset.
+    #: The joint whose position alone explains the readings, clearly better than each other one; None if none does.
     joint: WrongJoint | None
-    target: str
+    target: str  #: Name of the target that alone is off; empty if several are.
+    #: How far the positions of its targets are off [m], root mean square, or that of the one target; of distances and
+    #: heights likewise.
     distance: float
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """What a fit leaves, row by row, in the order of the configurations.
+    """What a fit leaves, row by row, in the order of the configurations."""
 
-    Attributes
-    ----------
-    residual, basis
-        Without what the free parameters can take ``(rows,)``, and directions that they can take ``(rows, rank)``.
-    sigma
-        Standard deviation of each row [m], zero for angles, ``(rows,)``.
-    target
-        Index of the block that each row is of, ``(rows,)``.
-    of
-        Rows of each configuration.
-    """
-
+    #: residual, basis: without what the free parameters can take ``(rows,)``, and directions that they can take
+    #: ``(rows, rank)``.
     residual: Array
     basis: Array
-    sigma: Array
-    target: NDArray[np.intp]
-    of: tuple[slice, ...]
+    sigma: Array  #: Standard deviation of each row [m], zero for angles, ``(rows,)``.
+    target: NDArray[np.intp]  #: Index of the block that each row is of, ``(rows,)``.
+    of: tuple[slice, ...]  #: Rows of each configuration.
 
 
 @dataclass(frozen=True)
 class Off:
-    """The configurations that are off one by one.
+    """The configurations that are off one by one."""
 
-    Attributes
-    ----------
-    configurations
-        The worst first.
-    left
-        What the fit leaves without them, over what it leaves with them: mean of the configurations' root mean squares.
-    in_a_row
-        Whether they were measured one after the other, so that something moved meanwhile.
-    """
-
-    configurations: tuple[OffConfiguration, ...] = ()
+    configurations: tuple[OffConfiguration, ...] = ()  #: The worst first.
+    #: What the fit leaves without them, over what it leaves with them: mean of the configurations' root mean squares.
     left: float = 1.0
-    in_a_row: bool = False
+    in_a_row: bool = False  #: Whether they were measured one after the other, so that something moved meanwhile.
 
     @property
     def indices(self) -> tuple[int, ...]:
@@ -190,10 +161,8 @@ def _shift(rows: _Rows, taken: NDArray[np.intp]) -> Array:
 def _worst(rows: _Rows, now: Array, out: list[int], taken: NDArray[np.intp]) -> tuple[int | None, float]:
     """Return the configuration that is off most, None if none is, and the mean square of what the others leave.
 
-    Parameters
-    ----------
-    now
-        What the fit without `taken` leaves, ``(rows,)``.
+    Args:
+        now: What the fit without `taken` leaves, ``(rows,)``.
     """
     edges = np.array([part.start for part in rows.of])
     count = np.array([part.stop - part.start for part in rows.of])
@@ -226,12 +195,9 @@ def _worst(rows: _Rows, now: Array, out: list[int], taken: NDArray[np.intp]) -> 
 def _described(left: LeftOver, rows: _Rows, index: int, shift: Array, scale: float) -> OffConfiguration:
     """Say what a configuration is off by.
 
-    Parameters
-    ----------
-    shift
-        What its rows are off by from a fit without it, ``(rows of it,)``.
-    scale
-        Mean square of what the other configurations leave.
+    Args:
+        shift: What its rows are off by from a fit without it, ``(rows of it,)``.
+        scale: Mean square of what the other configurations leave.
     """
     mine = rows.of[index]
     sigma, total = rows.sigma[mine], float(shift @ shift)

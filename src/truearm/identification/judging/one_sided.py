@@ -28,10 +28,8 @@ _BEYOND_CHANCE: Final = 21.1
 def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
     """Return a notice if positions that a loss holds back lie to one side.
 
-    Parameters
-    ----------
-    data
-        What the fit was made from.
+    Args:
+        data: What the fit was made from.
     """
     held = (np.nan_to_num(fit.weight, nan=1.0) < _HELD_BACK) & data.has_position
     if not held.any():

@@ -56,10 +56,8 @@ _NUMBERS: Final = (
 def orientation_slips(robot: Robot, data: Dataset) -> list[Notice]:
     """Return which slip with orientations makes them agree with the robot; nothing if they do, or if none does.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot, which is placed by the positions.
+    Args:
+        robot: The nominal robot, which is placed by the positions.
     """
     if data.quaternion is None or not data.has_orientation.any():
         return []
@@ -89,21 +87,11 @@ def _of_numbers(read: Array) -> Iterator[tuple[str, Array]]:
 
 @dataclass(frozen=True, eq=False)
 class _Readings:
-    """Orientations of targets that have several, and those of the flange at the same configurations.
+    """Orientations of targets that have several, and those of the flange at the same configurations."""
 
-    Attributes
-    ----------
-    flange
-        Of the placed robot, transposed, ``(rows, 3, 3)``.
-    taken
-        Which readings of the data they are, target by target, ``(rows,)``.
-    ends
-        Behind the last row of each target.
-    """
-
-    flange: Array
-    taken: IntArray
-    ends: tuple[int, ...]
+    flange: Array  #: Of the placed robot, transposed, ``(rows, 3, 3)``.
+    taken: IntArray  #: Which readings of the data they are, target by target, ``(rows,)``.
+    ends: tuple[int, ...]  #: Behind the last row of each target.
 
     @classmethod
     def of(cls, placed: Robot, data: Dataset) -> _Readings:
@@ -123,10 +111,8 @@ class _Readings:
     def left(self, *ways: Array) -> float:
         """Return how far targets' orientations on the flange differ from their means, as a root mean square [rad].
 
-        Parameters
-        ----------
-        ways
-            What was read, ``(rows, 3, 3)``. Of two ways that wins in each row that is nearer to the other rows.
+        Args:
+            ways: What was read, ``(rows, 3, 3)``. Of two ways that wins in each row that is nearer to the other rows.
         """
         squares, start = 0.0, 0
         on_flange = [self.flange @ turned for turned in ways]
@@ -181,12 +167,9 @@ def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], str
 
     Of all ways the one is taken that explains most of them: it must explain two, or one by the order of a quaternion.
 
-    Parameters
-    ----------
-    read
-        Quaternions as they came, ``(rows, 4)``.
-    predicted
-        How they should turn, ``(rows, 3, 3)``.
+    Args:
+        read: Quaternions as they came, ``(rows, 4)``.
+        predicted: How they should turn, ``(rows, 3, 3)``.
     """
     turned = rotation_from_quaternion(read)
     allowed = np.minimum(_EXPLAINED_WITHIN, _angles_between([turned], predicted) / _IMPROVEMENT_OF_ROWS)
@@ -214,10 +197,9 @@ def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], str
 def _other_conventions(turned: Array) -> Iterator[tuple[int, str, list[Array]]]:
     """Try each way to write three numbers as the one that was taken with each other one as the one that was meant.
 
-    Yields
-    ------
-    How many of both are rare, what happened in words, and the rotations that were meant, ``(rows, 3, 3)``: one way, or
-    two of which one is right in each row.
+    Yields:
+        How many of both are rare, what happened in words, and the rotations that were meant, ``(rows, 3, 3)``: one way,
+        or two of which one is right in each row.
     """
     for taken in (*_ORDERS, None):
         ways = _vectors(turned) if taken is None else _moving_angles(turned, taken)

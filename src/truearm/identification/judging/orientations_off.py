@@ -31,10 +31,8 @@ _ON_THE_AXIS: Final = 5e-3
 def orientations_off(errors: Errors) -> NDArray[np.bool_]:
     """Return which orientations are so far off that they are doubted, ``(readings,)``.
 
-    Parameters
-    ----------
-    errors
-        Of a robust fit.
+    Args:
+        errors: Of a robust fit.
     """
     turned = errors.orientation_errors
     if turned is None or not len(errors.orientation_norms):
@@ -46,12 +44,9 @@ def orientations_off(errors: Errors) -> NDArray[np.bool_]:
 def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray[np.bool_]) -> list[Notice]:
     """Say which orientations are far off, and which of them would not be if their numbers were read otherwise.
 
-    Parameters
-    ----------
-    errors
-        Of the fit.
-    doubted
-        The orientations that are far off, where the positions are not, ``(readings,)``.
+    Args:
+        errors: Of the fit.
+        doubted: The orientations that are far off, where the positions are not, ``(readings,)``.
     """
     if data.quaternion is None or errors.orientation_errors is None or not doubted.any():
         return []
@@ -96,10 +91,8 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
 def _as_if_turned(fit: Fit, data: Dataset, reading: int, by: Array) -> str:
     """Say if a joint that were off would turn a reading alike, and hardly move it; nothing if none would.
 
-    Parameters
-    ----------
-    by
-        What the orientation is off by, as a rotation vector [rad], ``(3,)``.
+    Args:
+        by: What the orientation is off by, as a rotation vector [rad], ``(3,)``.
     """
     one = data.of_configurations(data.configuration[[reading]])
     moves = fit.robot.joint_jacobian(one.postures, data.targets[data.target[reading]])[0]
@@ -113,10 +106,8 @@ def _as_if_turned(fit: Fit, data: Dataset, reading: int, by: Array) -> str:
 def without_orientations(data: Dataset, doubted: NDArray[np.bool_]) -> Dataset:
     """Return the data without some orientations.
 
-    Parameters
-    ----------
-    doubted
-        Which, ``(readings,)``.
+    Args:
+        doubted: Which, ``(readings,)``.
     """
     if data.quaternion is None or not doubted.any():
         return data

@@ -55,31 +55,19 @@ _LIMIT_ROUNDING: Final = math.radians(0.05)
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What is said of a dataset if it was measured on a robot.
+    """What is said of a dataset if it was measured on a robot."""
 
-    Attributes
-    ----------
-    notices, suspects
-        What is wrong with it, and the readings far off.
-    fit
-        A robust one; None where none was made, or where it is of no use.
-    believed
-        The readings without the orientations that are doubted; None without a fit.
-    """
-
-    notices: list[Notice]
+    notices: list[Notice]  #: notices, suspects: what is wrong with it, and the readings far off.
     suspects: list[Suspect] = field(default_factory=list)
-    fit: Fit | None = None
-    believed: Dataset | None = None
+    fit: Fit | None = None  #: A robust one; None where none was made, or where it is of no use.
+    believed: Dataset | None = None  #: The readings without the orientations that are doubted; None without a fit.
 
 
 def check_against(robot: Robot, data: Dataset) -> Comparison:
     """Compare a dataset with the robot that it was measured on.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot, with as many joints as the data; its base and targets are left out of account.
+    Args:
+        robot: The nominal robot, with as many joints as the data; its base and targets are left out of account.
     """
     found = _beyond_limits(robot, data)
     if data.fixture is not None:
@@ -140,10 +128,8 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
 def _computed(robot: Robot, data: Dataset, off: Array) -> list[Notice]:
     """Return a notice if the uncalibrated robot fits better than any arm is: somebody computed the positions.
 
-    Parameters
-    ----------
-    off
-        By how much each reading is off after a calibration [m].
+    Args:
+        off: By how much each reading is off after a calibration [m].
     """
     if robot.proof is not None or data.configurations < _LEAST_COMPUTED or np.nanmedian(off) > _COMPUTED_WITHIN:
         return []

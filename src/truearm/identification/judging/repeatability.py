@@ -25,39 +25,24 @@ _LEAST_FREEDOM: Final = 10
 
 @dataclass(frozen=True)
 class Repeatability:
-    """Of a robot, at the postures that were visited again.
+    """Of a robot, at the postures that were visited again."""
 
-    Attributes
-    ----------
-    rp
-        Pose repeatability of ISO 9283 [m].
-    postures
-        How many were visited again.
-    visits
-        How many visits these had together.
-    square
-        Mean square of the visits' distances from where the posture is on average, without the instrument's noise [m^2];
-        negative where the visits scatter less than the noise lets expect.
-    deviation
-        Its standard deviation [m^2].
-    """
-
-    rp: float
-    postures: int
-    visits: int
+    rp: float  #: Pose repeatability of ISO 9283 [m].
+    postures: int  #: How many were visited again.
+    visits: int  #: How many visits these had together.
+    #: Mean square of the visits' distances from where the posture is on average, without the instrument's noise [m^2];
+    #: negative where the visits scatter less than the noise lets expect.
     square: float
-    deviation: float
+    deviation: float  #: Its standard deviation [m^2].
 
 
 def repeatability(data: Dataset, sigma: float) -> Repeatability | None:
     """Return the repeatability that postures visited again show; None if too few were.
 
-    Parameters
-    ----------
-    data
-        Readings. Visits of a posture are configurations with the same joint positions, or visits of one configuration.
-    sigma
-        Standard deviation of a coordinate [m].
+    Args:
+        data: Readings. Visits of a posture are configurations with the same joint positions, or visits of one
+            configuration.
+        sigma: Standard deviation of a coordinate [m].
     """
     read = np.flatnonzero(data.has_position)
     if not len(read):

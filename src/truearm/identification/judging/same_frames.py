@@ -39,16 +39,11 @@ _FEWEST: Final = 8
 def check_frames(robot: Robot, data: Dataset, errors: Errors, known: Moved | None = None) -> list[Notice]:
     """Return a notice if readings agree with the robot only after something was moved, or hardly in any case.
 
-    Parameters
-    ----------
-    robot
-        With base and targets.
-    data
-        Readings of those.
-    errors
-        Of the robot on them.
-    known
-        What was found anew from them already.
+    Args:
+        robot: With base and targets.
+        data: Readings of those.
+        errors: Of the robot on them.
+        known: What was found anew from them already.
     """
     off = _sizes(errors)
     if len(off) == 0 or float(off.mean()) <= _NEAR:

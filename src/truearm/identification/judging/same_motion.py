@@ -32,10 +32,8 @@ def own_parameters(fit: Fit) -> list[int]:
 def same_motion(fit: Fit) -> set[tuple[int, int]]:
     """Return pairs of free parameters that move the targets alike at all configurations, up to base and targets.
 
-    Returns
-    -------
-    pairs
-        Indices of the free parameters, the lower one first.
+    Returns:
+        pairs: Indices of the free parameters, the lower one first.
     """
     robot, names = fit.robot, fit.free.names
     own = own_parameters(fit)

@@ -55,55 +55,32 @@ _MOST_LENGTHS: Final = 1000
 
 @dataclass(frozen=True)
 class PredictedError:
-    """Mean position error that errors of the parameters make at some configurations [m].
+    """Mean position error that errors of the parameters make at some configurations [m]."""
 
-    Attributes
-    ----------
-    mean, interval_90
-        By Monte Carlo.
-    linear_mean, linear_interval_90
-        By the covariance.
-    """
-
-    mean: float
+    mean: float  #: mean, interval_90: by Monte Carlo.
     interval_90: tuple[float, float]
-    linear_mean: float
+    linear_mean: float  #: linear_mean, linear_interval_90: by the covariance.
     linear_interval_90: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedCalibrations:
-    """Calibrations of the robot that a fit has found, from simulated readings.
+    """Calibrations of the robot that a fit has found, from simulated readings."""
 
-    Attributes
-    ----------
-    names
-        Of the parameters, in the order of the fit.
-    estimate, linear_deviation
-        Values that the fit found, and their standard deviations in it [SI], ``(parameters,)``.
-    error
-        Estimate minus truth in each trial that settled [SI], ``(trials, parameters)``.
-    stated
-        Standard deviations that each of these trials states [SI], likewise; those of the fit where its covariance
-        follows from the scatter of the arrivals.
-    asked
-        How many trials were made.
-    seed
-        Of the trials.
-    held_out
-        Error of predictions at the held-out configurations (the training ones, if nothing was held out).
-    workspace
-        Likewise over the whole workspace; None where parameters were held as redundant.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  #: Of the parameters, in the order of the fit.
+    #: estimate, linear_deviation: values that the fit found, and their standard deviations in it [SI],
+    #: ``(parameters,)``.
     estimate: Array
     linear_deviation: Array
-    error: Array
+    error: Array  #: Estimate minus truth in each trial that settled [SI], ``(trials, parameters)``.
+    #: Standard deviations that each of these trials states [SI], likewise; those of the fit where its covariance
+    #: follows from the scatter of the arrivals.
     stated: Array
-    asked: int
-    seed: int
+    asked: int  #: How many trials were made.
+    seed: int  #: Of the trials.
+    #: Error of predictions at the held-out configurations (the training ones, if nothing was held out).
     held_out: PredictedError | None
+    #: Likewise over the whole workspace; None where parameters were held as redundant.
     workspace: PredictedError | None
 
     @property
@@ -146,20 +123,13 @@ def simulated_calibrations(
 ) -> SimulatedCalibrations:
     """Repeat a calibration on simulated readings.
 
-    Parameters
-    ----------
-    training
-        What the fit was made from: where the robot is measured, and with which deviations.
-    judged
-        Readings at whose configurations predictions are compared.
-    trials
-        How many.
-    priors
-        Whether the priors take part, as in the fit.
-    seed
-        Of the trials.
-    progress
-        Called with the number of trials that are done.
+    Args:
+        training: What the fit was made from: where the robot is measured, and with which deviations.
+        judged: Readings at whose configurations predictions are compared.
+        trials: How many.
+        priors: Whether the priors take part, as in the fit.
+        seed: Of the trials.
+        progress: Called with the number of trials that are done.
     """
     rng = np.random.default_rng((seed, 4))
     problem, whitening, scatter = _of_itself(fit, training, priors=priors)
@@ -234,12 +204,9 @@ def _calibrated(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return estimates, their deviations, and whether they settled, for trials.
 
-    Parameters
-    ----------
-    readings
-        How far the simulated readings lie from the measured ones, in their deviations, ``(trials, rows)``.
-    centre
-        Nominal values, from which each trial begins, ``(trials, parameters)``.
+    Args:
+        readings: How far the simulated readings lie from the measured ones, in their deviations, ``(trials, rows)``.
+        centre: Nominal values, from which each trial begins, ``(trials, parameters)``.
     """
     prior = problem.free.prior
     ridge = np.eye(len(prior)) if problem.priors else np.zeros((len(prior),) * 2)
@@ -282,10 +249,8 @@ def _predicted(fit: Fit, joints: Array, names: tuple[str, ...], error: Array) ->
 def refuse_too_many(robot: Robot, training: Dataset, model: Model) -> None:
     """Refuse readings whose derivatives one trial would not have room for, before anything is fitted.
 
-    Parameters
-    ----------
-    robot
-        In the frames of the readings.
+    Args:
+        robot: In the frames of the readings.
     """
     start = model.prepared(robot)
     problem = Problem(start, training, model.free(start), {observation.name: 1.0 for observation in OBSERVATIONS})

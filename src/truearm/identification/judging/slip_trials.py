@@ -30,23 +30,12 @@ _MOST_TURNS: Final = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Slip:
-    """One slip, mended.
+    """One slip, mended."""
 
-    Attributes
-    ----------
-    code
-        Of the notice.
-    words
-        What happened and what to do about it, without a full stop.
-    data
-        The data as they should be.
-    at
-        Configuration and target of the readings that it is about; empty if it is about all.
-    """
-
-    code: str
-    words: str
-    data: Dataset
+    code: str  #: Of the notice.
+    words: str  #: What happened and what to do about it, without a full stop.
+    data: Dataset  #: The data as they should be.
+    #: Configuration and target of the readings that it is about; empty if it is about all.
     at: tuple[tuple[str, str], ...] = ()
 
     @property

@@ -151,10 +151,8 @@ def _angle_slips(robot: Robot, data: Dataset) -> list[Slip]:
 def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[[], list[Slip]] = list) -> Slip | None:
     """Return the simplest slip that explains the data, None if none does.
 
-    Parameters
-    ----------
-    several
-        Several slips at once, tried where none alone makes the data fit as if nothing else were wrong.
+    Args:
+        several: Several slips at once, tried where none alone makes the data fit as if nothing else were wrong.
     """
     tried = list(slips)
     if not tried:

@@ -22,14 +22,10 @@ _MOST_TARGETS: Final = 20
 def check_names(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
     """Return a notice if positions of targets fit other targets of the robot far better.
 
-    Parameters
-    ----------
-    robot
-        With base and targets.
-    data
-        Readings of those.
-    errors
-        Of the robot on them.
+    Args:
+        robot: With base and targets.
+        data: Readings of those.
+        errors: Of the robot on them.
     """
     if errors.position is None or errors.position.mean < _PLACED_WITHIN:
         return []

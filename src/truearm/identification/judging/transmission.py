@@ -41,29 +41,14 @@ _MOST_ALIASES: Final = 3
 
 @dataclass(frozen=True)
 class PeriodicError:
-    """A joint's residual that repeats.
+    """A joint's residual that repeats."""
 
-    Attributes
-    ----------
-    joint
-        Number of the joint, from 1.
-    periods
-        In a turn of the joint.
-    amplitude
-        Of the sine [rad].
-    share
-        Of the squared residuals that it explains.
-    chance
-        Probability that noise alone shows one as strong anywhere.
-    aliases
-        Other numbers of periods that look nearly the same at the positions that were measured, the nearest first.
-    """
-
-    joint: int
-    periods: int
-    amplitude: float
-    share: float
-    chance: float
+    joint: int  #: Number of the joint, from 1.
+    periods: int  #: In a turn of the joint.
+    amplitude: float  #: Of the sine [rad].
+    share: float  #: Of the squared residuals that it explains.
+    chance: float  #: Probability that noise alone shows one as strong anywhere.
+    #: Other numbers of periods that look nearly the same at the positions that were measured, the nearest first.
     aliases: tuple[int, ...] = ()
 
     @property
@@ -78,36 +63,23 @@ class PeriodicError:
 
 @dataclass(frozen=True, eq=False)
 class Pulls:
-    """What residuals say of errors of the joints, summed over the readings of each configuration.
+    """What residuals say of errors of the joints, summed over the readings of each configuration."""
 
-    Attributes
-    ----------
-    joints
-        Positions of the joints [rad or m], ``(n, joints)``.
-    pull, weight
-        J'r [m^2] and J'J [m^2], J the derivative by the joints, ``(n, joints)`` and ``(n, joints, joints)``.
-    total
-        Sum of the squared residuals [m^2].
-    free
-        Equations beyond the parameters: targets of a configuration share its errors, and count as one.
-    """
-
-    joints: Array
+    joints: Array  #: Positions of the joints [rad or m], ``(n, joints)``.
+    #: pull, weight: j'r [m^2] and J'J [m^2], J the derivative by the joints, ``(n, joints)`` and ``(n, joints,
+    #: joints)``.
     pull: Array
     weight: Array
-    total: float
-    free: int
+    total: float  #: Sum of the squared residuals [m^2].
+    free: int  #: Equations beyond the parameters: targets of a configuration share its errors, and count as one.
 
 
 def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
     """Return the periodic errors of joints whose gear the robot file does not describe, one a joint at most.
 
-    Parameters
-    ----------
-    fit
-        What is left over is seen from it.
-    data
-        The readings it is held against; fewer than 60 configurations say nothing.
+    Args:
+        fit: What is left over is seen from it.
+        data: The readings it is held against; fewer than 60 configurations say nothing.
     """
     robot = fit.robot
     if data.configurations < LEAST_CONFIGURATIONS or not data.has_position.any():
@@ -136,10 +108,8 @@ def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[Periodic
 
     Fewer than 60 configurations say nothing.
 
-    Parameters
-    ----------
-    fewest
-        Periods in a turn that are looked for, at least.
+    Args:
+        fewest: Periods in a turn that are looked for, at least.
     """
     if len(pulls.joints) < LEAST_CONFIGURATIONS:
         return ()
@@ -170,16 +140,11 @@ def _strongest(q: Array, pull: Array, weight: Array, noise: float, fewest: int) 
 
     It explains nothing where the readings see none.
 
-    Parameters
-    ----------
-    q
-        Positions of the joint [rad], ``(n,)``.
-    pull, weight
-        J'r [m^2] and J'J [m^2] of the joint, ``(n,)``.
-    noise
-        Variance of a coordinate of the residuals [m^2].
-    fewest
-        Periods in a turn that are looked for, at least.
+    Args:
+        q: Positions of the joint [rad], ``(n,)``.
+        pull, weight: J'r [m^2] and J'J [m^2] of the joint, ``(n,)``.
+        noise: Variance of a coordinate of the residuals [m^2].
+        fewest: Periods in a turn that are looked for, at least.
     """
     among = _PERIODS[fewest - FEWEST :]
     explained, a, b, least = _sines(q, pull, weight, among)
@@ -209,12 +174,9 @@ def _sines(q: Array, pull: Array, weight: Array, periods: NDArray[np.intp]) -> t
 def _aliases(q: Array, wave: Array, weight: Array, periods: int) -> tuple[int, ...]:
     """Return other numbers of periods whose sines pass through nearly the same values at the positions measured.
 
-    Parameters
-    ----------
-    wave
-        What was found, ``(n,)``.
-    periods
-        In a turn; its neighbours, which the range of the joint does not tell from it, are not others.
+    Args:
+        wave: What was found, ``(n,)``.
+        periods: In a turn; its neighbours, which the range of the joint does not tell from it, are not others.
     """
     explained = _sines(q, weight * wave, weight, _ALIASES)[0] / float(weight @ wave**2)
     near = math.ceil(2.0 * math.pi / max(float(np.ptp(q)), 1e-3))

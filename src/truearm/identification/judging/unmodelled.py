@@ -67,25 +67,15 @@ _FARTHEST_COG: Final = 1.0
 
 @dataclass(frozen=True)
 class Explanation:
-    """What would explain what a fit leaves.
+    """What would explain what a fit leaves."""
 
-    Attributes
-    ----------
-    cause
-        Name of a joint effect; ``geometry`` for the geometry and the joint zeros; ``payload``; or ``loads`` where the
-        joints give way under loads that the robot file does not know.
-    left
-        Root mean square that is left with it, over that without it, on configurations that the estimate has not seen.
-    chance
-        Probability that noise alone shows as much with any of the causes tried.
-    mass
-        Of the payload [kg]; zero for other causes, and where it cannot be told.
-    """
-
+    #: Name of a joint effect; ``geometry`` for the geometry and the joint zeros; ``payload``; or ``loads`` where the
+    #: joints give way under loads that the robot file does not know.
     cause: str
+    #: Root mean square that is left with it, over that without it, on configurations that the estimate has not seen.
     left: float
-    chance: float
-    mass: float = 0.0
+    chance: float  #: Probability that noise alone shows as much with any of the causes tried.
+    mass: float = 0.0  #: Of the payload [kg]; zero for other causes, and where it cannot be told.
 
 
 def with_causes(left: LeftOver, *causes: str) -> LeftOver:
@@ -111,27 +101,13 @@ def with_causes(left: LeftOver, *causes: str) -> LeftOver:
 
 @dataclass(frozen=True, eq=False)
 class _Remainder:
-    """What a fit leaves of some configurations.
+    """What a fit leaves of some configurations."""
 
-    Attributes
-    ----------
-    problem
-        The readings, without any parameter.
-    residual
-        ``(rows,)``, without what the free parameters can take.
-    basis
-        Orthonormal directions that they can take, ``(rows, rank)``.
-    fold
-        Fold of each row, ``(rows,)``.
-    configuration
-        Of each row, ``(rows,)``.
-    """
-
-    problem: Problem
-    residual: Array
-    basis: Array
-    fold: NDArray[np.intp]
-    configuration: NDArray[np.intp]
+    problem: Problem  #: The readings, without any parameter.
+    residual: Array  #: ``(rows,)``, without what the free parameters can take.
+    basis: Array  #: Orthonormal directions that they can take, ``(rows, rank)``.
+    fold: NDArray[np.intp]  #: Fold of each row, ``(rows,)``.
+    configuration: NDArray[np.intp]  #: Of each row, ``(rows,)``.
 
     def without_parameters(self, columns: Array) -> Array:
         """Return columns without what the free parameters can take."""
@@ -141,10 +117,8 @@ class _Remainder:
 def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | None:
     """Return what best explains what a fit leaves, None if nothing does by more than chance.
 
-    Parameters
-    ----------
-    without
-        Configurations of the dataset that are left out of account.
+    Args:
+        without: Configurations of the dataset that are left out of account.
     """
     robot, groups = _candidates(left, left.problem)
     some = _some(left, without, groups)
@@ -232,10 +206,8 @@ def _candidates(
 ) -> tuple[Robot, dict[str, tuple[Parameter, ...]]]:
     """Return the causes that are tried, each with its parameters, and a robot that has them all.
 
-    Parameters
-    ----------
-    asked
-        The causes that are wanted; all of them if None.
+    Args:
+        asked: The causes that are wanted; all of them if None.
     """
     fit = left.fit
     robot = fit.robot
@@ -265,12 +237,9 @@ def _candidates(
 def _judged(rest: _Remainder, cause: str, columns: Array, mass: float, freedom: int, tried: int) -> Explanation | None:
     """Return what columns explain of the residuals, None if it is too little or chance.
 
-    Parameters
-    ----------
-    columns
-        Per prior and without what the free parameters can take, ``(rows, k)``.
-    mass
-        Of a payload [kg].
+    Args:
+        columns: Per prior and without what the free parameters can take, ``(rows, k)``.
+        mass: Of a payload [kg].
     """
     r, (rows, k) = rest.residual, columns.shape
     # The smaller of two systems: (A'A + c)^-1 A' = A' (AA' + c)^-1. Their eigenvalues differ by zeros alone.
@@ -374,12 +343,10 @@ def _bilinear(G: Array, g: Array, mine: list[int], start: Array, prior: Array) -
 
     The residual is ``r + sum_i own_i (c_i - start_i) + sum_i c_i added_i p``, and its sums of products are given.
 
-    Parameters
-    ----------
-    G, g
-        Columns times columns, and times the residual; own columns of the free joints first, then four of each joint.
-    mine
-        The joints whose compliance is free.
+    Args:
+        G, g: Columns times columns, and times the residual; own columns of the free joints first, then four of each
+            joint.
+        mine: The joints whose compliance is free.
     """
     count, k = len(start), len(mine)
     c, p = start.copy(), np.zeros(4)

@@ -34,34 +34,20 @@ _DIFFERENCE: Final = 1e-6
 
 @dataclass(frozen=True)
 class WrongJoint:
-    """A joint whose position alone explains the readings of a configuration.
+    """A joint whose position alone explains the readings of a configuration."""
 
-    Attributes
-    ----------
-    number
-        From 1.
-    error
-        What it was read too large by [rad or m].
-    sign
-        Whether its sign was wrong.
-    """
-
-    number: int
-    error: float
-    sign: bool
+    number: int  #: From 1.
+    error: float  #: What it was read too large by [rad or m].
+    sign: bool  #: Whether its sign was wrong.
 
 
 def wrong_joint(left: LeftOver, index: int, shift: Array, scale: float) -> WrongJoint | None:
     """Return the joint that explains what a configuration is off by, clearly better than each other joint does.
 
-    Parameters
-    ----------
-    index
-        Of the configuration.
-    shift
-        What its equations are off by from a fit without it, ``(equations,)``.
-    scale
-        Mean square of what the other configurations leave.
+    Args:
+        index: Of the configuration.
+        shift: What its equations are off by from a fit without it, ``(equations,)``.
+        scale: Mean square of what the other configurations leave.
     """
     total = float(shift @ shift)
     trials = _Trials(left, index, shift)
@@ -90,10 +76,8 @@ def _clearly(rest: Array, best: int, usual: float, equations: int) -> bool:
 class _Trials:
     """The equations of one configuration, with its joints elsewhere.
 
-    Attributes
-    ----------
-    noted
-        Joint positions as they were noted: the controller's where they came as such, ``(joints,)``.
+    Attributes:
+        noted: Joint positions as they were noted: the controller's where they came as such, ``(joints,)``.
     """
 
     def __init__(self, left: LeftOver, index: int, shift: Array) -> None:
@@ -108,10 +92,8 @@ class _Trials:
     def rest(self, moved: Array) -> Array:
         """Return the sum of squares that is left with each joint moved by so much, ``(joints,)``.
 
-        Parameters
-        ----------
-        moved
-            [rad or m], ``(joints,)``.
+        Args:
+            moved: [rad or m], ``(joints,)``.
         """
         return np.asarray(np.sum(self._left_by(np.arange(len(moved)), moved) ** 2, axis=1))
 

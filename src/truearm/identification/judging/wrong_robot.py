@@ -66,21 +66,11 @@ _MOST_COMPARED: Final = 10
 
 @dataclass(frozen=True, eq=False)
 class Lengths:
-    """How far the lengths of a robot moved along the combinations that readings determine.
+    """How far the lengths of a robot moved along the combinations that readings determine."""
 
-    Attributes
-    ----------
-    parameters
-        The lengths.
-    directions
-        Orthonormal combinations in priors, ``(combinations, lengths)``.
-    moved
-        How far along each [priors], ``(combinations,)``.
-    """
-
-    parameters: tuple[Parameter, ...]
-    directions: Array
-    moved: Array
+    parameters: tuple[Parameter, ...]  #: The lengths.
+    directions: Array  #: Orthonormal combinations in priors, ``(combinations, lengths)``.
+    moved: Array  #: How far along each [priors], ``(combinations,)``.
 
     @classmethod
     def of(cls, fit: Fit, data: Dataset) -> Lengths:
@@ -194,10 +184,8 @@ def judges_lengths(fit: Fit) -> bool:
 def check_robot(fit: Fit, data: Dataset) -> list[Notice]:
     """Return a notice if the lengths that a fit found are not this robot's.
 
-    Parameters
-    ----------
-    data
-        The readings it was made from.
+    Args:
+        data: The readings it was made from.
     """
     lengths = Lengths.of(fit, data)
     if lengths.chance >= _SIGNIFICANT:

@@ -22,15 +22,9 @@ from truearm.modeling.parameters import FreeParameters
 
 @dataclass(frozen=True, eq=False)
 class Arrivals:
-    """Equations gathered by arrival.
+    """Equations gathered by arrival."""
 
-    Attributes
-    ----------
-    of_row
-        Index of the arrival of each equation, ``(rows,)``, without gaps.
-    """
-
-    of_row: NDArray[np.intp]
+    of_row: NDArray[np.intp]  #: Index of the arrival of each equation, ``(rows,)``, without gaps.
 
     @property
     def count(self) -> int:
@@ -72,18 +66,10 @@ class Arrivals:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Makes the residuals of an arrival independent.
+    """Makes the residuals of an arrival independent."""
 
-    Attributes
-    ----------
-    arrivals
-        Which equations hang together.
-    shared
-        Derivative of the equations by the joints, times the deviations of these, ``(rows, joints)``.
-    """
-
-    arrivals: Arrivals
-    shared: Array
+    arrivals: Arrivals  #: Which equations hang together.
+    shared: Array  #: Derivative of the equations by the joints, times the deviations of these, ``(rows, joints)``.
 
     def of(self, rows: Rows) -> Whitening:
         """Return it for some equations: all those of some arrivals."""

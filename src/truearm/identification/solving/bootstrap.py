@@ -33,23 +33,15 @@ def refit_draws(
 
     Deviations of the readings, and which parameters are held, are those of the fit.
 
-    Parameters
-    ----------
-    solved
-        The fit to all training configurations, where each search begins.
-    loss
-        Of the fit.
-    count
-        How many draws.
-    seed
-        Of the draws.
-    progress
-        Called with a few words at each fit.
+    Args:
+        solved: The fit to all training configurations, where each search begins.
+        loss: Of the fit.
+        count: How many draws.
+        seed: Of the draws.
+        progress: Called with a few words at each fit.
 
-    Raises
-    ------
-    InputError
-        If there are too few configurations to draw from.
+    Raises:
+        InputError: If there are too few configurations to draw from.
     """
     problem, n = solved.problem, solved.problem.data.configurations
     if n < LEAST_CONFIGURATIONS:

@@ -28,20 +28,14 @@ class Bounds(BaseModel):
     """Schema ``truearm-bounds/1``.
 
     A name is a parameter (``theta_offset_2``) or a family (``theta_offset``: those of all joints).
-
-    Attributes
-    ----------
-    within
-        Largest distance from the nominal value.
-    between
-        Lowest and highest value.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     truearm: Literal["truearm-bounds/1"]
     units: _Units
+    #: Largest distance from the nominal value.
     within: dict[str, Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]] = {}
-    between: dict[str, tuple[_Number, _Number]] = {}
+    between: dict[str, tuple[_Number, _Number]] = {}  #: Lowest and highest value.
 
 
 def read_bounds(path: Path) -> Bounds:
@@ -54,15 +48,11 @@ def bound_vectors(
 ) -> tuple[Array, Array]:
     """Return lowest and highest value of every free parameter [SI], infinite where the file says nothing.
 
-    Parameters
-    ----------
-    others
-        What is not free, and may be named all the same.
+    Args:
+        others: What is not free, and may be named all the same.
 
-    Raises
-    ------
-    InputError
-        For a name that is no free parameter and no family of them, or bounds that leave no room.
+    Raises:
+        InputError: For a name that is no free parameter and no family of them, or bounds that leave no room.
     """
     low = np.full(len(free.names), -np.inf)
     high = np.full(len(free.names), np.inf)

@@ -41,18 +41,14 @@ def cluster_covariance(
 
     With it come its parts: of the arrivals' scatter, without what that is uncertain by, and of the priors.
 
-    Parameters
-    ----------
-    parts
-        Goes through the equations of some whole arrivals at a time, each part with their indices, with the square root
-        of the information: a Jacobian, per prior, whose square is what the parameters are known by,
-        ``(k, parameters)``; and with what each equation pulls the parameters with, ``(k, parameters)``: its residual
-        times its weight times its derivative, per prior.
-    uncertain
-        Which parameters are, ``(parameters,)``.
-    beforehand
-        What is known of each parameter before any reading: one by its deviation, in priors, ``(parameters,)``; 1 with
-        priors, 0 where nothing is known.
+    Args:
+        parts: Goes through the equations of some whole arrivals at a time, each part with their indices, with the
+            square root of the information: a Jacobian, per prior, whose square is what the parameters are known by,
+            ``(k, parameters)``; and with what each equation pulls the parameters with, ``(k, parameters)``: its
+            residual times its weight times its derivative, per prior.
+        uncertain: Which parameters are, ``(parameters,)``.
+        beforehand: What is known of each parameter before any reading: one by its deviation, in priors,
+            ``(parameters,)``; 1 with priors, 0 where nothing is known.
     """
     root = triangle = np.diag(beforehand[uncertain])
     for _, told, _ in parts():
@@ -70,18 +66,12 @@ def cluster_covariance(
 
 @dataclass(frozen=True, eq=False)
 class _Scatter:
-    """Arrivals with their equations and pulls, as :func:`cluster_covariance` takes them, and directions to see them in.
-
-    Attributes
-    ----------
-    directions
-        Of unit information, ``(parameters, p)``.
-    """
+    """Arrivals with their equations and pulls for :func:`cluster_covariance`, and directions to see them in."""
 
     parts: Callable[[], Iterable[tuple[Rows, Array, Array]]]
     arrivals: Arrivals
     uncertain: NDArray[np.bool_]
-    directions: Array
+    directions: Array  #: Of unit information, ``(parameters, p)``.
 
     def alike(self) -> Iterable[tuple[Array, Array, Array]]:
         """Go through arrivals with equally many equations, all at once where that takes little memory.

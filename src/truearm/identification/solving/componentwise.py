@@ -22,22 +22,16 @@ _SMALLEST: Final = 1e-9  # longest step [priors] below which steps that fail are
 def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None) -> tuple[Evaluated, bool, int]:
     """Minimise the sum of the absolute whitened residuals, without priors.
 
-    Parameters
-    ----------
-    problem
-        What is minimised; starts at its free parameters' values, moved inside the bounds.
-    bounds
-        Lowest and highest value of every parameter [SI], infinite where there is none.
+    Args:
+        problem: What is minimised; starts at its free parameters' values, moved inside the bounds.
+        bounds: Lowest and highest value of every parameter [SI], infinite where there is none.
 
-    Returns
-    -------
-    evaluated, converged, steps
-        The problem at the minimum, whether no step promised more, and how many linear programs it took.
+    Returns:
+        evaluated, converged, steps: The problem at the minimum, whether no step promised more, and how many linear
+            programs it took.
 
-    Raises
-    ------
-    ArithmeticError
-        If the solver of linear programs fails: residuals or Jacobian are not finite.
+    Raises:
+        ArithmeticError: If the solver of linear programs fails: residuals or Jacobian are not finite.
     """
     low, high = bounds if bounds is not None else (np.full(len(problem.free.names), side) for side in (-np.inf, np.inf))
     x, longest = np.clip(problem.free.start, low, high), np.inf

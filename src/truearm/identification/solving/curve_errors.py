@@ -47,39 +47,25 @@ _CERTAIN: Final = 1e-22
 
 @dataclass(frozen=True, eq=False)
 class CurveMoments:
-    """Products of all equations at a solution.
+    """Products of all equations at a solution."""
 
-    Attributes
-    ----------
-    moments
-        Of the derivatives by the other parameters, per prior, by the coefficients [1/rad], and of the right side,
-        ``(others + coefficients + 1, others + coefficients + 1)``.
-    rows
-        How many equations there are.
-    away
-        How far the solution is from the priors' centre: the others per prior, coefficients [rad],
-        ``(others + coefficients,)``.
-    joint, period
-        Of each coefficient.
-    size
-        Sum over the equations of the square of their derivative by each joint [1/rad^2], ``(joints,)``.
-    """
-
+    #: Of the derivatives by the other parameters, per prior, by the coefficients [1/rad], and of the right side,
+    #: ``(others + coefficients + 1, others + coefficients + 1)``.
     moments: Array
-    rows: float
+    rows: float  #: How many equations there are.
+    #: How far the solution is from the priors' centre: the others per prior, coefficients [rad], ``(others +
+    #: coefficients,)``.
     away: Array
-    joint: NDArray[np.intp]
+    joint: NDArray[np.intp]  #: joint, period: of each coefficient.
     period: NDArray[np.intp]
-    size: Array
+    size: Array  #: Sum over the equations of the square of their derivative by each joint [1/rad^2], ``(joints,)``.
 
 
 def expected_variances(of: CurveMoments, likeliest: Array) -> Array:
     """Return what the variance of each coefficient is expected to be [rad^2], ``(coefficients,)``.
 
-    Parameters
-    ----------
-    likeliest
-        The variances with the largest likelihood, ``(coefficients,)``.
+    Args:
+        likeliest: The variances with the largest likelihood, ``(coefficients,)``.
     """
     left = moments_without(of.moments, len(of.away) - len(likeliest))
     band = np.searchsorted(BANDS, of.period, side="right")
@@ -104,18 +90,13 @@ def expected_variances(of: CurveMoments, likeliest: Array) -> Array:
 def curve_covariance(of: CurveMoments, variance: Array, certain: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return the mean squared error of the fitted values, its part without readings, and which coefficients matter.
 
-    Parameters
-    ----------
-    variance
-        Of each coefficient [rad^2].
-    certain
-        Which of all parameters cannot be off, ``(others + coefficients,)``.
+    Args:
+        variance: Of each coefficient [rad^2].
+        certain: Which of all parameters cannot be off, ``(others + coefficients,)``.
 
-    Returns
-    -------
-    whole, beforehand
-        ``(parameters, parameters)`` each: the others per prior, coefficients in rad. The second is what priors leave,
-        without the noise of the readings.
+    Returns:
+        whole, beforehand: ``(parameters, parameters)`` each: the others per prior, coefficients in rad. The second is
+            what priors leave, without the noise of the readings.
     """
     others = len(of.away) - len(variance)
     expected = np.concatenate([np.ones(others), np.maximum(variance, _CERTAIN)])

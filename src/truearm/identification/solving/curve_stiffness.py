@@ -49,30 +49,14 @@ _ALIKE_EQUATIONS: Final = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class CurveVariances:
-    """How stiff the curves are.
+    """How stiff the curves are."""
 
-    Attributes
-    ----------
-    variance
-        Of each coefficient [rad^2], ``(coefficients,)``; zero where it is left out.
-    full
-        The same before those are left out that move next to nothing.
-    noise
-        Variance of the residuals by the one assumed.
-    informed
-        What the data know of each coefficient, 0 to 1, ``(coefficients,)``.
-    likelihood
-        Logarithm of the restricted likelihood, up to a constant.
-    gains
-        What the curve of each joint gains in it, by the index of the joint.
-    """
-
-    variance: Array
-    full: Array
-    noise: float
-    informed: Array
-    likelihood: float
-    gains: dict[int, float]
+    variance: Array  #: Of each coefficient [rad^2], ``(coefficients,)``; zero where it is left out.
+    full: Array  #: The same before those are left out that move next to nothing.
+    noise: float  #: Variance of the residuals by the one assumed.
+    informed: Array  #: What the data know of each coefficient, 0 to 1, ``(coefficients,)``.
+    likelihood: float  #: Logarithm of the restricted likelihood, up to a constant.
+    gains: dict[int, float]  #: What the curve of each joint gains in it, by the index of the joint.
 
 
 def curve_variances(
@@ -85,19 +69,14 @@ def curve_variances(
 ) -> CurveVariances:
     """Find the variances of the coefficients of the joints' curves.
 
-    Parameters
-    ----------
-    moments
-        From :func:`moments_without`, ``(coefficients + 1, coefficients + 1)``: of the derivatives of the equations by
-        the coefficients [1/rad], and of what the curves are to explain.
-    rows
-        How many independent equations there are.
-    joint, period
-        Of each coefficient: the index of its joint, and its periods in a turn.
-    least_noise
-        What the variance of the equations is at least, by the one assumed.
-    most
-        Sum of the variances of a joint's coefficients that no curve has, :data:`LARGEST` of coefficients in SI units.
+    Args:
+        moments: From :func:`moments_without`, ``(coefficients + 1, coefficients + 1)``: of the derivatives of the
+            equations by the coefficients [1/rad], and of what the curves are to explain.
+        rows: How many independent equations there are.
+        joint, period: Of each coefficient: the index of its joint, and its periods in a turn.
+        least_noise: What the variance of the equations is at least, by the one assumed.
+        most: Sum of the variances of a joint's coefficients that no curve has, :data:`LARGEST` of coefficients in SI
+            units.
     """
     of = equations_of(moments, rows)
     group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
@@ -137,13 +116,10 @@ def curve_variances(
 def moments_without(moments: Array, others: int) -> Array:
     """Return products of columns of equations with other parameters integrated out under their priors.
 
-    Parameters
-    ----------
-    moments
-        Products of the derivatives by the other parameters, per prior, of those by the coefficients and of the
-        residuals, ``(others + coefficients + 1, others + coefficients + 1)``.
-    others
-        How many other parameters there are.
+    Args:
+        moments: Products of the derivatives by the other parameters, per prior, of those by the coefficients and of the
+            residuals, ``(others + coefficients + 1, others + coefficients + 1)``.
+        others: How many other parameters there are.
     """
     root = np.linalg.cholesky(moments[:others, :others] + np.eye(others))
     shared = np.linalg.solve(root, moments[:others, others:])

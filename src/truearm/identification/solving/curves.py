@@ -39,32 +39,20 @@ _COORDINATES: Final = 3
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """The curves of the joints in a fit.
+    """The curves of the joints in a fit."""
 
-    Attributes
-    ----------
-    places
-        Joint (from 0) and periods in a turn of every coefficient that the model has, by its name.
-    variances
-        Of the coefficients that are free [rad^2].
-    likeliest
-        The variance of every coefficient that has the largest likelihood [rad^2], in the order of `places`.
-    design_effect
-        By what the variances of the readings are larger, for the curves' sake, than their residuals (Kish 1965): where
-        errors of the joints at an arrival explain nothing, its readings count as one of three coordinates, and hold
-        the curves no better.
-    gains
-        What the curve of each joint gains in log-likelihood, by the index of the joint.
-    rounds
-        How often stiffness is still to be found.
-    """
-
+    #: Joint (from 0) and periods in a turn of every coefficient that the model has, by its name.
     places: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-    variances: Mapping[str, float] = field(default_factory=dict)
+    variances: Mapping[str, float] = field(default_factory=dict)  #: Of the coefficients that are free [rad^2].
+    #: The variance of every coefficient that has the largest likelihood [rad^2], in the order of `places`.
     likeliest: Array = field(default_factory=lambda: np.zeros(0))
+    #: By what the variances of the readings are larger, for the curves' sake, than their residuals (Kish 1965): where
+    #: errors of the joints at an arrival explain nothing, its readings count as one of three coordinates, and hold the
+    #: curves no better.
     design_effect: float = 1.0
+    #: What the curve of each joint gains in log-likelihood, by the index of the joint.
     gains: Mapping[int, float] = field(default_factory=dict)
-    rounds: int = 0
+    rounds: int = 0  #: How often stiffness is still to be found.
 
     def __bool__(self) -> bool:
         return bool(self.places)
@@ -101,18 +89,12 @@ def with_stiffness(
     The deviations of its readings, and the variances of the joints' errors, which are returned too, are those with the
     curves.
 
-    Parameters
-    ----------
-    problem
-        At a solution, whose values its free parameters have.
-    every
-        All parameters that the model frees, in their order.
-    curves
-        What was found before.
-    joints
-        Variances of the joints' errors that readings are weighed by.
-    weight
-        What the loss leaves of each reading.
+    Args:
+        problem: At a solution, whose values its free parameters have.
+        every: All parameters that the model frees, in their order.
+        curves: What was found before.
+        joints: Variances of the joints' errors that readings are weighed by.
+        weight: What the loss leaves of each reading.
     """
     names = curves.names  # all of them again: what is weak shows only where the strong curves are known
     robot = problem.robot
@@ -167,16 +149,11 @@ def with_stiffness(
 def curve_moments(problem: Problem, curves: Curves, joints: Array, weight: Array, crowd: float) -> CurveMoments:
     """Return products of the equations of a problem, with every coefficient of the curves beside the other parameters.
 
-    Parameters
-    ----------
-    problem
-        At a solution, whose values its free parameters have.
-    joints
-        Variances of the joints' errors that readings are weighed by.
-    weight
-        What the loss leaves of each reading.
-    crowd
-        By what the variances of the readings are larger because they hang together.
+    Args:
+        problem: At a solution, whose values its free parameters have.
+        joints: Variances of the joints' errors that readings are weighed by.
+        weight: What the loss leaves of each reading.
+        crowd: By what the variances of the readings are larger because they hang together.
     """
     names, robot = curves.names, problem.robot
     others = [p for p in problem.free.parameters if p.name not in curves.places]
@@ -215,25 +192,17 @@ def parts_with_curves(
 ) -> tuple[tuple[str, ...], tuple[CovariancePart, ...]]:
     """Return what the parameters of a fit with curves are off by, and the coefficients that were not fitted.
 
-    Parameters
-    ----------
-    problem
-        At the solution, whose values its free parameters have.
-    joints
-        Variances of the joints' errors that readings are weighed by.
-    weight
-        What the loss leaves of each reading.
-    certain
-        Which of its free parameters are certain, ``(free,)``.
-    scatter
-        What the readings' noise adds to the covariance of the free parameters [SI], where it follows from their
-        scatter.
+    Args:
+        problem: At the solution, whose values its free parameters have.
+        joints: Variances of the joints' errors that readings are weighed by.
+        weight: What the loss leaves of each reading.
+        certain: Which of its free parameters are certain, ``(free,)``.
+        scatter: What the readings' noise adds to the covariance of the free parameters [SI], where it follows from
+            their scatter.
 
-    Returns
-    -------
-    names, parts
-        Of the coefficients that are zero in the fit and may not be, and the parts of the covariance [SI] of the free
-        parameters and, behind them, of these.
+    Returns:
+        names, parts: Of the coefficients that are zero in the fit and may not be, and the parts of the covariance [SI]
+            of the free parameters and, behind them, of these.
     """
     names, free = list(curves.places), problem.free
     of = curve_moments(problem, curves, joints, weight, 1.0 if scatter is None else curves.design_effect)

@@ -78,102 +78,56 @@ class Status(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """An identified robot. It knows training data only; held-out figures belong to the calibration.
+    """An identified robot. It knows training data only; held-out figures belong to the calibration."""
 
-    Attributes
-    ----------
-    robot
-        The robot with identified parameters, their deviations and informed shares.
-    start
-        The robot before: same frames in closed form, nominal parameters.
-    model
-        What was free.
-    status
-        How the fit ended.
-    free
-        The parameters that were identified, in the order of `covariance`.
-    covariance
-        Of the free parameters [SI], ``(parameters, parameters)``. An interval of 1.96 deviations to both sides is of
-        95 %: where variances are known from few readings, it is as much wider as one of Student's t. Readings of an
-        arrival may hang together. Outliers that lie to one side bias a robust fit, and the covariance does not contain
-        that.
-    covariance_parts
-        The covariance by its sources, and without what their variances are uncertain by; of the free parameters and,
-        behind them, of the `unfitted` ones.
-    redundancies
-        Parameters held because the data cannot tell them apart, with the combination.
-    at_bound
-        Names of parameters at a bound.
-    unobservable
-        Names of parameters that the data do not determine although predictions depend on them.
-    gauge_freedoms
-        Motions of everything that no reading observes: ``base`` where no reading locates the robot, ``size`` where no
-        length was measured either.
-    unobservable_combinations
-        Combinations of the robot's own parameters that readings without an anchor do not observe, in words such as
-        ``d_3 - d_2``; the first parameter of each keeps its nominal value.
-    sigma
-        Standard deviation of a reading [m or rad] by observation, declared (root mean square) or estimated.
-    declared
-        Whether the file declared all of them.
-    excess
-        How much larger the residuals are than the declared deviations allow; 1 if they agree or nothing was
-        declared. The covariance contains it. Parameters at a bound are not uncertain in it.
-    joint_error
-        Standard deviation of the error of each joint that all readings of an arrival share, ``(joints,)`` [rad or m]:
-        repeatability plus what the model leaves. Zero where none was found.
-    joint_freedom
-        Degrees of freedom behind its square, ``(joints,)``; infinite where none was found.
-    scattered
-        Whether the covariance follows from the scatter of the arrivals: for losses other than the linear one, and where
-        errors of the joints do not explain how the residuals of an arrival hang together.
-    weight
-        What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
-        For sums of absolute values, which have no full weight, relative to the median reading.
-    numbers
-        Of the readings it was made from, and of what is known of fixtures.
-    spent
-        How many of them the parameters took up.
-    assumed
-        The observations whose standard deviation was neither declared nor told by the readings.
-    loss
-        Of the readings.
-    steps
-        Steps of the solver, over all stages.
-    held
-        Places that were known, and not found.
-    bootstrap
-        How many fits to configurations drawn anew the covariance follows from; 0 if from none.
-    unfitted
-        Coefficients of joint curves that are zero, and uncertain: the data could not tell them.
-    """
-
-    robot: Robot
-    start: Robot
-    model: Model
-    status: Status
-    free: FreeParameters
+    robot: Robot  #: The robot with identified parameters, their deviations and informed shares.
+    start: Robot  #: The robot before: same frames in closed form, nominal parameters.
+    model: Model  #: What was free.
+    status: Status  #: How the fit ended.
+    free: FreeParameters  #: The parameters that were identified, in the order of `covariance`.
+    #: Of the free parameters [SI], ``(parameters, parameters)``. An interval of 1.96 deviations to both sides is of 95
+    #: %: where variances are known from few readings, it is as much wider as one of Student's t. Readings of an arrival
+    #: may hang together. Outliers that lie to one side bias a robust fit, and the covariance does not contain that.
     covariance: Array
+    #: The covariance by its sources, and without what their variances are uncertain by; of the free parameters and,
+    #: behind them, of the `unfitted` ones.
     covariance_parts: tuple[CovariancePart, ...]
+    #: Parameters held because the data cannot tell them apart, with the combination.
     redundancies: tuple[Redundancy, ...]
-    at_bound: tuple[str, ...]
+    at_bound: tuple[str, ...]  #: Names of parameters at a bound.
+    #: Names of parameters that the data do not determine although predictions depend on them.
     unobservable: tuple[str, ...]
+    #: Motions of everything that no reading observes: ``base`` where no reading locates the robot, ``size`` where no
+    #: length was measured either.
     gauge_freedoms: tuple[str, ...]
+    #: Combinations of the robot's own parameters that readings without an anchor do not observe, in words such as ``d_3
+    #: - d_2``; the first parameter of each keeps its nominal value.
     unobservable_combinations: tuple[str, ...]
+    #: Standard deviation of a reading [m or rad] by observation, declared (root mean square) or estimated.
     sigma: dict[str, float]
-    declared: bool
+    declared: bool  #: Whether the file declared all of them.
+    #: How much larger the residuals are than the declared deviations allow; 1 if they agree or nothing was declared.
+    #: The covariance contains it. Parameters at a bound are not uncertain in it.
     excess: float
+    #: Standard deviation of the error of each joint that all readings of an arrival share, ``(joints,)`` [rad or m]:
+    #: repeatability plus what the model leaves. Zero where none was found.
     joint_error: Array
-    joint_freedom: Array
+    joint_freedom: Array  #: Degrees of freedom behind its square, ``(joints,)``; infinite where none was found.
+    #: Whether the covariance follows from the scatter of the arrivals: for losses other than the linear one, and where
+    #: errors of the joints do not explain how the residuals of an arrival hang together.
     scattered: bool
+    #: What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used. For
+    #: sums of absolute values, which have no full weight, relative to the median reading.
     weight: Array
-    numbers: int
-    spent: float
+    numbers: int  #: Of the readings it was made from, and of what is known of fixtures.
+    spent: float  #: How many of them the parameters took up.
+    #: The observations whose standard deviation was neither declared nor told by the readings.
     assumed: tuple[str, ...]
-    loss: Loss
-    steps: int
-    held: Held = NOTHING_HELD
-    bootstrap: int = 0
+    loss: Loss  #: Of the readings.
+    steps: int  #: Steps of the solver, over all stages.
+    held: Held = NOTHING_HELD  #: Places that were known, and not found.
+    bootstrap: int = 0  #: How many fits to configurations drawn anew the covariance follows from; 0 if from none.
+    #: Coefficients of joint curves that are zero, and uncertain: the data could not tell them.
     unfitted: tuple[str, ...] = ()
 
     def parameter_status(self, name: str) -> ParameterStatus:
@@ -221,39 +175,26 @@ def identify(
 ) -> Fit:
     """Identify a robot from training data.
 
-    Parameters
-    ----------
-    robot
-        Its current parameter values are the start and the centre of the priors; its own base and targets are
-        found anew from the data.
-    data
-        Training readings.
-    model
-        Which parameters are free.
-    loss
-        See :mod:`truearm.identification.solving.losses`.
-    redundancy
-        ``prior``: every parameter is kept near its nominal value as far as its prior says, so redundant ones
-        do no harm. ``drop``: no priors; redundant parameters are held at nominal and named. ``none``: no priors, and
-        nothing is held; what neither bounds nor the readings determine ends in ``rank-loss``.
-    bounds
-        Limits of parameter values.
-    held
-        Places that are known: they are not found.
-    bootstrap
-        How many fits to configurations drawn anew the deviations follow from; 0: from the readings' own scatter.
-    seed
-        Of those draws.
-    small
-        Step of the solver that is the last, in priors.
-    progress
-        Called with a few words at each of those fits.
+    Args:
+        robot: Its current parameter values are the start and the centre of the priors; its own base and targets are
+            found anew from the data.
+        data: Training readings.
+        model: Which parameters are free.
+        loss: See :mod:`truearm.identification.solving.losses`.
+        redundancy: ``prior``: every parameter is kept near its nominal value as far as its prior says, so redundant
+            ones do no harm. ``drop``: no priors; redundant parameters are held at nominal and named. ``none``: no
+            priors, and nothing is held; what neither bounds nor the readings determine ends in ``rank-loss``.
+        bounds: Limits of parameter values.
+        held: Places that are known: they are not found.
+        bootstrap: How many fits to configurations drawn anew the deviations follow from; 0: from the readings' own
+            scatter.
+        seed: Of those draws.
+        small: Step of the solver that is the last, in priors.
+        progress: Called with a few words at each of those fits.
 
-    Raises
-    ------
-    InputError
-        For data without positions, bounds on unknown parameters, bounds that a redundant parameter cannot keep, too few
-        equations without priors, nothing to find, or too few configurations to draw from.
+    Raises:
+        InputError: For data without positions, bounds on unknown parameters, bounds that a redundant parameter cannot
+            keep, too few equations without priors, nothing to find, or too few configurations to draw from.
     """
     solved = find_parameters(
         robot,

@@ -26,24 +26,12 @@ _ROUNDING: Final = 1e-13  # m: what rounding moves
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """What parameters do to the pose of the tip.
+    """What parameters do to the pose of the tip."""
 
-    Attributes
-    ----------
-    names
-        The parameters.
-    perturbation
-        How far each of them was moved [m, rad or its own unit], ``(parameters,)``.
-    size
-        How far the tip then moved [m], ``(parameters, n)``.
-    turn
-        By how much it turned [rad], ``(parameters, n)``; None if that was not computed.
-    """
-
-    names: tuple[str, ...]
-    perturbation: Array
-    size: Array
-    turn: Array | None = None
+    names: tuple[str, ...]  #: The parameters.
+    perturbation: Array  #: How far each of them was moved [m, rad or its own unit], ``(parameters,)``.
+    size: Array  #: How far the tip then moved [m], ``(parameters, n)``.
+    turn: Array | None = None  #: By how much it turned [rad], ``(parameters, n)``; None if that was not computed.
 
     @property
     def mean(self) -> Array:
@@ -64,10 +52,8 @@ class Influence:
     def vector(self) -> Array:
         """The influence vector k of each configuration, ``(parameters, n)``: 1 for the most influential parameter.
 
-        Raises
-        ------
-        InputError
-            If no parameter moves the tip at some configuration.
+        Raises:
+            InputError: If no parameter moves the tip at some configuration.
         """
         most = self.size.max(axis=0)
         if (most < _ROUNDING).any():
@@ -128,19 +114,13 @@ def sizes_of(
 ) -> Array:
     """Return a size for each of the named parameters [m, rad or its own unit], ``(parameters,)``.
 
-    Parameters
-    ----------
-    by_unit
-        Sizes by SI unit.
-    given
-        Sizes by parameter name, which come first.
-    what
-        What the size is, for messages.
+    Args:
+        by_unit: Sizes by SI unit.
+        given: Sizes by parameter name, which come first.
+        what: What the size is, for messages.
 
-    Raises
-    ------
-    InputError
-        For a name that is no parameter, occurs twice or has no size, and for a size that is not above zero.
+    Raises:
+        InputError: For a name that is no parameter, occurs twice or has no size, and for a size that is not above zero.
     """
     if not names:
         raise InputError("no parameter is named", where=robot.name, cure="Name at least one.")

@@ -31,37 +31,20 @@ _UNSEEN: Final = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """A fit linearised at its solution.
+    """A fit linearised at its solution."""
 
-    Attributes
-    ----------
-    residual
-        Divided by the deviations assumed so far, ``(rows,)``.
-    by_parameters
-        Its derivative, per prior, ``(rows, parameters)``; or what goes through it, the equations of some whole arrivals
-        at a time, each with their indices.
-    by_joints
-        Its derivative by the errors of the joints, ``(rows, joints)``.
-    offset
-        How far the parameters are from the centres of their priors, in priors, ``(parameters,)``.
-    priors
-        Whether they have any.
-    arrivals
-        Which equations share a draw of the joints' errors.
-    factor
-        Index of the factor by which the variance of each equation may differ from the one assumed, ``(rows,)``.
-    triangle
-        Of the derivative by the parameters, ``(k, parameters)``, where it is known: products of its columns are those
-        of all equations.
-    """
-
-    residual: Array
+    residual: Array  #: Divided by the deviations assumed so far, ``(rows,)``.
+    #: Its derivative, per prior, ``(rows, parameters)``; or what goes through it, the equations of some whole arrivals
+    #: at a time, each with their indices.
     by_parameters: Array | Callable[[], Iterable[tuple[Rows, Array]]]
-    by_joints: Array
-    offset: Array
-    priors: bool
-    arrivals: Arrivals
+    by_joints: Array  #: Its derivative by the errors of the joints, ``(rows, joints)``.
+    offset: Array  #: How far the parameters are from the centres of their priors, in priors, ``(parameters,)``.
+    priors: bool  #: Whether they have any.
+    arrivals: Arrivals  #: Which equations share a draw of the joints' errors.
+    #: Index of the factor by which the variance of each equation may differ from the one assumed, ``(rows,)``.
     factor: NDArray[np.intp]
+    #: Of the derivative by the parameters, ``(k, parameters)``, where it is known: products of its columns are those of
+    #: all equations.
     triangle: Array | None = None
 
     @property
@@ -262,10 +245,8 @@ class Likelihood:
 
         Half their difference is the slope of the likelihood.
 
-        Parameters
-        ----------
-        kinds
-            Joints that share a variance, or the index of a factor.
+        Args:
+            kinds: Joints that share a variance, or the index of a factor.
         """
         of, count = self.of, len(kinds)
         e, g, LM, _ = self._small

@@ -44,12 +44,9 @@ def norms_of(residual: Array, components: NDArray[np.intp]) -> Array:
     Those of one number are multiplied so that 95 of 100 good ones stay below what 95 of 100 good readings of three do:
     the thresholds hold for both.
 
-    Parameters
-    ----------
-    residual
-        Whitened, ``(rows,)``.
-    components
-        Number of consecutive rows of each reading, one to three.
+    Args:
+        residual: Whitened, ``(rows,)``.
+        components: Number of consecutive rows of each reading, one to three.
     """
     first = np.concatenate([[0], np.cumsum(components)[:-1]])
     norms: Array = np.sqrt(np.add.reduceat(residual**2, first))
@@ -70,13 +67,10 @@ def meets_exactly(loss: Loss, components: NDArray[np.intp]) -> bool:
 def scale_of(loss: Loss, norms: Array, components: NDArray[np.intp], spent: float) -> float:
     """Return the deviation of one coordinate that a fit leaves.
 
-    Parameters
-    ----------
-    norms
-        As from :func:`norms_of`, of what the loss weighs together.
-    spent
-        How many coordinates the parameters used up: a sum of absolute single numbers leaves so many at zero, and those
-        say nothing of the noise.
+    Args:
+        norms: As from :func:`norms_of`, of what the loss weighs together.
+        spent: How many coordinates the parameters used up: a sum of absolute single numbers leaves so many at zero, and
+            those say nothing of the noise.
     """
     if meets_exactly(loss, components):
         smallest = np.argsort(norms)[min(int(spent), len(norms) - 1) :]
@@ -87,12 +81,10 @@ def scale_of(loss: Loss, norms: Array, components: NDArray[np.intp], spent: floa
 def weights(loss: Loss, norms: Array, scale: float) -> Array:
     """Return the weight of each reading's squared residual, ``(readings,)``.
 
-    Parameters
-    ----------
-    norms
-        Norm of each whitened reading.
-    scale
-        Robust deviation of one coordinate; for sums of absolute values the norm below which a reading counts as met.
+    Args:
+        norms: Norm of each whitened reading.
+        scale: Robust deviation of one coordinate; for sums of absolute values the norm below which a reading counts as
+            met.
     """
     if loss == "huber":
         return np.minimum(1.0, _HUBER * scale / np.maximum(norms, 1e-300))
@@ -128,19 +120,13 @@ def pulls(
     absolute values of single numbers, whose pull only jumps, it is the density of the residuals at zero, of a normal
     distribution with their median.
 
-    Parameters
-    ----------
-    residual, jacobian
-        Whitened, ``(rows,)`` and ``(rows, parameters)``.
-    components
-        Number of consecutive rows of each reading.
-    scales
-        Those of :func:`scales_of_pulls` of all readings, where these are a part of them.
+    Args:
+        residual, jacobian: Whitened, ``(rows,)`` and ``(rows, parameters)``.
+        components: Number of consecutive rows of each reading.
+        scales: Those of :func:`scales_of_pulls` of all readings, where these are a part of them.
 
-    Returns
-    -------
-    pull, root
-        Each ``(rows, parameters)``.
+    Returns:
+        pull, root: Each ``(rows, parameters)``.
     """
     if loss == "linear":
         return residual[:, None] * jacobian, jacobian

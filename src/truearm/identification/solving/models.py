@@ -14,26 +14,13 @@ from truearm.modeling.robot import Robot
 
 @dataclass(frozen=True)
 class Model:
-    """A family of robots to look in.
+    """A family of robots to look in."""
 
-    Attributes
-    ----------
-    name
-        As the command line spells it.
-    summary
-        What it frees, in words.
-    groups
-        Parameter groups that are free besides base, targets, fixtures and the effects' own.
-    effects
-        Joint effects that are added and free.
-    tried
-        Joint effects that could have been, had the data said that they help; bounds may name their parameters.
-    """
-
-    name: str
-    summary: str
-    groups: tuple[Group, ...]
-    effects: tuple[str, ...] = ()
+    name: str  #: As the command line spells it.
+    summary: str  #: What it frees, in words.
+    groups: tuple[Group, ...]  #: Parameter groups that are free besides base, targets, fixtures and the effects' own.
+    effects: tuple[str, ...] = ()  #: Joint effects that are added and free.
+    #: Joint effects that could have been, had the data said that they help; bounds may name their parameters.
     tried: tuple[str, ...] = ()
 
     def also(self, effects: Sequence[str]) -> Model:
@@ -88,10 +75,8 @@ MODELS: Final = (
 def named_model(name: str) -> Model:
     """Return the model of this name.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises:
+        InputError: If there is none.
     """
     for model in MODELS:
         if model.name == name:

@@ -60,29 +60,14 @@ _BLOCK: Final = 9_000  # positions swept together
 
 @dataclass(frozen=True, eq=False)
 class PoseByPose:
-    """What poses say one at a time, and the robot made of it.
+    """What poses say one at a time, and the robot made of it."""
 
-    Attributes
-    ----------
-    robot
-        With the combined set.
-    names
-        The parameters that were identified.
-    sets
-        Their values at each pose [SI], ``(n, parameters)``.
-    iterations
-        Steps taken at each pose, ``(n,)``.
-    left
-        Position error of each pose with its own set [m], ``(n,)``.
-    converged
-        Whether that came below the tolerance, ``(n,)``. A pose where it did not counts in the combination as it is.
-    """
-
-    robot: Robot
-    names: tuple[str, ...]
-    sets: Array
-    iterations: NDArray[np.intp]
-    left: Array
+    robot: Robot  #: With the combined set.
+    names: tuple[str, ...]  #: The parameters that were identified.
+    sets: Array  #: Their values at each pose [SI], ``(n, parameters)``.
+    iterations: NDArray[np.intp]  #: Steps taken at each pose, ``(n,)``.
+    left: Array  #: Position error of each pose with its own set [m], ``(n,)``.
+    #: Whether that came below the tolerance, ``(n,)``. A pose where it did not counts in the combination as it is.
     converged: NDArray[np.bool_]
 
 
@@ -98,29 +83,19 @@ def minimum_norm(
 ) -> PoseByPose:
     """Identify parameters with the smallest step at each pose (Patel, equation 3.6).
 
-    Parameters
-    ----------
-    robot
-        Its values are the start; what is not named, joint effects included, is held.
-    data
-        Position readings in the frame that the robot stands in.
-    names
-        Parameters of the robot.
-    target
-        The one whose readings are used.
-    combination
-        See :data:`Combination`.
-    tolerance
-        Position error that counts as none [m].
-    units
-        What a parameter is counted in, by its name [m, rad or its own unit], instead of :data:`UNIT`. A slide that
-        stands for a turn with an arm of 0.2 m counts like it in units of 0.2 m.
+    Args:
+        robot: Its values are the start; what is not named, joint effects included, is held.
+        data: Position readings in the frame that the robot stands in.
+        names: Parameters of the robot.
+        target: The one whose readings are used.
+        combination: See :data:`Combination`.
+        tolerance: Position error that counts as none [m].
+        units: What a parameter is counted in, by its name [m, rad or its own unit], instead of :data:`UNIT`. A slide
+            that stands for a turn with an arm of 0.2 m counts like it in units of 0.2 m.
 
-    Raises
-    ------
-    InputError
-        For parameters or a target that the robot does not have, no position reading of the target, or a tolerance or
-        unit that is not above zero.
+    Raises:
+        InputError: For parameters or a target that the robot does not have, no position reading of the target, or a
+            tolerance or unit that is not above zero.
     """
     poses = _poses(robot, data, names, target, tolerance, units)
     return _result(robot, poses, np.ones((len(poses.postures), len(names))), tolerance, combination, "minimum norm")
@@ -140,14 +115,11 @@ def influence_based(
 ) -> PoseByPose:
     """Identify parameters at each pose by their influence there (Patel, equations 3.7 and 3.8).
 
-    Parameters
-    ----------
-    damping
-        C, above 0 and at most 1. It sets the number of iterations.
-    perturbations
-        As for :func:`~truearm.identification.solving.influence.influence`, which gives k once, at the start.
-
-    Other parameters and errors are those of :func:`minimum_norm`.
+    Args:
+        damping: C, above 0 and at most 1. It sets the number of iterations.
+        perturbations: As for :func:`~truearm.identification.solving.influence.influence`, which gives k once, at the
+            start.
+        Other parameters and errors are those of :func:`minimum_norm`.:
     """
     if not 0.0 < damping <= 1.0:
         raise InputError("the damping coefficient C is out of range", came=damping, allowed="above 0, at most 1")

@@ -38,34 +38,17 @@ Rows = slice | NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The readings of one observation kind of one target from one fixture: consecutive rows of the problem.
+    """The readings of one observation kind of one target from one fixture: consecutive rows of the problem."""
 
-    Attributes
-    ----------
-    observation
-        What is compared.
-    data
-        Where the readings are: the problem's data, or what is known of its fixtures.
-    target
-        Name of the target; of a fixture in what is known of fixtures.
-    fixture
-        Name of the fixture it is measured against; None for the instrument's frame.
-    readings
-        Indices into `data`, ``(k,)``.
-    configurations
-        Index of the configuration of each reading; all of them at once, which costs no copy, where the target was
-        read at every one in order.
-    sigma
-        Standard deviation of each reading [m or rad], ``(k,)``.
-    """
-
-    observation: Observation
-    data: Dataset
-    target: str
-    fixture: str | None
-    readings: NDArray[np.intp]
+    observation: Observation  #: What is compared.
+    data: Dataset  #: Where the readings are: the problem's data, or what is known of its fixtures.
+    target: str  #: Name of the target; of a fixture in what is known of fixtures.
+    fixture: str | None  #: Name of the fixture it is measured against; None for the instrument's frame.
+    readings: NDArray[np.intp]  #: Indices into `data`, ``(k,)``.
+    #: Index of the configuration of each reading; all of them at once, which costs no copy, where the target was read
+    #: at every one in order.
     configurations: NDArray[np.intp] | slice
-    sigma: Array
+    sigma: Array  #: Standard deviation of each reading [m or rad], ``(k,)``.
 
     @property
     def declared(self) -> bool:
@@ -80,30 +63,14 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Readings, a robot and the parameters that may change.
+    """Readings, a robot and the parameters that may change."""
 
-    Attributes
-    ----------
-    robot
-        Gives the value of every parameter that is not free.
-    data
-        The readings; each target must be known to the robot.
-    free
-        What the solver changes.
-    noise
-        Standard deviation [m or rad] by observation name, for readings that declare none.
-    priors
-        Whether the parameters' priors are rows of the problem.
-    widened
-        How many times larger than declared the deviations of the readings are taken.
-    """
-
-    robot: Robot
-    data: Dataset
-    free: FreeParameters
-    noise: dict[str, float]
-    priors: bool = True
-    widened: float = 1.0
+    robot: Robot  #: Gives the value of every parameter that is not free.
+    data: Dataset  #: The readings; each target must be known to the robot.
+    free: FreeParameters  #: What the solver changes.
+    noise: dict[str, float]  #: Standard deviation [m or rad] by observation name, for readings that declare none.
+    priors: bool = True  #: Whether the parameters' priors are rows of the problem.
+    widened: float = 1.0  #: How many times larger than declared the deviations of the readings are taken.
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
@@ -224,18 +191,10 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """A problem at one vector of its free parameters. The Jacobian goes on from the forward kinematics of the residual.
+    """A problem at one vector of its free parameters. The Jacobian reuses the forward kinematics of the residual."""
 
-    Attributes
-    ----------
-    problem
-        What is evaluated.
-    vector
-        ``(parameters,)``, or ``(trials, parameters)``, and then all that follows has the trials in front.
-    """
-
-    problem: Problem
-    vector: Array
+    problem: Problem  #: What is evaluated.
+    vector: Array  #: ``(parameters,)``, or ``(trials, parameters)``, and then all that follows has the trials in front.
 
     def portions(self) -> Iterator[tuple[Rows, Evaluation]]:
         """Go through the problem part by part, each with its equations: then not all derivatives are in memory."""
@@ -413,10 +372,8 @@ class Evaluation:
 def check_circumstances(robot: Robot, data: Dataset) -> None:
     """Refuse joint effects that need to know what the data do not tell.
 
-    Raises
-    ------
-    InputError
-        Naming the effect and what is missing.
+    Raises:
+        InputError: Naming the effect and what is missing.
     """
     for effect in robot.effects:
         if effect.ordered and (data.approach is None or data.number is None):
@@ -437,10 +394,8 @@ def check_circumstances(robot: Robot, data: Dataset) -> None:
 def check_solvable(problem: Problem) -> None:
     """Refuse fewer equations than unknowns where no prior helps.
 
-    Raises
-    ------
-    InputError
-        With the counts and what to do.
+    Raises:
+        InputError: With the counts and what to do.
     """
     if not problem.priors and problem.rows < len(problem.free.parameters):
         raise InputError(

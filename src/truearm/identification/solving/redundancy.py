@@ -46,21 +46,11 @@ _LEAST_INVOLVED: Final = 0.1  # share of a parameter in the lost directions
 
 @dataclass(frozen=True)
 class Redundancy:
-    """A direction in which the parameters can move without changing any reading.
+    """A direction in which the parameters can move without changing any reading."""
 
-    Attributes
-    ----------
-    dropped
-        The parameter that is held at its nominal value.
-    members
-        Coefficient of each parameter that takes part, in SI units, 1 for `dropped`.
-    combination
-        The direction in words, for example ``d_3 - d_2``.
-    """
-
-    dropped: str
-    members: dict[str, float]
-    combination: str
+    dropped: str  #: The parameter that is held at its nominal value.
+    members: dict[str, float]  #: Coefficient of each parameter that takes part, in SI units, 1 for `dropped`.
+    combination: str  #: The direction in words, for example ``d_3 - d_2``.
 
 
 class Linearisable(Protocol):
@@ -77,10 +67,8 @@ class Linearisable(Protocol):
 def find_redundancies(problem: Linearisable, vector: Array, held: Sequence[str] = ()) -> tuple[Redundancy, ...]:
     """Return the redundant parameters of a problem at `vector`, with their combinations.
 
-    Parameters
-    ----------
-    held
-        Parameters that are redundant elsewhere. If as many are redundant here, these stay the ones that are held.
+    Args:
+        held: Parameters that are redundant elsewhere. If as many are redundant here, these stay the ones that are held.
     """
     A = _columns(problem, vector)
     names = problem.free.names
@@ -188,12 +176,9 @@ def unobservable_parameters(
     Predictions are compared up to the gauge freedoms: a rigid motion of everything where no reading locates the robot,
     and a change of its size where no length was measured either. See :func:`gauge_freedoms`.
 
-    Parameters
-    ----------
-    free
-        The parameters to look at; all others are held.
-    held
-        Places that are known. A fixture among them locates the robot.
+    Args:
+        free: The parameters to look at; all others are held.
+        held: Places that are known. A fixture among them locates the robot.
     """
     free = free.without([SCALE])  # as much as is known of it beforehand is enough
     if not free.names:
@@ -248,14 +233,10 @@ def gauge_motion_removed(
 ) -> list[Array]:
     """Remove from moves of a target what a motion of the whole robot does, and a change of its size.
 
-    Parameters
-    ----------
-    gauge
-        From :func:`gauge_freedoms`.
-    robot, kinematics
-        The robot, and its forward kinematics to the target at n configurations.
-    moved
-        How it moves [m], and turns if that is asked too, by each parameter, ``(3 n, parameters)`` each.
+    Args:
+        gauge: From :func:`gauge_freedoms`.
+        robot, kinematics: The robot, and its forward kinematics to the target at n configurations.
+        moved: How it moves [m], and turns if that is asked too, by each parameter, ``(3 n, parameters)`` each.
     """
     columns = gauge_motions(gauge, robot, kinematics)[: len(moved)]
     together = np.concatenate(columns)

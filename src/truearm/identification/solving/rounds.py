@@ -61,37 +61,20 @@ _LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The values that the data give to the free parameters, before anything is said about their worth.
+    """The values that the data give to the free parameters, before anything is said about their worth."""
 
-    Attributes
-    ----------
-    start
-        The robot before: frames in closed form, nominal parameters.
-    problem
-        The problem of the last round, at whose deviations and loads the solution is one. Deviations that neither the
-        file declares nor the readings tell are those that are assumed at first.
-    solution
-        Its solution, with the steps of all rounds.
-    redundancies
-        Parameters held because the data cannot tell them apart.
-    limits
-        Lowest and highest value of every free parameter [SI], where there are bounds.
-    components
-        Variances of the readings and of the joints' errors at the solution; None for losses other than the linear one.
-    held
-        Places that were known.
-    curves
-        The curves of the joints, where the model has them.
-    """
-
-    start: Robot
+    start: Robot  #: The robot before: frames in closed form, nominal parameters.
+    #: The problem of the last round, at whose deviations and loads the solution is one. Deviations that neither the
+    #: file declares nor the readings tell are those that are assumed at first.
     problem: Problem
-    solution: Solution
-    redundancies: tuple[Redundancy, ...]
+    solution: Solution  #: Its solution, with the steps of all rounds.
+    redundancies: tuple[Redundancy, ...]  #: Parameters held because the data cannot tell them apart.
+    #: Lowest and highest value of every free parameter [SI], where there are bounds.
     limits: tuple[Array, Array] | None
+    #: Variances of the readings and of the joints' errors at the solution; None for losses other than the linear one.
     components: Components | None
-    held: Held = NOTHING_HELD
-    curves: Curves = NO_CURVES
+    held: Held = NOTHING_HELD  #: Places that were known.
+    curves: Curves = NO_CURVES  #: The curves of the joints, where the model has them.
 
     @property
     def robot(self) -> Robot:
@@ -118,13 +101,10 @@ def find_parameters(
 
     It is what :func:`truearm.identification.solving.fit.identify` does first, with the same parameters and refusals.
 
-    Parameters
-    ----------
-    shared
-        Whether errors of the joints that the readings of an arrival share are looked for, with the linear loss.
-    near
-        A solution of the same robot and model from other data: the search begins at its frames, values and variances.
-        What is found does not depend on it.
+    Args:
+        shared: Whether errors of the joints that the readings of an arrival share are looked for, with the linear loss.
+        near: A solution of the same robot and model from other data: the search begins at its frames, values and
+            variances. What is found does not depend on it.
     """
     robot = robot.marked(data.simulated)
     start = start_from_readings(model.prepared(robot), data, held) if near is None else near.start
@@ -365,10 +345,8 @@ def solve_with_joints(
 ) -> Solution:
     """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own.
 
-    Parameters
-    ----------
-    design_effect
-        How many times larger the variances of the readings are taken, because they hang together.
+    Args:
+        design_effect: How many times larger the variances of the readings are taken, because they hang together.
     """
     root = float(np.sqrt(design_effect))
     taken = problem
@@ -527,10 +505,8 @@ def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, t
 def assumed_noise(problem: Problem, components: Components | None, spent: float) -> tuple[str, ...]:
     """Return the observations whose deviation is neither declared nor told by the readings: it is as assumed.
 
-    Parameters
-    ----------
-    spent
-        As :func:`informed_rows` returns it.
+    Args:
+        spent: As :func:`informed_rows` returns it.
     """
     names, _ = factors_of(problem)
     undeclared = [name for name in names if name not in (DECLARED, SETUP)]

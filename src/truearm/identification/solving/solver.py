@@ -77,27 +77,13 @@ class Evaluated(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where a solver stopped.
+    """Where a solver stopped."""
 
-    Attributes
-    ----------
-    vector
-        Parameter values, in the order of the problem.
-    converged
-        Whether the last step was too small to matter.
-    steps
-        Number of steps taken.
-    at
-        The problem there, not weighted by a loss; it finds residual and Jacobian when they are asked for.
-    weight
-        What the loss left of each reading, ``(readings,)``; where coordinates count alone, of their mean.
-    """
-
-    vector: Array
-    converged: bool
-    steps: int
-    at: Evaluated
-    weight: Array
+    vector: Array  #: Parameter values, in the order of the problem.
+    converged: bool  #: Whether the last step was too small to matter.
+    steps: int  #: Number of steps taken.
+    at: Evaluated  #: The problem there, not weighted by a loss; it finds residual and Jacobian when they are asked for.
+    weight: Array  #: What the loss left of each reading, ``(readings,)``; where coordinates count alone, of their mean.
 
     @property
     def residual(self) -> Array:
@@ -115,17 +101,13 @@ def solve(
 ) -> Solution:
     """Minimise the whitened residuals under a loss.
 
-    Parameters
-    ----------
-    problem
-        What is minimised; starts at its free parameters' values, moved inside the bounds.
-    loss
-        ``linear`` is least squares; ``l1`` the sum of the norms of the readings (Li et al. 2016, equation 4, with
-        "|X - X'|" read as each point's distance); ``l1-components`` that of the absolute values of their coordinates.
-    bounds
-        Lowest and highest value of every parameter [SI], infinite where there is none.
-    small
-        Step that is the last, in priors.
+    Args:
+        problem: What is minimised; starts at its free parameters' values, moved inside the bounds.
+        loss: ``linear`` is least squares; ``l1`` the sum of the norms of the readings (Li et al. 2016, equation 4, with
+            "|X - X'|" read as each point's distance); ``l1-components`` that of the absolute values of their
+            coordinates.
+        bounds: Lowest and highest value of every parameter [SI], infinite where there is none.
+        small: Step that is the last, in priors.
     """
     if loss == "l1-components" and not problem.priors:
         return _by_linear_programs(problem, bounds)
@@ -217,10 +199,8 @@ def _cost(here: Evaluated, w: Array | None) -> float:
 def _triangle(here: Evaluated, w: Array | None) -> tuple[Array, Array]:
     """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant.
 
-    Parameters
-    ----------
-    w
-        Weight of every row's square, ``(rows,)``; None for ones.
+    Args:
+        w: Weight of every row's square, ``(rows,)``; None for ones.
     """
     triangle: Array = np.zeros((0, len(here.vector) + 1))
     if here.problem.priors:

@@ -40,41 +40,24 @@ _LEAST: Final = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Variances:
-    """Variances of readings and of joints.
+    """Variances of readings and of joints."""
 
-    Attributes
-    ----------
-    factors
-        What the variance of the equations of each factor is, by the variance assumed, ``(factors,)``.
-    joints
-        Variance of the error of each joint that the readings of an arrival share [rad^2 or m^2], ``(joints,)``.
-    freedom
-        Degrees of freedom behind the variance of each joint (Satterthwaite 1946), ``(joints,)``; infinite where there
-        is none.
-    """
-
-    factors: Array
+    factors: Array  #: What the variance of the equations of each factor is, by the variance assumed, ``(factors,)``.
+    #: Variance of the error of each joint that the readings of an arrival share [rad^2 or m^2], ``(joints,)``.
     joints: Array
+    #: Degrees of freedom behind the variance of each joint (Satterthwaite 1946), ``(joints,)``; infinite where there is
+    #: none.
     freedom: Array
 
 
 @dataclass(frozen=True, eq=False)
 class CovariancePart:
-    """What one source of error adds to the covariance of the parameters.
+    """What one source of error adds to the covariance of the parameters."""
 
-    Attributes
-    ----------
-    covariance
-        Of the parameters, ``(parameters, parameters)``, if the variance of the source is as estimated.
-    freedom
-        Degrees of freedom behind that variance; infinite where it is known.
-    joints
-        Indices of the joints whose errors are the source.
-    """
-
+    #: Of the parameters, ``(parameters, parameters)``, if the variance of the source is as estimated.
     covariance: Array
-    freedom: float
-    joints: tuple[int, ...] = ()
+    freedom: float  #: Degrees of freedom behind that variance; infinite where it is known.
+    joints: tuple[int, ...] = ()  #: Indices of the joints whose errors are the source.
 
     def among(self, places: NDArray[np.bool_]) -> CovariancePart:
         """Return it among more parameters, `places` of which these are; zero for the others."""
@@ -89,34 +72,19 @@ class CovariancePart:
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """Variances, and what the parameters are worth with them.
+    """Variances, and what the parameters are worth with them."""
 
-    Attributes
-    ----------
-    likeliest
-        The variances with the largest likelihood.
-    weighing
-        Those that readings are to be weighed by: the same where errors of the joints explain how residuals of an
-        arrival hang together, else the likeliest ones without errors of the joints.
-    estimated
-        Whether the variance of each factor was.
-    holds
-        Whether the residuals look as they do with the variances that readings are weighed by.
-    covariance
-        Of the parameters, per prior, ``(parameters, parameters)``, with the uncertainty of these variances.
-    parts
-        The same by its sources, and without that uncertainty: per prior too.
-    squares, freedom
-        Sum of the squared residuals of each factor, divided by these variances, and what to expect of it,
-        ``(factors,)``.
-    """
-
-    likeliest: Variances
+    likeliest: Variances  #: The variances with the largest likelihood.
+    #: Those that readings are to be weighed by: the same where errors of the joints explain how residuals of an arrival
+    #: hang together, else the likeliest ones without errors of the joints.
     weighing: Variances
-    estimated: tuple[bool, ...]
-    holds: bool
+    estimated: tuple[bool, ...]  #: Whether the variance of each factor was.
+    holds: bool  #: Whether the residuals look as they do with the variances that readings are weighed by.
+    #: Of the parameters, per prior, ``(parameters, parameters)``, with the uncertainty of these variances.
     covariance: Array
-    parts: tuple[CovariancePart, ...]
+    parts: tuple[CovariancePart, ...]  #: The same by its sources, and without that uncertainty: per prior too.
+    #: squares, freedom: sum of the squared residuals of each factor, divided by these variances, and what to expect of
+    #: it, ``(factors,)``.
     squares: Array
     freedom: Array
 
@@ -135,17 +103,12 @@ def variance_components(
     parameters contains what the variances are uncertain by: an interval of 1.96 deviations holds what one of Student's
     t with the degrees of freedom of Satterthwaite (1946) would, see :func:`_widened`.
 
-    Parameters
-    ----------
-    estimated
-        Whether the variance of each factor is free; else it is as assumed.
-    least
-        What each factor is at least, ``(factors,)``: readings without noise leave but rounding.
-    kinds
-        Joints that share one variance; of joints that are in none it is zero.
-    before
-        What was found at a solution nearby, with the same factors, by whose variances readings are now weighed. Whether
-        there are errors of the joints, and whether they explain the residuals, is as it was.
+    Args:
+        estimated: Whether the variance of each factor is free; else it is as assumed.
+        least: What each factor is at least, ``(factors,)``: readings without noise leave but rounding.
+        kinds: Joints that share one variance; of joints that are in none it is zero.
+        before: What was found at a solution nearby, with the same factors, by whose variances readings are now weighed.
+            Whether there are errors of the joints, and whether they explain the residuals, is as it was.
     """
     moments = Moments(at, len(estimated))
     start, noise = _start(at, estimated, least)
@@ -195,10 +158,8 @@ def largest_likelihood(
     Parameters are those of :func:`variance_components`. Errors of the joints count however little they gain. How well
     variances are known is not asked.
 
-    Parameters
-    ----------
-    joints
-        Variance of the error of each joint where it is known, ``(joints,)``; otherwise it is estimated.
+    Args:
+        joints: Variance of the error of each joint where it is known, ``(joints,)``; otherwise it is estimated.
     """
     moments = Moments(at, len(estimated))
     start, noise = _start(at, estimated, least)

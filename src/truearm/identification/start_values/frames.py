@@ -31,39 +31,24 @@ _ARM = 0.3
 
 @dataclass(frozen=True, eq=False)
 class _Placement:
-    """Where the data say that the robot stands, and its targets on the flange.
+    """Where the data say that the robot stands, and its targets on the flange."""
 
-    Attributes
-    ----------
-    base
-        Of the robot in the instrument's frame.
-    targets
-        Places on the flange by name, in the order of the data's targets.
-    left_over
-        What no place explains of each position reading [m], ``(readings, 3)``, in the axes of the base.
-    """
-
-    base: Transform
-    targets: dict[str, Transform | Array]
+    base: Transform  #: Of the robot in the instrument's frame.
+    targets: dict[str, Transform | Array]  #: Places on the flange by name, in the order of the data's targets.
+    #: What no place explains of each position reading [m], ``(readings, 3)``, in the axes of the base.
     left_over: Array
 
 
 def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Robot:
     """Return the robot placed where the data say it stands, with the data's targets on its flange.
 
-    Parameters
-    ----------
-    robot
-        Its kinematic parameters are used as they are; its own base and targets are left out of account.
-    data
-        At least one position reading; orientations are used where present.
-    held
-        Places that are known: those are not found, and the others agree with them.
+    Args:
+        robot: Its kinematic parameters are used as they are; its own base and targets are left out of account.
+        data: At least one position reading; orientations are used where present.
+        held: Places that are known: those are not found, and the others agree with them.
 
-    Raises
-    ------
-    InputError
-        If no target has a position.
+    Raises:
+        InputError: If no target has a position.
     """
     placement = _placements([robot.with_frames(Transform(), {})], [data], held)[0]
     return robot.with_frames(placement.base, placement.targets)  # type: ignore[arg-type]
@@ -72,12 +57,9 @@ def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Ro
 def placed_errors(robot: Robot, tried: Sequence[Dataset]) -> list[Array]:
     """Return how far position readings are from the robot placed by :func:`initial_frames` [m], ``(readings,)`` each.
 
-    Parameters
-    ----------
-    robot
-        At the origin, with no targets.
-    tried
-        Data that the robot is placed by one after the other; many of them together take little longer than one.
+    Args:
+        robot: At the origin, with no targets.
+        tried: Data that the robot is placed by one after the other; many of them together take little longer than one.
     """
     return _left_over(_placements([robot] * len(tried), tried, NOTHING_HELD))
 
@@ -85,12 +67,9 @@ def placed_errors(robot: Robot, tried: Sequence[Dataset]) -> list[Array]:
 def errors_of_placed(robots: Sequence[Robot], data: Dataset) -> list[Array]:
     """Return how far position readings are from each of some robots placed by them [m], ``(readings,)`` each.
 
-    Parameters
-    ----------
-    robots
-        At the origin, with no targets; many of them together take little longer than one.
-    data
-        What each of them is placed by, as :func:`initial_frames` does.
+    Args:
+        robots: At the origin, with no targets; many of them together take little longer than one.
+        data: What each of them is placed by, as :func:`initial_frames` does.
     """
     return _left_over(_placements(robots, [data] * len(robots), NOTHING_HELD))
 
@@ -113,33 +92,18 @@ def _placements(robots: Sequence[Robot], tried: Sequence[Dataset], held: Held) -
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """What the readings of some data say of the base's rotation, and with it of the places.
+    """What the readings of some data say of the base's rotation, and with it of the places."""
 
-    Attributes
-    ----------
-    M, m
-        ``M vec(R) = m`` for the rotation alone, ``(rows, 9)`` and ``(rows,)``.
-    turned, left, known
-        ``turned vec(R) = left + known x`` for targets and base x.
-    centre
-        Mean of the readings [m].
-    R
-        Of the flange ``(configurations, 3, 3)``.
-    seen, found
-        Targets that were read, and those whose place is not known.
-    rotations
-        Configurations and rotations of the orientation readings of each target.
-    """
-
-    M: Array
+    M: Array  #: M, m: ``M vec(R) = m`` for the rotation alone, ``(rows, 9)`` and ``(rows,)``.
     m: Array
-    turned: Array
+    turned: Array  #: turned, left, known: ``turned vec(R) = left + known x`` for targets and base x.
     left: Array
     known: Array
-    centre: Array
-    R: Array
-    seen: list[int]
+    centre: Array  #: Mean of the readings [m].
+    R: Array  #: Of the flange ``(configurations, 3, 3)``.
+    seen: list[int]  #: seen, found: targets that were read, and those whose place is not known.
     found: list[int]
+    #: Configurations and rotations of the orientation readings of each target.
     rotations: Mapping[int, tuple[IntArray, Array]]
 
 

@@ -53,19 +53,14 @@ _LEAST_SINGULAR_VALUE: Final = 1e-5
 def start_from_readings(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Robot:
     """Return the robot placed where the data say it stands, with the data's targets and fixtures.
 
-    Parameters
-    ----------
-    robot
-        Its kinematic parameters are used as they are. Its own base and targets are left out of account where the data
-        place them.
-    held
-        Places that are known: the robot, its targets and the fixtures are there.
+    Args:
+        robot: Its kinematic parameters are used as they are. Its own base and targets are left out of account where the
+            data place them.
+        held: Places that are known: the robot, its targets and the fixtures are there.
 
-    Raises
-    ------
-    InputError
-        If readings contradict each other about what a fixture is, or are too few or too much alike to place target
-        and fixture.
+    Raises:
+        InputError: If readings contradict each other about what a fixture is, or are too few or too much alike to place
+            target and fixture.
     """
     if data.fixture is None:
         return initial_frames(robot, data, held).with_scale(data.scale_sigma)

@@ -16,14 +16,10 @@ _WRONG_SIDE_ERROR: Final = 5e-3
 def point_at_distances(anchors: Array, lengths: Array, side: float) -> Array:
     """Return the point at these distances from known points, on one side of them if they lie in a plane.
 
-    Parameters
-    ----------
-    anchors
-        Known points [m], ``(n, 3)``, three or more.
-    lengths
-        Distances from them [m], ``(n,)``.
-    side
-        1 or -1: on which side of three points, or of points in a plane.
+    Args:
+        anchors: Known points [m], ``(n, 3)``, three or more.
+        lengths: Distances from them [m], ``(n,)``.
+        side: 1 or -1: on which side of three points, or of points in a plane.
     """
     centre = anchors.mean(axis=0)
     a = anchors - centre

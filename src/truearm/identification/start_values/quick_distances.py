@@ -33,10 +33,8 @@ def quick_misfit(robot: Robot, data: Dataset) -> float | None:
     Each target has points of its own, and what is known of the distances between them does not count: with it they are
     off by more. None unless readings are distances of targets from points nobody measured, and nothing else.
 
-    Parameters
-    ----------
-    robot
-        Nominal; its base is the world, and its own targets do not count.
+    Args:
+        robot: Nominal; its base is the world, and its own targets do not count.
     """
     distance = _distances_alone(data)
     if distance is None:

@@ -30,31 +30,15 @@ _EXACT: Final = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What was found in a bag.
+    """What was found in a bag."""
 
-    Attributes
-    ----------
-    joints, targets
-        Its topics.
-    standstills
-        In order, one a configuration.
-    missed
-        When the robot paused, or may have, without a standstill that can be used [s].
-    lost
-        How many messages of the joints are missing between others.
-    sightings
-        Of each target in each standstill.
-    data
-        The measurements.
-    """
-
-    joints: JointStream
+    joints: JointStream  #: joints, targets: its topics.
     targets: tuple[TargetStream, ...]
-    standstills: tuple[Standstill, ...]
-    missed: tuple[float, ...]
-    lost: int
-    sightings: tuple[tuple[Sighting, ...], ...]
-    data: Dataset
+    standstills: tuple[Standstill, ...]  #: In order, one a configuration.
+    missed: tuple[float, ...]  #: When the robot paused, or may have, without a standstill that can be used [s].
+    lost: int  #: How many messages of the joints are missing between others.
+    sightings: tuple[tuple[Sighting, ...], ...]  #: Of each target in each standstill.
+    data: Dataset  #: The measurements.
 
     @property
     def declares_sigma(self) -> bool:
@@ -78,21 +62,14 @@ def found_in(
 
     A pause that is no standstill takes a number too: where the robot came from is not known after it.
 
-    Parameters
-    ----------
-    bag
-        The file, for messages.
-    joints, targets
-        Its topics.
-    references
-        Which targets stand beside the robot.
-    prismatic
-        Which joints slide.
-    joints_are
-        Whose joint positions they are.
-    still, hold, settle
-        See :func:`~truearm.measurement.bags.standstills.find_standstills` and
-        :func:`~truearm.measurement.bags.standstills.seen_at`.
+    Args:
+        bag: The file, for messages.
+        joints, targets: Its topics.
+        references: Which targets stand beside the robot.
+        prismatic: Which joints slide.
+        joints_are: Whose joint positions they are.
+        still, hold, settle: See :func:`~truearm.measurement.bags.standstills.find_standstills` and
+            :func:`~truearm.measurement.bags.standstills.seen_at`.
     """
     stills = find_standstills(joints, still, hold)
     missed = missed_pauses(joints, stills)

@@ -48,49 +48,25 @@ _MOSTLY_EVEN: Final = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Standstill:
-    """A time in which no joint moves.
+    """A time in which no joint moves."""
 
-    Attributes
-    ----------
-    start, end
-        From when to when [s].
-    joints
-        Mean joint positions [rad; m for prismatic joints], ``(joints,)``.
-    span
-        How far the joint that moved most went [rad or m].
-    """
-
-    start: float
+    start: float  #: start, end: from when to when [s].
     end: float
-    joints: Array
-    span: float
+    joints: Array  #: Mean joint positions [rad; m for prismatic joints], ``(joints,)``.
+    span: float  #: How far the joint that moved most went [rad or m].
 
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """What was seen of a target in a standstill.
+    """What was seen of a target in a standstill."""
 
-    Attributes
-    ----------
-    position
-        Mean [m], ``(3,)``; NaN where too few samples were seen.
-    quaternion
-        Mean (w, x, y, z), ``(4,)``; None for points.
-    samples, set_aside
-        How many samples it is the mean of, and how many were far from the others.
-    scatter, sigma
-        Standard deviation of a coordinate of one sample, and of the mean [m].
-    sigma_rot
-        Of the mean's orientation, per axis [rad]; None for points.
-    """
-
-    position: Array
-    quaternion: Array | None
-    samples: int
+    position: Array  #: Mean [m], ``(3,)``; NaN where too few samples were seen.
+    quaternion: Array | None  #: Mean (w, x, y, z), ``(4,)``; None for points.
+    samples: int  #: samples, set_aside: how many samples it is the mean of, and how many were far from the others.
     set_aside: int
-    scatter: float
+    scatter: float  #: scatter, sigma: standard deviation of a coordinate of one sample, and of the mean [m].
     sigma: float
-    sigma_rot: float | None
+    sigma_rot: float | None  #: Of the mean's orientation, per axis [rad]; None for points.
 
 
 def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[Standstill, ...]:
@@ -99,19 +75,13 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
     Messages may be missing: times count, not samples. Where none came for longer than an arm needs to leave a place and
     to come back, which is 0.3 s or ten usual times between messages (1 s at most), a standstill ends.
 
-    Parameters
-    ----------
-    stream
-        The joints.
-    still
-        How far a joint may move during `hold` [rad; m for prismatic joints].
-    hold
-        The shortest standstill [s].
+    Args:
+        stream: The joints.
+        still: How far a joint may move during `hold` [rad; m for prismatic joints].
+        hold: The shortest standstill [s].
 
-    Raises
-    ------
-    InputError
-        If there is none, or the joints creep.
+    Raises:
+        InputError: If there is none, or the joints creep.
     """
     times, positions = stream.times, stream.positions
     where = f"topic {stream.topic}"
@@ -188,10 +158,8 @@ def _spans(positions: Array, last: IntArray) -> Array:
 def _joined(positions: Array, gaps: IntArray, parts: Iterable[tuple[int, int]], still: float) -> list[tuple[int, int]]:
     """Return parts of the stream, neighbours as one whose joints agree with no motion and no long gap between.
 
-    Parameters
-    ----------
-    gaps
-        How many long gaps there are before each sample, ``(n,)``.
+    Args:
+        gaps: How many long gaps there are before each sample, ``(n,)``.
     """
     found: list[tuple[int, int]] = []
     for i, j in parts:
@@ -266,10 +234,8 @@ def seen_at(stills: Sequence[Standstill], stream: TargetStream, settle: float) -
     standstills together, tells how many independent ones there are (the sum of its first positive terms, Geyer 1992,
     Practical Markov chain Monte Carlo, section 3.3).
 
-    Raises
-    ------
-    InputError
-        If the target moves while the joints stand still, which is a matter of the clocks.
+    Raises:
+        InputError: If the target moves while the joints stand still, which is a matter of the clocks.
     """
     parts = []
     for still in stills:

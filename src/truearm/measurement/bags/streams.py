@@ -35,56 +35,26 @@ _NUMBERED: Final = re.compile(r"(?P<stem>.*?[^0-9])(?P<number>[0-9]{1,2})")
 
 @dataclass(frozen=True, eq=False)
 class JointStream:
-    """Joint positions over time.
+    """Joint positions over time."""
 
-    Attributes
-    ----------
-    topic
-        Where they were published.
-    names
-        Of the joints, in the order of the robot.
-    times
-        When, from the first [s], ``(n,)``, never falling.
-    positions
-        ``(n, joints)`` [rad; m for prismatic joints].
-    start
-        The first time by its clock [ns].
-    """
-
-    topic: str
-    names: tuple[str, ...]
-    times: Array
-    positions: Array
-    start: int
+    topic: str  #: Where they were published.
+    names: tuple[str, ...]  #: Of the joints, in the order of the robot.
+    times: Array  #: When, from the first [s], ``(n,)``, never falling.
+    positions: Array  #: ``(n, joints)`` [rad; m for prismatic joints].
+    start: int  #: The first time by its clock [ns].
 
 
 @dataclass(frozen=True, eq=False)
 class TargetStream:
-    """What an instrument saw of a target over time.
+    """What an instrument saw of a target over time."""
 
-    Attributes
-    ----------
-    target, topic
-        Its name, and where it was published.
-    times
-        When, counted as those of the joints [s], ``(n,)``, never falling.
-    positions
-        ``(n, 3)`` [m].
-    quaternions
-        (w, x, y, z), ``(n, 4)``; None for points.
-    frame
-        In which frame, as the messages say.
-    lost
-        How many messages hold no number.
-    """
-
-    target: str
+    target: str  #: target, topic: its name, and where it was published.
     topic: str
-    times: Array
-    positions: Array
-    quaternions: Array | None
-    frame: str
-    lost: int
+    times: Array  #: When, counted as those of the joints [s], ``(n,)``, never falling.
+    positions: Array  #: ``(n, 3)`` [m].
+    quaternions: Array | None  #: (w, x, y, z), ``(n, 4)``; None for points.
+    frame: str  #: In which frame, as the messages say.
+    lost: int  #: How many messages hold no number.
 
 
 def read_streams(
@@ -96,23 +66,15 @@ def read_streams(
 ) -> tuple[JointStream, tuple[TargetStream, ...]]:
     """Read the joints and the targets of a bag.
 
-    Parameters
-    ----------
-    bag
-        A ``.bag`` file of ROS 1, or a folder of ROS 2 that holds ``metadata.yaml``.
-    targets
-        The topic of each target by its name; None for the only topic that holds points or poses.
-    joint_topic
-        Topic of the joints; None for the only one.
-    joint_names
-        Names of the joints in the order of the robot; None where numbers at their ends tell it.
-    times
-        By which clock.
+    Args:
+        bag: A ``.bag`` file of ROS 1, or a folder of ROS 2 that holds ``metadata.yaml``.
+        targets: The topic of each target by its name; None for the only topic that holds points or poses.
+        joint_topic: Topic of the joints; None for the only one.
+        joint_names: Names of the joints in the order of the robot; None where numbers at their ends tell it.
+        times: By which clock.
 
-    Raises
-    ------
-    InputError
-        If the bag cannot be read, or does not hold them.
+    Raises:
+        InputError: If the bag cannot be read, or does not hold them.
     """
     with _opened(bag) as reader:
         kinds = {topic: str(info.msgtype) for topic, info in reader.topics.items()}

@@ -28,23 +28,13 @@ _MOST: Final = 100
 
 @dataclass(frozen=True)
 class Charuco:
-    """A chessboard with a marker in every white square.
+    """A chessboard with a marker in every white square."""
 
-    Attributes
-    ----------
-    columns, rows
-        Squares along x and y.
-    square, marker
-        Side of a square, and of a marker [m].
-    dictionary
-        Of the markers, one of :data:`DICTIONARIES`.
-    """
-
-    columns: int
+    columns: int  #: columns, rows: squares along x and y.
     rows: int
-    square: float
+    square: float  #: square, marker: side of a square, and of a marker [m].
     marker: float
-    dictionary: str
+    dictionary: str  #: Of the markers, one of :data:`DICTIONARIES`.
 
     @classmethod
     def of_text(cls, text: str, parameter: str = "board") -> Charuco:

@@ -33,16 +33,12 @@ Seen = tuple[Array, Array]
 def seen_in_pictures(pictures: Sequence[Path], board: Charuco) -> Views:
     """Return where a board is in the camera that took some pictures.
 
-    Parameters
-    ----------
-    pictures
-        Of one camera with one lens, all of one size.
+    Args:
+        pictures: Of one camera with one lens, all of one size.
 
-    Raises
-    ------
-    InputError
-        If OpenCV is not installed, a picture does not show the board or is of another size, or the corners do not fit
-        the board.
+    Raises:
+        InputError: If OpenCV is not installed, a picture does not show the board or is of another size, or the corners
+            do not fit the board.
     """
     cv2 = _opencv()
     if len(pictures) < LEAST_PICTURES:
@@ -191,10 +187,8 @@ def _known(
 ) -> Views:
     """Return the views with what is not known of each, and of all through the lens.
 
-    Parameters
-    ----------
-    poses, lens
-        Derivative of the corners of each view by its pose, ``(rows, 6)``, and by the lens, ``(rows, 9)``.
+    Args:
+        poses, lens: Derivative of the corners of each view by its pose, ``(rows, 6)``, and by the lens, ``(rows, 9)``.
     """
     spread, by_lens, left = [], [], np.zeros((len(_LENS), len(_LENS)))
     for J, L in zip(poses, lens, strict=True):

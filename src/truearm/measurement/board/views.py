@@ -12,46 +12,28 @@ from truearm.modeling.chain import Array
 
 @dataclass(frozen=True, eq=False)
 class Lens:
-    """What pictures say of a camera's lens: pinhole and distortion, in the model of OpenCV.
+    """What pictures say of a camera's lens: pinhole and distortion, in the model of OpenCV."""
 
-    Attributes
-    ----------
-    values, deviations
-        ``fx``, ``fy``, ``cx``, ``cy`` [px] and ``k1``, ``k2``, ``p1``, ``p2``, ``k3``, and their standard deviations.
-    noise
-        Standard deviation of a coordinate of a corner, by what the corners leave [px].
-    corners
-        How many corners were seen in each picture, ``(pictures,)``.
-    """
-
+    #: values, deviations: ``fx``, ``fy``, ``cx``, ``cy`` [px] and ``k1``, ``k2``, ``p1``, ``p2``, ``k3``, and their
+    #: standard deviations.
     values: Mapping[str, float]
     deviations: Mapping[str, float]
-    noise: float
-    corners: tuple[int, ...]
+    noise: float  #: Standard deviation of a coordinate of a corner, by what the corners leave [px].
+    corners: tuple[int, ...]  #: How many corners were seen in each picture, ``(pictures,)``.
 
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """Where a board is in a camera, view by view.
+    """Where a board is in a camera, view by view."""
 
-    Attributes
-    ----------
-    rotation, position
-        ``T_camera_board``: ``(n, 3, 3)`` and ``(n, 3)`` [m].
-    spread
-        Possible errors of each view that belong to no other view, as columns of a small turn in the camera's axes [rad]
-        and a shift [m], ``(n, 6, k)``: their squares add up. None if nothing is known.
-    common
-        Errors that one unknown makes in all views at once, ``(n, 6, m)``: those of the lens, a deviation each.
-    lens
-        Of the camera, where pictures were read.
-    """
-
-    rotation: Array
+    rotation: Array  #: rotation, position: ``T_camera_board``: ``(n, 3, 3)`` and ``(n, 3)`` [m].
     position: Array
+    #: Possible errors of each view that belong to no other view, as columns of a small turn in the camera's axes [rad]
+    #: and a shift [m], ``(n, 6, k)``: their squares add up. None if nothing is known.
     spread: Array | None = None
+    #: Errors that one unknown makes in all views at once, ``(n, 6, m)``: those of the lens, a deviation each.
     common: Array = field(default_factory=lambda: np.zeros((0, 6, 0)))
-    lens: Lens | None = None
+    lens: Lens | None = None  #: Of the camera, where pictures were read.
 
     def point_ahead(self) -> float:
         """Return how far before the camera the board was on average [m]."""
@@ -63,15 +45,12 @@ class Views:
         A small turn of the board hardly moves the point that lies where the board is: the error of the place is then
         nearly independent of that of the orientation, which it is not for the camera itself.
 
-        Parameters
-        ----------
-        ahead
-            How far the point is before the camera [m].
+        Args:
+            ahead: How far the point is before the camera [m].
 
-        Returns
-        -------
-        Places ``(n, 3)``, rotations ``(n, 3, 3)``, and the standard deviations of a coordinate of the places ``(n,)``
-        and of a turn about an axis ``(n,)``, or None.
+        Returns:
+            Places ``(n, 3)``, rotations ``(n, 3, 3)``, and the standard deviations of a coordinate of the places
+            ``(n,)`` and of a turn about an axis ``(n,)``, or None.
         """
         lever = np.array([0.0, 0.0, ahead]) - self.position
         turned = np.swapaxes(self.rotation, 1, 2)

@@ -19,27 +19,13 @@ _TURNS: Final = 4 * math.pi
 
 @dataclass(frozen=True, eq=False)
 class DrawnCircle:
-    """Where the pencil's point was, in the frame at the centre of the circle with its z out of the paper.
+    """Where the pencil's point was, in the frame at the centre of the circle with its z out of the paper."""
 
-    Attributes
-    ----------
-    source
-        The scanned file.
-    joints
-        Joint positions [rad or m], ``(n, joints)``.
-    angle
-        Direction from the centre [rad], ``(n,)``.
-    radius
-        Distance from the centre in the plane of the paper [m], ``(n,)``; NaN where the line is missing.
-    height
-        Over the paper [m], ``(n,)``.
-    """
-
-    source: str
-    joints: Array
-    angle: Array
-    radius: Array
-    height: Array
+    source: str  #: The scanned file.
+    joints: Array  #: Joint positions [rad or m], ``(n, joints)``.
+    angle: Array  #: Direction from the centre [rad], ``(n,)``.
+    radius: Array  #: Distance from the centre in the plane of the paper [m], ``(n,)``; NaN where the line is missing.
+    height: Array  #: Over the paper [m], ``(n,)``.
 
     @property
     def distance(self) -> Array:
@@ -50,22 +36,16 @@ class DrawnCircle:
 def drawn_circle(scan: ScannedCircle, angle: Array, joints: Array, height: Array) -> DrawnCircle:
     """Put scan and potentiometer together, configuration by configuration.
 
-    Parameters
-    ----------
-    scan
-        The circle on the page.
-    angle
-        At which directions of the circle the robot was read [rad], ``(n,)``, from the page's x towards y. A degree of
-        error matters little: it moves a radius by its slope only.
-    joints
-        Joint positions there [rad or m], ``(n, joints)``.
-    height
-        Of the tool over the paper by the potentiometer, along the pencil [m], ``(n,)``.
+    Args:
+        scan: The circle on the page.
+        angle: At which directions of the circle the robot was read [rad], ``(n,)``, from the page's x towards y. A
+            degree of error matters little: it moves a radius by its slope only.
+        joints: Joint positions there [rad or m], ``(n, joints)``.
+        height: Of the tool over the paper by the potentiometer, along the pencil [m], ``(n,)``.
 
-    Raises
-    ------
-    InputError
-        If the arrays do not belong together, are not finite or in other units, or the line is missing at every angle.
+    Raises:
+        InputError: If the arrays do not belong together, are not finite or in other units, or the line is missing at
+            every angle.
     """
     angle, joints, height = (np.asarray(values, dtype=np.float64) for values in (angle, joints, height))
     if angle.ndim != 1 or not len(angle) or height.shape != angle.shape or joints.ndim != 2 or not joints.shape[1]:

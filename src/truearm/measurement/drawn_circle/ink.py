@@ -29,27 +29,14 @@ _ROWS_AT_ONCE: Final = 256
 
 @dataclass(frozen=True, eq=False)
 class Ink:
-    """Darkness of a page; x right, y up, from its lower left corner.
+    """Darkness of a page; x right, y up, from its lower left corner."""
 
-    Attributes
-    ----------
-    brightness
-        ``(rows, columns)``, the uppermost row first.
-    pitch
-        Distance of dots along x and y [m].
-    size
-        Width and height of the page [m]; the dots may leave a rest of less than a dot at the right and below.
-    paper
-        Brightness of the paper ``(rows, columns)``, in blocks.
-    block
-        Edges of a block in dots, along x and y.
-    """
-
-    brightness: NDArray[np.uint8] | Array
-    pitch: tuple[float, float]
+    brightness: NDArray[np.uint8] | Array  #: ``(rows, columns)``, the uppermost row first.
+    pitch: tuple[float, float]  #: Distance of dots along x and y [m].
+    #: Width and height of the page [m]; the dots may leave a rest of less than a dot at the right and below.
     size: tuple[float, float]
-    paper: Array
-    block: tuple[float, float]
+    paper: Array  #: Brightness of the paper ``(rows, columns)``, in blocks.
+    block: tuple[float, float]  #: Edges of a block in dots, along x and y.
 
     def at(self, x: Array, y: Array) -> Array:
         """Return the darkness at points [m] between dots, 0 beyond the page; ``(rays, points)``, short rays."""

@@ -38,37 +38,21 @@ _MOST_LOOKS: Final = 5
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line around a centre.
+    """A line around a centre."""
 
-    Attributes
-    ----------
-    centre
-        Of the circle of least squares [m], ``(2,)``.
-    radius
-        Of that circle [m].
-    profile
-        Distance of the line from the centre in each sector [m], NaN where missing, ``(sectors,)``.
-    beside
-        Share of the sectors in which something else is drawn nearby.
-    """
-
-    centre: Array
-    radius: float
-    profile: Array
-    beside: float
+    centre: Array  #: Of the circle of least squares [m], ``(2,)``.
+    radius: float  #: Of that circle [m].
+    profile: Array  #: Distance of the line from the centre in each sector [m], NaN where missing, ``(sectors,)``.
+    beside: float  #: Share of the sectors in which something else is drawn nearby.
 
 
 def follow(ink: Ink, start: Candidate, sectors: int, threshold: float) -> Line | None:
     """Follow the line near a circle, or return None where there is none.
 
-    Parameters
-    ----------
-    start
-        Circle nearby, and how far from it to look.
-    sectors
-        Their number; the first is centred on the page's x axis.
-    threshold
-        Darkness of what is inked.
+    Args:
+        start: Circle nearby, and how far from it to look.
+        sectors: Their number; the first is centred on the page's x axis.
+        threshold: Darkness of what is inked.
     """
     centre, radius, reach = np.array([start.x, start.y]), start.radius, start.tolerance
     for _ in range(_MOST_LOOKS):

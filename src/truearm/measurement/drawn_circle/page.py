@@ -30,21 +30,11 @@ _TURNED: Final = (5, 6, 7, 8)  # EXIF orientations in which rows and columns are
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """A page as it was scanned.
+    """A page as it was scanned."""
 
-    Attributes
-    ----------
-    source
-        The file.
-    brightness
-        0 black to 255 white, ``(rows, columns)``, the uppermost row first.
-    pitch
-        Distance of dots along x and y [m].
-    """
-
-    source: str
-    brightness: NDArray[np.uint8]
-    pitch: tuple[float, float]
+    source: str  #: The file.
+    brightness: NDArray[np.uint8]  #: 0 black to 255 white, ``(rows, columns)``, the uppermost row first.
+    pitch: tuple[float, float]  #: Distance of dots along x and y [m].
 
     @property
     def size(self) -> tuple[float, float]:
@@ -56,16 +46,12 @@ class Page:
 def read_page(path: Path, dpi: float | tuple[float, float] | None = None) -> Page:
     """Read a PNG, JPEG or TIFF of one page.
 
-    Parameters
-    ----------
-    dpi
-        Dots per inch, along x and y if they differ; what the file says if None.
+    Args:
+        dpi: Dots per inch, along x and y if they differ; what the file says if None.
 
-    Raises
-    ------
-    InputError
-        If the file is no such image, damaged, of several pages, too large or too small, or if nothing says its
-        resolution or that is none of a scanner's (100 to 4800).
+    Raises:
+        InputError: If the file is no such image, damaged, of several pages, too large or too small, or if nothing says
+            its resolution or that is none of a scanner's (100 to 4800).
     """
     image, declared = _opened(path)
     given = declared if dpi is None else (dpi if isinstance(dpi, tuple) else (dpi, dpi))

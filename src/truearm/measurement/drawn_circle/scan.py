@@ -32,27 +32,15 @@ _DARKEST_PAGE: Final = 64.0
 
 @dataclass(frozen=True, eq=False)
 class ScannedCircle:
-    """A circle as it was drawn.
+    """A circle as it was drawn."""
 
-    Attributes
-    ----------
-    source
-        The scanned file.
-    centre
-        Of the circle of least squares [m], ``(2,)``: x right and y up, from the page's lower left corner.
-    radius
-        Of that circle [m].
-    angle
-        Directions from the centre, from the page's x towards y [rad], ``(n,)``, evenly from 0 to below 2 pi.
-    profile
-        Distance from the centre to the middle of the line in each direction [m], ``(n,)``; NaN where the line is
-        missing or cannot be told.
-    """
-
-    source: str
-    centre: Array
-    radius: float
+    source: str  #: The scanned file.
+    centre: Array  #: Of the circle of least squares [m], ``(2,)``: x right and y up, from the page's lower left corner.
+    radius: float  #: Of that circle [m].
+    #: Directions from the centre, from the page's x towards y [rad], ``(n,)``, evenly from 0 to below 2 pi.
     angle: Array
+    #: Distance from the centre to the middle of the line in each direction [m], ``(n,)``; NaN where the line is missing
+    #: or cannot be told.
     profile: Array
 
     @property
@@ -72,20 +60,14 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
     Specks, writing and straight lines elsewhere, a grid fainter than the line, and gaps are left aside. The line's
     width does not matter: its middle counts.
 
-    Parameters
-    ----------
-    path
-        PNG, JPEG or TIFF of one page.
-    dpi
-        Dots per inch, along x and y if they differ; what the file says if None.
-    sectors
-        Number of directions in which the line is read, each the mean over its sector; 90 to 3600.
+    Args:
+        path: PNG, JPEG or TIFF of one page.
+        dpi: Dots per inch, along x and y if they differ; what the file says if None.
+        sectors: Number of directions in which the line is read, each the mean over its sector; 90 to 3600.
 
-    Raises
-    ------
-    InputError
-        If the file is no such page or does not say its resolution; if nothing is drawn on it, or no circle, one that
-        the page's edge cuts, several, or one with something else along it.
+    Raises:
+        InputError: If the file is no such page or does not say its resolution; if nothing is drawn on it, or no circle,
+            one that the page's edge cuts, several, or one with something else along it.
     """
     if not _SECTORS[0] <= sectors <= _SECTORS[1]:
         raise InputError(

@@ -25,29 +25,16 @@ _SAME: Final = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ChangerRepeatability:
-    """What was found of a tool changer, for the cups T1, T2 and T3.
+    """What was found of a tool changer, for the cups T1, T2 and T3."""
 
-    Attributes
-    ----------
-    changer
-        Standard deviation of a coordinate that is due to the attachment [m], ``(3,)``.
-    rest
-        The same of what does not repeat though the tool stays on, robot and ballbar together [m], ``(3,)``; None if
-        nothing tells it: it is contained in `changer` then.
-    mean, largest
-        Distance between where a cup is with two attachments, over all pairs [m], ``(3,)``.
-    pairs
-        How many pairs of readings of one configuration with two attachments there are.
-    compared
-        How many attachments are in them.
-    """
-
-    changer: Array
+    changer: Array  #: Standard deviation of a coordinate that is due to the attachment [m], ``(3,)``.
+    #: The same of what does not repeat though the tool stays on, robot and ballbar together [m], ``(3,)``; None if
+    #: nothing tells it: it is contained in `changer` then.
     rest: Array | None
-    mean: Array
+    mean: Array  #: mean, largest: distance between where a cup is with two attachments, over all pairs [m], ``(3,)``.
     largest: Array
-    pairs: int
-    compared: int
+    pairs: int  #: How many pairs of readings of one configuration with two attachments there are.
+    compared: int  #: How many attachments are in them.
 
     def declared(self, attachments: Sequence[str]) -> Array:
         """Return the standard deviation of a coordinate of each cup in each row [m], ``(rows, 3)``.
@@ -58,10 +45,8 @@ class ChangerRepeatability:
         less that mean is ``1 - 2 w_a + sum(w ** 2)`` times that of the changer. Where the rest is not known it is
         contained in `changer`, which then counts in full.
 
-        Parameters
-        ----------
-        attachments
-            Of each row.
+        Args:
+            attachments: Of each row.
         """
         if self.rest is None:
             return np.tile(self.changer, (len(attachments), 1))
@@ -74,33 +59,20 @@ class ChangerRepeatability:
 
 @dataclass(frozen=True, eq=False)
 class Attachments:
-    """The attachments of the tool in a sheet, two or more.
+    """The attachments of the tool in a sheet, two or more."""
 
-    Attributes
-    ----------
-    count
-        How many there were.
-    found
-        How well they repeat; None if no configuration was measured with two of them.
-    """
-
-    count: int
-    found: ChangerRepeatability | None
+    count: int  #: How many there were.
+    found: ChangerRepeatability | None  #: How well they repeat; None if no configuration was measured with two of them.
 
 
 def compared(cups: Array, joints: Array, places: Sequence[str], attachments: Sequence[str]) -> Attachments:
     """Compare the attachments of a tool.
 
-    Parameters
-    ----------
-    cups
-        T1, T2 and T3 of each row in the frame of the fixture [m], ``(rows, 3, 3)``.
-    joints
-        Joint positions [rad or m], ``(rows, joints)``; where they are the same, the configuration is.
-    places
-        Where the fixture stood at each row: only readings of one place are compared.
-    attachments
-        Of each row, two different ones or more.
+    Args:
+        cups: T1, T2 and T3 of each row in the frame of the fixture [m], ``(rows, 3, 3)``.
+        joints: Joint positions [rad or m], ``(rows, joints)``; where they are the same, the configuration is.
+        places: Where the fixture stood at each row: only readings of one place are compared.
+        attachments: Of each row, two different ones or more.
     """
     groups: dict[tuple[object, ...], list[int]] = {}
     for row, place in enumerate(places):

@@ -28,17 +28,12 @@ TO_FOURTH: Final = ("B1-B4", "B2-B4", "B3-B4")
 def four_cups(base: Sequence[float] | Array, to_fourth: Sequence[float] | Array) -> Array:
     """Return B1 to B4 in the frame of the first three [m], ``(4, 3)``.
 
-    Parameters
-    ----------
-    base
-        Distances 12, 23 and 31 [m], ``(3,)``.
-    to_fourth
-        Distances 14, 24 and 34 [m], ``(3,)``.
+    Args:
+        base: Distances 12, 23 and 31 [m], ``(3,)``.
+        to_fourth: Distances 14, 24 and 34 [m], ``(3,)``.
 
-    Raises
-    ------
-    InputError
-        If the first three lie on one line, or the distances do not meet.
+    Raises:
+        InputError: If the first three lie on one line, or the distances do not meet.
     """
     cups = triangle(base, "B")
     return np.vstack([cups, tripod(cups, np.asarray(to_fourth, float), -1, TO_FOURTH)])

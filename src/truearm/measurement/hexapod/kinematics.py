@@ -19,21 +19,14 @@ SOLUTIONS: Final = {1: (1, 1), 2: (1, -1), 3: (-1, 1), 4: (-1, -1)}
 def tripod(feet: Iterable[Array], legs: Iterable[Array], side: int, names: Sequence[str]) -> Array:
     """Return the point at given distances from three others (Nubiola, 3.4 to 3.11; `Tri`).
 
-    Parameters
-    ----------
-    feet
-        Three points, each ``(3, ...)`` [m].
-    legs
-        Distance of the point from each [m], ``(...)``.
-    side
-        1 if, seen from the point, the feet go round against the clock, -1 for the other point.
-    names
-        Of the three legs, for messages.
+    Args:
+        feet: Three points, each ``(3, ...)`` [m].
+        legs: Distance of the point from each [m], ``(...)``.
+        side: 1 if, seen from the point, the feet go round against the clock, -1 for the other point.
+        names: Of the three legs, for messages.
 
-    Raises
-    ------
-    InputError
-        If the feet lie on one line, or the legs do not meet; with their names.
+    Raises:
+        InputError: If the feet lie on one line, or the legs do not meet; with their names.
     """
     v1, v2, v3 = feet
     l1, l2, l3 = legs
@@ -68,28 +61,19 @@ def tool_cups(
 ) -> Array:
     """Return where the tool cups are in the frame of the base fixture (Nubiola, 3.12 to 3.14).
 
-    Parameters
-    ----------
-    design
-        Between which cups the legs were measured.
-    solution
-        Which of the four ways to assemble the design, 1 to 4; those below the base are left out.
-    base, tool
-        Distances 12, 23 and 31 of the fixtures [m], ``(3,)`` or ``(3, n)``.
-    legs
-        Lengths in the order of :attr:`~truearm.measurement.hexapod.geometry.Design.legs` [m], ``(6,)`` or
-        ``(6, n)``.
+    Args:
+        design: Between which cups the legs were measured.
+        solution: Which of the four ways to assemble the design, 1 to 4; those below the base are left out.
+        base, tool: Distances 12, 23 and 31 of the fixtures [m], ``(3,)`` or ``(3, n)``.
+        legs: Lengths in the order of :attr:`~truearm.measurement.hexapod.geometry.Design.legs` [m], ``(6,)`` or ``(6,
+            n)``.
 
-    Returns
-    -------
-    cups
-        T1, T2, T3: ``(3, 3)`` or ``(3, 3, n)``, cup first. The frame's origin is B1, x goes to B2, and z is the
-        normal on whose side the tool is.
+    Returns:
+        cups: T1, T2, T3: ``(3, 3)`` or ``(3, 3, n)``, cup first. The frame's origin is B1, x goes to B2, and z is the
+            normal on whose side the tool is.
 
-    Raises
-    ------
-    InputError
-        If cups lie on one line, or legs do not meet; with the names of the lengths.
+    Raises:
+        InputError: If cups lie on one line, or legs do not meet; with the names of the lengths.
     """
     feet = triangle(base, "B")
     sides = dict(zip((frozenset(ends) for ends in SIDES), np.asarray(tool, float), strict=True))

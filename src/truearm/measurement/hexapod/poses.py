@@ -35,27 +35,13 @@ _FIRST_LEADS: Final = (1, 0, 2)
 
 @dataclass(frozen=True, eq=False)
 class HexapodPose:
-    """One pose that the device can measure, at nominal lengths, in the frame of the base fixture.
+    """One pose that the device can measure, at nominal lengths, in the frame of the base fixture."""
 
-    Attributes
-    ----------
-    number
-        From 1, as in Nubiola's Figure 3.6.
-    design
-        Which legs to measure.
-    solution
-        Which way the design is assembled, 1 to 4.
-    cups
-        T1, T2, T3 [m], ``(3, 3)``.
-    rotation, position
-        Of the flange [m], ``(3, 3)`` and ``(3,)``.
-    """
-
-    number: int
-    design: Design
-    solution: int
-    cups: Array
-    rotation: Array
+    number: int  #: From 1, as in Nubiola's Figure 3.6.
+    design: Design  #: Which legs to measure.
+    solution: int  #: Which way the design is assembled, 1 to 4.
+    cups: Array  #: T1, T2, T3 [m], ``(3, 3)``.
+    rotation: Array  #: rotation, position: of the flange [m], ``(3, 3)`` and ``(3,)``.
     position: Array
 
 

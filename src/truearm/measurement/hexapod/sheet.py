@@ -46,43 +46,21 @@ CUP_DEVIATION: Final = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """Lengths measured with the device.
+    """Lengths measured with the device."""
 
-    Attributes
-    ----------
-    source
-        The file, for messages.
-    configurations
-        Labels and joint positions, one row each; None if the sheet has no joints.
-    labels
-        One for each row.
-    designs, solutions
-        Of each row.
-    base, tool
-        Distances 12, 23 and 31 of the fixtures [m], ``(rows, 3)``.
-    legs
-        In the order of the design's legs [m], ``(rows, 6)``; NaN where one could not be measured.
-    places
-        Name of the place of the base fixture of each row; None if the sheet does not name it.
-    sides
-        Side of four cups of each row, 1 to 4; 1 is that of three cups.
-    to_fourth
-        Distances 14, 24 and 34 [m], ``(rows, 3)``; NaN without a fourth cup.
-    attachments
-        Attachment of the tool of each row, empty in rows that were not measured; None if the sheet does not say.
-    """
-
-    source: str
-    configurations: Configurations | None
-    labels: tuple[str, ...]
-    designs: tuple[Design, ...]
+    source: str  #: The file, for messages.
+    configurations: Configurations | None  #: Labels and joint positions, one row each; None if the sheet has no joints.
+    labels: tuple[str, ...]  #: One for each row.
+    designs: tuple[Design, ...]  #: designs, solutions: of each row.
     solutions: tuple[int, ...]
-    base: Array
+    base: Array  #: base, tool: distances 12, 23 and 31 of the fixtures [m], ``(rows, 3)``.
     tool: Array
-    legs: Array
+    legs: Array  #: In the order of the design's legs [m], ``(rows, 6)``; NaN where one could not be measured.
+    #: Name of the place of the base fixture of each row; None if the sheet does not name it.
     places: tuple[str, ...] | None
-    sides: tuple[int, ...]
-    to_fourth: Array
+    sides: tuple[int, ...]  #: Side of four cups of each row, 1 to 4; 1 is that of three cups.
+    to_fourth: Array  #: Distances 14, 24 and 34 [m], ``(rows, 3)``; NaN without a fourth cup.
+    #: Attachment of the tool of each row, empty in rows that were not measured; None if the sheet does not say.
     attachments: tuple[str, ...] | None
 
     @property
@@ -125,10 +103,8 @@ class Sheet:
         the place is, for each. They declare no deviations, because what a robot does not repeat is many times what the
         ballbar does not know; but if the tool was attached several times and rows say how well, they declare that.
 
-        Raises
-        ------
-        InputError
-            If the sheet has no joints, or no row with all six legs.
+        Raises:
+            InputError: If the sheet has no joints, or no row with all six legs.
         """
         if self.configurations is None:
             raise InputError(
@@ -168,35 +144,17 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class PlannedRow:
-    """One configuration to measure.
+    """One configuration to measure."""
 
-    Attributes
-    ----------
-    configuration, branch
-        What it is called, and the posture of the arm.
-    pose
-        Number of the pose.
-    design, solution
-        Which legs, and how they are assembled.
-    joints
-        Joint positions [rad or m], ``(joints,)``.
-    place
-        Name of the place of the base fixture; empty if there is one place only.
-    side
-        Of four cups, 1 to 4; 1 is that of three cups.
-    attachment
-        Which attachment of the tool; empty if it stays on.
-    """
-
-    configuration: str
+    configuration: str  #: configuration, branch: what it is called, and the posture of the arm.
     branch: str
-    pose: int
-    design: Design
+    pose: int  #: Number of the pose.
+    design: Design  #: design, solution: which legs, and how they are assembled.
     solution: int
-    joints: Array
-    place: str = ""
-    side: int = 1
-    attachment: str = ""
+    joints: Array  #: Joint positions [rad or m], ``(joints,)``.
+    place: str = ""  #: Name of the place of the base fixture; empty if there is one place only.
+    side: int = 1  #: Of four cups, 1 to 4; 1 is that of three cups.
+    attachment: str = ""  #: Which attachment of the tool; empty if it stays on.
 
     @property
     def leg_names(self) -> tuple[str, ...]:
@@ -212,16 +170,11 @@ def sheet_csv(
 ) -> str:
     """Return a sheet, empty or with lengths.
 
-    Parameters
-    ----------
-    rows
-        What to measure, in order.
-    joints
-        Of the robot.
-    lengths
-        For each row the lengths [m] by name; what is not there stays empty.
-    controller
-        Who shows the joint positions, ``axis_i``; None for the model's, ``joint_i``.
+    Args:
+        rows: What to measure, in order.
+        joints: Of the robot.
+        lengths: For each row the lengths [m] by name; what is not there stays empty.
+        controller: Who shows the joint positions, ``axis_i``; None for the model's, ``joint_i``.
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

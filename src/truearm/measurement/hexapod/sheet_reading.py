@@ -34,11 +34,9 @@ Columns = dict[str, tuple[int, str]]
 def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
     """Read a sheet that was filled in.
 
-    Raises
-    ------
-    InputError
-        If it is not as :mod:`truearm.measurement.hexapod.sheet` says, or a length is beyond the ballbar's
-        range; with line and column.
+    Raises:
+        InputError: If it is not as :mod:`truearm.measurement.hexapod.sheet` says, or a length is beyond the ballbar's
+            range; with line and column.
     """
     text = read_text(path)
     header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())

@@ -28,11 +28,9 @@ def together(sheets: Sequence[Sheet]) -> Sheet:
     Sheets whose places have names share those that have the same name. A sheet that names none is a place of its own,
     called ``fixture_1`` and so on, if there are several.
 
-    Raises
-    ------
-    InputError
-        If they are not of one robot and one tool, only some of them name places or attachments, or a place has too
-        few rows with all legs, or base distances that cannot be those of a fixture that stands still.
+    Raises:
+        InputError: If they are not of one robot and one tool, only some of them name places or attachments, or a place
+            has too few rows with all legs, or base distances that cannot be those of a fixture that stands still.
     """
     first, *others = sheets
     for other in others:

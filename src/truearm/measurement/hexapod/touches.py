@@ -27,11 +27,9 @@ _CUPS: Final = ("B1", "B2", "B3")
 def read_touches(path: Path, robot: Robot) -> Array:
     """Return the model's joint positions at B1, B2 and B3 [rad or m], ``(3, joints)``.
 
-    Raises
-    ------
-    InputError
-        If the file does not hold each cup once with all joints of the robot, or they are its controller's and its file
-        does not say how that counts them.
+    Raises:
+        InputError: If the file does not hold each cup once with all joints of the robot, or they are its controller's
+            and its file does not say how that counts them.
     """
     text = read_text(path)
     header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())

@@ -26,18 +26,11 @@ _FREE_OF_BASE: Final = ((1, 0), (2, 0), (2, 1))
 
 @dataclass(frozen=True, eq=False)
 class CupUncertainty:
-    """Uncertainty of the tool's cups in one solution, in standard deviations of a length.
+    """Uncertainty of the tool's cups in one solution, in standard deviations of a length."""
 
-    Attributes
-    ----------
-    covariance
-        Of T1, T2, T3 in the base's frame, ``(9, 9)``.
-    third_as_printed
-        Per axis of T3 as Table 3.1 has it: as if T1 and T2, and their coordinates, did not depend on each other, and
-        B2 were exact, ``(3,)``.
-    """
-
-    covariance: Array
+    covariance: Array  #: Of T1, T2, T3 in the base's frame, ``(9, 9)``.
+    #: Per axis of T3 as Table 3.1 has it: as if T1 and T2, and their coordinates, did not depend on each other, and B2
+    #: were exact, ``(3,)``.
     third_as_printed: Array
 
     @property
@@ -52,16 +45,11 @@ def cup_uncertainty(
 ) -> CupUncertainty:
     """Propagate the uncertainty of the twelve lengths (Nubiola, 3.15).
 
-    Parameters
-    ----------
-    solution
-        1 to 4.
-    design
-        Which legs there are.
-    device
-        Its nominal lengths.
-    lengths
-        Base 12, 23, 31, tool 12, 23, 31, and the legs in the design's order [m], ``(12,)``; nominal if None.
+    Args:
+        solution: 1 to 4.
+        design: Which legs there are.
+        device: Its nominal lengths.
+        lengths: Base 12, 23, 31, tool 12, 23, 31, and the legs in the design's order [m], ``(12,)``; nominal if None.
     """
     d = _nominal(device) if lengths is None else lengths
     base, cups = triangle(d[:3], "B"), tool_cups(design, solution, d[:3], d[3:6], d[6:])
@@ -112,16 +100,11 @@ def cup_monte_carlo(
 ) -> tuple[float, float, float]:
     """Return the uncertainty of T1, T2 and T3 found by measuring anew many times, as :attr:`CupUncertainty.norms`.
 
-    Parameters
-    ----------
-    solution
-        1 to 4.
-    trials
-        How often all twelve lengths are drawn.
-    rng
-        For the noise.
-    design, device
-        Which legs there are; nominal lengths and the ballbar's noise.
+    Args:
+        solution: 1 to 4.
+        trials: How often all twelve lengths are drawn.
+        rng: For the noise.
+        design, device: Which legs there are; nominal lengths and the ballbar's noise.
     """
     if trials < 2:
         raise InputError("a spread needs two trials or more", where="trials", came=trials)

@@ -20,24 +20,12 @@ from truearm.modeling.transform import Transform
 
 @dataclass(frozen=True, eq=False)
 class WorldFrame:
-    """The frame of the base fixture: origin B1, x to B2, z the normal on whose side B3 is at positive y.
+    """The frame of the base fixture: origin B1, x to B2, z the normal on whose side B3 is at positive y."""
 
-    Attributes
-    ----------
-    frame
-        Of the fixture in the frame of the points.
-    plain
-        The same without the distances: origin in the first point, x through the second.
-    seen
-        Distances 12, 23 and 31 between the points [m], ``(3,)``.
-    residual
-        How far each point is from its place in the triangle [m], ``(3, 3)``.
-    """
-
-    frame: Transform
-    plain: Transform
-    seen: Array
-    residual: Array
+    frame: Transform  #: Of the fixture in the frame of the points.
+    plain: Transform  #: The same without the distances: origin in the first point, x through the second.
+    seen: Array  #: Distances 12, 23 and 31 between the points [m], ``(3,)``.
+    residual: Array  #: How far each point is from its place in the triangle [m], ``(3, 3)``.
 
 
 def plain_frame(points: Array) -> Transform:
@@ -51,17 +39,12 @@ def plain_frame(points: Array) -> Transform:
 def world_frame(points: Array, sides: Sequence[float] | Array) -> WorldFrame:
     """Return the frame of the base fixture.
 
-    Parameters
-    ----------
-    points
-        B1, B2 and B3 by the robot's model [m], ``(3, 3)``.
-    sides
-        Measured distances 12, 23 and 31 [m], ``(3,)``.
+    Args:
+        points: B1, B2 and B3 by the robot's model [m], ``(3, 3)``.
+        sides: Measured distances 12, 23 and 31 [m], ``(3,)``.
 
-    Raises
-    ------
-    InputError
-        If the points lie on one line, or the distances are of no triangle.
+    Raises:
+        InputError: If the points lie on one line, or the distances are of no triangle.
     """
     points = np.asarray(points, float)
     seen = np.array([np.linalg.norm(points[a] - points[b]) for a, b in SIDES])

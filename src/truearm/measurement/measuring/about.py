@@ -95,24 +95,15 @@ class Air:
 
 @dataclass(frozen=True)
 class About:
-    """What a campaign was measured with; None for what nobody said.
+    """What a campaign was measured with; None for what nobody said."""
 
-    Attributes
-    ----------
-    instrument, instrument_serial, robot_serial
-        Name and serial numbers.
-    reflector_radius, reflector_offset
-        Of the reflector, and of its centre from where the nest holds it [m].
-    environment
-        The air, as often as it was read.
-    """
-
-    instrument: str | None = None
+    instrument: str | None = None  #: instrument, instrument_serial, robot_serial: name and serial numbers.
     instrument_serial: str | None = None
     robot_serial: str | None = None
+    #: reflector_radius, reflector_offset: of the reflector, and of its centre from where the nest holds it [m].
     reflector_radius: float | None = None
     reflector_offset: float | None = None
-    environment: tuple[Air, ...] = ()
+    environment: tuple[Air, ...] = ()  #: The air, as often as it was read.
 
     @property
     def missing(self) -> list[str]:
@@ -173,10 +164,8 @@ def _millimetres(length: float | None) -> str:
 def read_about(path: Path) -> About:
     """Read a file of the schema above.
 
-    Raises
-    ------
-    InputError
-        If an entry is not known, or a number cannot be meant.
+    Raises:
+        InputError: If an entry is not known, or a number cannot be meant.
     """
     return about_of(read_yaml(path, AboutFile), str(path))
 
@@ -184,10 +173,8 @@ def read_about(path: Path) -> About:
 def about_of(content: AboutFile, where: str) -> About:
     """Return what the entries of a file say.
 
-    Raises
-    ------
-    InputError
-        If a number cannot be meant.
+    Raises:
+        InputError: If a number cannot be meant.
     """
     texts = (content.instrument.name, content.instrument.serial, content.robot.serial)
     for text in (*texts, *(air.at for air in content.environment)):

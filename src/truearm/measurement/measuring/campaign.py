@@ -22,19 +22,13 @@ _NAMED: Final = 5
 class Campaign:
     """The measuring of a plan into a folder.
 
-    Parameters
-    ----------
-    session
-        New: what the log holds is added to it.
-    source
-        What readings come from.
-    folder
-        In which the log is, or is made.
+    Args:
+        session: New: what the log holds is added to it.
+        source: What readings come from.
+        folder: In which the log is, or is made.
 
-    Raises
-    ------
-    InputError
-        If the log cannot be used, or is another session's.
+    Raises:
+        InputError: If the log cannot be used, or is another session's.
     """
 
     def __init__(self, session: Session, source: Source, folder: Path) -> None:
@@ -64,12 +58,9 @@ class Campaign:
     def step(self, seconds: float = 0.0, most: int | None = None) -> tuple[Entry, ...]:
         """Take what has come, or comes within some time, and return what became of it; all of it is on disk then.
 
-        Parameters
-        ----------
-        seconds
-            To wait at most.
-        most
-            So much is taken at once, and the rest by the next call; None takes all of it.
+        Args:
+            seconds: To wait at most.
+            most: So much is taken at once, and the rest by the next call; None takes all of it.
         """
         taken: list[Entry] = []
         if not self._coming:

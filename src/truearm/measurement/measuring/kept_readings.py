@@ -17,21 +17,11 @@ from truearm.shown import counted
 
 @dataclass(frozen=True)
 class StatedSigma:
-    """The standard deviation that measurements are written with.
+    """The standard deviation that measurements are written with."""
 
-    Attributes
-    ----------
-    value
-        For all readings [m]; None where every reading has its own, or none is stated.
-    words
-        Where it comes from.
-    own
-        Whether every reading has its own.
-    """
-
-    value: float | None
-    words: str
-    own: bool = False
+    value: float | None  #: For all readings [m]; None where every reading has its own, or none is stated.
+    words: str  #: Where it comes from.
+    own: bool = False  #: Whether every reading has its own.
 
 
 def stated_sigma(session: Session) -> StatedSigma:
@@ -61,14 +51,10 @@ def kept_readings(
     the configurations, these count in the order, so that nobody takes it that a joint came from the configuration
     before.
 
-    Parameters
-    ----------
-    configurations
-        Those of the plan.
-    source
-        What messages call the data.
-    simulated
-        Whether a virtual instrument reads.
+    Args:
+        configurations: Those of the plan.
+        source: What messages call the data.
+        simulated: Whether a virtual instrument reads.
     """
     targets = [entry for entry in session.kept if not entry.is_nest]
     if not targets:
@@ -107,18 +93,10 @@ def kept_readings(
 
 @dataclass(frozen=True)
 class _Visits:
-    """When the robot was where.
+    """When the robot was where."""
 
-    Attributes
-    ----------
-    order
-        Configurations in the order in which the robot came to them first.
-    of
-        On which visit of its configuration each reading was taken, by its number.
-    """
-
-    order: tuple[str, ...]
-    of: dict[int, int]
+    order: tuple[str, ...]  #: Configurations in the order in which the robot came to them first.
+    of: dict[int, int]  #: On which visit of its configuration each reading was taken, by its number.
 
     @property
     def several(self) -> bool:

@@ -67,19 +67,13 @@ class _Client:
 class Listener:
     """A source of readings: programs of this machine that know the token.
 
-    Parameters
-    ----------
-    port
-        To listen on; 0 for any that is free.
-    token
-        What a program must send first; a new one if None.
-    now
-        What time it is [s].
+    Args:
+        port: To listen on; 0 for any that is free.
+        token: What a program must send first; a new one if None.
+        now: What time it is [s].
 
-    Raises
-    ------
-    InputError
-        If another program listens on the port; a free one is named.
+    Raises:
+        InputError: If another program listens on the port; a free one is named.
     """
 
     kind: Final = "listen"

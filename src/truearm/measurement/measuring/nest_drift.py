@@ -16,31 +16,17 @@ _LEAST_FREEDOMS: Final = 12
 
 @dataclass(frozen=True, eq=False)
 class NestDrift:
-    """Nests in the order of their rounds.
+    """Nests in the order of their rounds."""
 
-    Attributes
-    ----------
-    names
-        Of the nests that were read.
-    rounds
-        Number of each round with a reading, from 0, ``(r,)``.
-    time
-        Mean time of each [s], from the first reading of a nest on, ``(r,)``.
-    moved
-        Of each nest against its first reading [m], in the instrument's frame, ``(nests, r, 3)``; NaN where it was not
-        read.
-    sigma
-        Standard deviation of a coordinate about the mean of its nest [m]; None where too few readings tell it.
-    freedoms
-        Degrees of freedom of that.
-    """
-
-    names: tuple[str, ...]
-    rounds: tuple[int, ...]
-    time: Array
+    names: tuple[str, ...]  #: Of the nests that were read.
+    rounds: tuple[int, ...]  #: Number of each round with a reading, from 0, ``(r,)``.
+    time: Array  #: Mean time of each [s], from the first reading of a nest on, ``(r,)``.
+    #: Of each nest against its first reading [m], in the instrument's frame, ``(nests, r, 3)``; NaN where it was not
+    #: read.
     moved: Array
+    #: Standard deviation of a coordinate about the mean of its nest [m]; None where too few readings tell it.
     sigma: float | None
-    freedoms: int
+    freedoms: int  #: Degrees of freedom of that.
 
     @property
     def distance(self) -> Array:
@@ -60,10 +46,9 @@ class NestDrift:
     def noise(self, stated: float | None = None) -> float | None:
         """Return the standard deviation of a coordinate of a reading without what all nests share [m].
 
-        Parameters
-        ----------
-        stated
-            What the instrument says of itself [m]; else it is found from the nests, if enough of them were read.
+        Args:
+            stated: What the instrument says of itself [m]; else it is found from the nests, if enough of them were
+                read.
         """
         if stated is not None:
             return stated

@@ -63,15 +63,11 @@ _EVENTS: Final = ("reading", "aside", "left")
 class ReadingLog:
     """An open log; one process at a time has it.
 
-    Parameters
-    ----------
-    folder
-        In which it is, or is made.
+    Args:
+        folder: In which it is, or is made.
 
-    Raises
-    ------
-    InputError
-        If another process measures there, the log was changed, or it cannot be written.
+    Raises:
+        InputError: If another process measures there, the log was changed, or it cannot be written.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -99,10 +95,8 @@ class ReadingLog:
     def append(self, entry: Entry) -> None:
         """Write one line; when this returns it is on disk.
 
-        Raises
-        ------
-        InputError
-            If it cannot be written.
+        Raises:
+            InputError: If it cannot be written.
         """
         line = _line(entry)
         self._put(f"{line},{_check(line)}")

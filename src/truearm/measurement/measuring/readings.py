@@ -31,50 +31,25 @@ MOST_SAMPLES: Final = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What an instrument read of one point.
+    """What an instrument read of one point."""
 
-    Attributes
-    ----------
-    name
-        Of the target or nest.
-    time
-        When [s], counted from any moment that is the same for all readings.
-    position
-        In the instrument's frame [m], ``(3,)``; NaN if nothing was measured.
-    quaternion
-        (w, x, y, z), ``(4,)``; None for a point.
-    label
-        Of the configuration, as the source names it; None if it does not.
-    sigma, sigma_rot
-        Standard deviations that the instrument states [m], [rad]; None if it states none.
-    samples
-        How many were taken while the arm stood; None if it is not told.
-    deviation
-        Standard deviation of a coordinate of one sample about their mean [m]: the root of the mean square over the
-        coordinates; None if it is not told.
-    settling
-        How far the mean of the second half of the samples is from that of the first [m]; None if it is not told.
-    breaks
-        How often the beam was interrupted.
-    origin
-        Where it comes from, such as a file and a line.
-    mark
-        By which the same row is known again; empty if it has none.
-    """
-
-    name: str
-    time: float
-    position: Array
-    quaternion: Array | None = None
-    label: str | None = None
+    name: str  #: Of the target or nest.
+    time: float  #: When [s], counted from any moment that is the same for all readings.
+    position: Array  #: In the instrument's frame [m], ``(3,)``; NaN if nothing was measured.
+    quaternion: Array | None = None  #: (w, x, y, z), ``(4,)``; None for a point.
+    label: str | None = None  #: Of the configuration, as the source names it; None if it does not.
+    #: sigma, sigma_rot: standard deviations that the instrument states [m], [rad]; None if it states none.
     sigma: float | None = None
     sigma_rot: float | None = None
-    samples: int | None = None
+    samples: int | None = None  #: How many were taken while the arm stood; None if it is not told.
+    #: Standard deviation of a coordinate of one sample about their mean [m]: the root of the mean square over the
+    #: coordinates; None if it is not told.
     deviation: float | None = None
+    #: How far the mean of the second half of the samples is from that of the first [m]; None if it is not told.
     settling: float | None = None
-    breaks: int = 0
-    origin: str = ""
-    mark: str = ""
+    breaks: int = 0  #: How often the beam was interrupted.
+    origin: str = ""  #: Where it comes from, such as a file and a line.
+    mark: str = ""  #: By which the same row is known again; empty if it has none.
 
     @property
     def is_empty(self) -> bool:
@@ -85,14 +60,11 @@ class Reading:
 def dwell_figures(samples: Array) -> tuple[Array, float, float]:
     """Return mean, deviation and settling of the samples of a dwell.
 
-    Parameters
-    ----------
-    samples
-        Positions in the order in which they were taken [m], ``(n, 3)``, two or more.
+    Args:
+        samples: Positions in the order in which they were taken [m], ``(n, 3)``, two or more.
 
-    Returns
-    -------
-    The mean ``(3,)``; the deviation of a coordinate of one sample; how far the means of the two halves are apart.
+    Returns:
+        The mean ``(3,)``; the deviation of a coordinate of one sample; how far the means of the two halves are apart.
     """
     mean, half = samples.mean(axis=0), len(samples) // 2
     deviation = float(np.sqrt(samples.var(axis=0, ddof=1).mean()))
@@ -102,21 +74,11 @@ def dwell_figures(samples: Array) -> tuple[Array, float, float]:
 
 @dataclass(frozen=True)
 class Quality:
-    """What a reading must be by itself to be kept; None asks for nothing.
+    """What a reading must be by itself to be kept; None asks for nothing."""
 
-    Attributes
-    ----------
-    deviation
-        Largest deviation of a sample [m].
-    settling
-        How far the means of the two halves of a dwell may be apart [m].
-    samples
-        Fewest samples.
-    """
-
-    deviation: float | None = None
-    settling: float | None = None
-    samples: int = 1
+    deviation: float | None = None  #: Largest deviation of a sample [m].
+    settling: float | None = None  #: How far the means of the two halves of a dwell may be apart [m].
+    samples: int = 1  #: Fewest samples.
 
     @classmethod
     def of_instrument(cls, sigma: float, samples: int) -> Quality:

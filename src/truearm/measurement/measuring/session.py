@@ -27,40 +27,19 @@ _LONGEST_WORDS: Final = 200
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """One line of the log.
+    """One line of the log."""
 
-    Attributes
-    ----------
-    number
-        Counted from 1.
-    event
-        ``reading``; ``aside``, the operator takes back a reading that was kept; ``left``, a point that cannot be
-        measured.
-    label
-        Of the configuration; empty if it is not known.
-    name
-        Of the target or nest.
-    is_nest
-        Whether it is a nest.
-    reading
-        What was read; None for other events.
-    reason
-        Why it is not kept, of ``REASONS``; empty for what is kept.
-    words
-        More about that.
-    of
-        Number of the reading that is taken back.
-    """
-
-    number: int
+    number: int  #: Counted from 1.
+    #: ``reading``; ``aside``, the operator takes back a reading that was kept; ``left``, a point that cannot be
+    #: measured.
     event: Event
-    label: str
-    name: str
-    is_nest: bool = False
-    reading: Reading | None = None
-    reason: str = ""
-    words: str = ""
-    of: int | None = None
+    label: str  #: Of the configuration; empty if it is not known.
+    name: str  #: Of the target or nest.
+    is_nest: bool = False  #: Whether it is a nest.
+    reading: Reading | None = None  #: What was read; None for other events.
+    reason: str = ""  #: Why it is not kept, of ``REASONS``; empty for what is kept.
+    words: str = ""  #: More about that.
+    of: int | None = None  #: Number of the reading that is taken back.
 
     @property
     def kept(self) -> bool:
@@ -87,58 +66,28 @@ class Entry:
 
 @dataclass(frozen=True)
 class Step:
-    """What is measured together: a round of the nests, or the targets at a configuration.
+    """What is measured together: a round of the nests, or the targets at a configuration."""
 
-    Attributes
-    ----------
-    kind
-        ``nests`` or ``configuration``.
-    configuration
-        Index of the configuration at which the robot stands.
-    label
-        Its name.
-    names
-        What is still to be measured, in order.
-    number, of
-        Which of the steps it is, from 1.
-    """
-
-    kind: Kind
-    configuration: int
-    label: str
-    names: tuple[str, ...]
-    number: int
+    kind: Kind  #: ``nests`` or ``configuration``.
+    configuration: int  #: Index of the configuration at which the robot stands.
+    label: str  #: Its name.
+    names: tuple[str, ...]  #: What is still to be measured, in order.
+    number: int  #: number, of: which of the steps it is, from 1.
     of: int
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """All readings as arrays, in the order in which they came.
+    """All readings as arrays, in the order in which they came."""
 
-    Attributes
-    ----------
-    names, labels
-        Of the points and the configurations, ``(k,)`` each.
-    is_nest, kept
-        Whether it is a nest, and whether it is kept now, ``(k,)``.
-    reasons
-        Why not, empty for what is kept, ``(k,)``.
-    time
-        [s], ``(k,)``.
-    position
-        In the instrument's frame [m], ``(k, 3)``, NaN where nothing was measured.
-    deviation, settling, samples
-        [m], [m] and a count, ``(k,)``, NaN where it is not told.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  #: names, labels: of the points and the configurations, ``(k,)`` each.
     labels: tuple[str, ...]
-    is_nest: NDArray[np.bool_]
+    is_nest: NDArray[np.bool_]  #: is_nest, kept: whether it is a nest, and whether it is kept now, ``(k,)``.
     kept: NDArray[np.bool_]
-    reasons: tuple[str, ...]
-    time: Array
-    position: Array
-    deviation: Array
+    reasons: tuple[str, ...]  #: Why not, empty for what is kept, ``(k,)``.
+    time: Array  #: [s], ``(k,)``.
+    position: Array  #: In the instrument's frame [m], ``(k, 3)``, NaN where nothing was measured.
+    deviation: Array  #: deviation, settling, samples: [m], [m] and a count, ``(k,)``, NaN where it is not told.
     settling: Array
     samples: Array
 
@@ -151,21 +100,14 @@ class Session:
     before the operator sets it aside. The nests are measured at the start, after every so many configurations, and at
     the end.
 
-    Parameters
-    ----------
-    labels
-        Of the configurations, in the order of the plan.
-    targets
-        What is measured at each.
-    nests
-        Fixed points beside the robot.
-    every
-        How many configurations lie between two rounds of the nests.
-    quality
-        What a reading must be to be kept.
-    reads
-        Which of the targets are asked for at each configuration, by its label; all of them where nothing is said. One
-        that is not asked for may be read all the same.
+    Args:
+        labels: Of the configurations, in the order of the plan.
+        targets: What is measured at each.
+        nests: Fixed points beside the robot.
+        every: How many configurations lie between two rounds of the nests.
+        quality: What a reading must be to be kept.
+        reads: Which of the targets are asked for at each configuration, by its label; all of them where nothing is
+            said. One that is not asked for may be read all the same.
     """
 
     def __init__(
@@ -320,10 +262,8 @@ class Session:
     def set_aside(self, number: int, words: str = "") -> Entry:
         """Return the operator's word that a kept reading is none.
 
-        Raises
-        ------
-        InputError
-            If there is no such reading, or it is not kept.
+        Raises:
+            InputError: If there is no such reading, or it is not kept.
         """
         if number not in self._held.values():
             raise InputError(
@@ -339,10 +279,8 @@ class Session:
     def leave_out(self, label: str, name: str, words: str = "") -> Entry:
         """Return the word that a point cannot be measured at a configuration.
 
-        Raises
-        ------
-        InputError
-            If the plan has no such configuration or point, or it was measured.
+        Raises:
+            InputError: If the plan has no such configuration or point, or it was measured.
         """
         known = (*self.targets, *self.nests)
         for came, allowed, parameter in ((label, self.labels, "label"), (name, known, "name")):
@@ -361,10 +299,8 @@ class Session:
     def add(self, *entries: Entry) -> None:
         """Take what is in the log into account, in its order.
 
-        Raises
-        ------
-        InputError
-            If an entry does not follow from those before: the log was changed.
+        Raises:
+            InputError: If an entry does not follow from those before: the log was changed.
         """
         for entry in entries:
             place = self._place_in_log(entry)

@@ -17,24 +17,13 @@ def _nobody(entry: Entry) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Incoming:
-    """What came.
+    """What came."""
 
-    Attributes
-    ----------
-    reading
-        That was read; None where a point is left out.
-    left
-        Configuration and name of the point that is left out, and why in words; None for a reading.
-    reply
-        Called with what became of it, once that is on disk.
-    refuse
-        Called with words where it cannot be taken.
-    """
-
-    reading: Reading | None = None
+    reading: Reading | None = None  #: That was read; None where a point is left out.
+    #: Configuration and name of the point that is left out, and why in words; None for a reading.
     left: tuple[str, str, str] | None = None
-    reply: Callable[[Entry], None] = _nobody
-    refuse: Callable[[str], None] = lambda words: None
+    reply: Callable[[Entry], None] = _nobody  #: Called with what became of it, once that is on disk.
+    refuse: Callable[[str], None] = lambda words: None  #: Called with words where it cannot be taken.
 
 
 class Source(Protocol):

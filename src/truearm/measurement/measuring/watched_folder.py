@@ -41,27 +41,13 @@ _NAMED: Final = 5
 
 @dataclass
 class _File:
-    """How far a file was read.
+    """How far a file was read."""
 
-    Attributes
-    ----------
-    taken
-        How many of its lines.
-    digest
-        Of their text.
-    state
-        Its size and time when it was read last.
-    again
-        Whether it was replaced, so that rows that are known by their text are passed over.
-    open_end
-        Whether its last line has no end.
-    """
-
-    taken: int = 0
-    digest: bytes = b""
-    state: tuple[int, int] = (-1, -1)
-    again: bool = True
-    open_end: bool = False
+    taken: int = 0  #: How many of its lines.
+    digest: bytes = b""  #: Of their text.
+    state: tuple[int, int] = (-1, -1)  #: Its size and time when it was read last.
+    again: bool = True  #: Whether it was replaced, so that rows that are known by their text are passed over.
+    open_end: bool = False  #: Whether its last line has no end.
 
 
 @dataclass
@@ -77,21 +63,14 @@ class WatchedFolder:
     Only whole lines are read, those that end with a line break. A row that cannot be read is named, and the others are
     kept. Rows that a log holds already are passed over, so that measuring can go on.
 
-    Parameters
-    ----------
-    folder
-        That is watched, without the folders in it.
-    mapping
-        Its mapping file, or the name of a preset. The joint positions are those of the plan.
-    labels
-        Of the plan, for tables in which every row is a configuration of its own.
-    now
-        What time it is [s].
+    Args:
+        folder: That is watched, without the folders in it.
+        mapping: Its mapping file, or the name of a preset. The joint positions are those of the plan.
+        labels: Of the plan, for tables in which every row is a configuration of its own.
+        now: What time it is [s].
 
-    Raises
-    ------
-    InputError
-        If there is no such folder, or the mapping cannot be used here.
+    Raises:
+        InputError: If there is no such folder, or the mapping cannot be used here.
     """
 
     kind: Final = "watch"

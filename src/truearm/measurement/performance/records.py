@@ -17,18 +17,10 @@ from truearm.modeling.chain import Array
 
 @dataclass(frozen=True, eq=False)
 class Names:
-    """A column of names.
+    """A column of names."""
 
-    Attributes
-    ----------
-    names
-        Those that occur, in the order of their first row.
-    code
-        Of each row: which of them, ``(n,)``.
-    """
-
-    names: tuple[str, ...]
-    code: NDArray[np.intp]
+    names: tuple[str, ...]  #: Those that occur, in the order of their first row.
+    code: NDArray[np.intp]  #: Of each row: which of them, ``(n,)``.
 
     @classmethod
     def of(cls, texts: Iterable[str]) -> Self:
@@ -50,126 +42,54 @@ class Names:
 
 @dataclass(frozen=True, eq=False)
 class AttainedPoses:
-    """Rows of ``poses.csv``: one attained pose each, in the instrument's frame.
+    """Rows of ``poses.csv``: one attained pose each, in the instrument's frame."""
 
-    Attributes
-    ----------
-    criterion
-        Id of the test: a key of :data:`truearm.planning.iso9283.criteria.TESTS`.
-    robot, pose, approach
-        Names; the robot's is empty where one robot was measured, the approach's where there is one alone.
-    cycle
-        From 1, ``(n,)``.
-    velocity, load
-        Shares of the rated ones, 0 to 1, ``(n,)``.
-    time
-        [s], ``(n,)``; NaN where it is not given.
-    position
-        [m], ``(n, 3)``.
-    rotation
-        ``(n, 3, 3)``; None where the file has no orientations.
-    line
-        In the file, ``(n,)``.
-    source
-        The file, for messages.
-    resolution
-        Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
-    resolution_rot
-        The same of the components of quaternions.
-    simulated
-        Whether a virtual instrument read any of them.
-    """
-
-    criterion: Names
+    criterion: Names  #: Id of the test: a key of :data:`truearm.planning.iso9283.criteria.TESTS`.
+    #: robot, pose, approach: names; the robot's is empty where one robot was measured, the approach's where there is
+    #: one alone.
     robot: Names
     pose: Names
     approach: Names
-    cycle: NDArray[np.intp]
-    velocity: Array
+    cycle: NDArray[np.intp]  #: From 1, ``(n,)``.
+    velocity: Array  #: velocity, load: shares of the rated ones, 0 to 1, ``(n,)``.
     load: Array
-    time: Array
-    position: Array
-    rotation: Array | None
-    line: NDArray[np.intp]
-    source: str
-    resolution: float = 0.0
-    resolution_rot: float = 0.0
-    simulated: bool = False
+    time: Array  #: [s], ``(n,)``; NaN where it is not given.
+    position: Array  #: [m], ``(n, 3)``.
+    rotation: Array | None  #: ``(n, 3, 3)``; None where the file has no orientations.
+    line: NDArray[np.intp]  #: In the file, ``(n,)``.
+    source: str  #: The file, for messages.
+    resolution: float = 0.0  #: Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
+    resolution_rot: float = 0.0  #: The same of the components of quaternions.
+    simulated: bool = False  #: Whether a virtual instrument read any of them.
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Rows of ``paths.csv`` or ``settling.csv``: samples over time, in the instrument's frame.
+    """Rows of ``paths.csv`` or ``settling.csv``: samples over time, in the instrument's frame."""
 
-    Attributes
-    ----------
-    criterion
-        Id of the test.
-    place
-        Name of the path, or of the pose.
-    cycle
-        From 1, ``(n,)``; 0 where a stream of a whole test has no cycles, which then are found.
-    velocity, load
-        Shares of the rated ones, 0 to 1, ``(n,)``.
-    time
-        [s], ``(n,)``.
-    position
-        [m], ``(n, 3)``.
-    rotation
-        ``(n, 3, 3)``; None where the file has no orientations.
-    line
-        In the file, ``(n,)``.
-    source
-        The file, for messages.
-    resolution
-        Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
-    simulated
-        Whether a virtual instrument read any of them.
-    """
-
-    criterion: Names
-    place: Names
-    cycle: NDArray[np.intp]
-    velocity: Array
+    criterion: Names  #: Id of the test.
+    place: Names  #: Name of the path, or of the pose.
+    cycle: NDArray[np.intp]  #: From 1, ``(n,)``; 0 where a stream of a whole test has no cycles, which then are found.
+    velocity: Array  #: velocity, load: shares of the rated ones, 0 to 1, ``(n,)``.
     load: Array
-    time: Array
-    position: Array
-    rotation: Array | None
-    line: NDArray[np.intp]
-    source: str
-    resolution: float = 0.0
-    simulated: bool = False
+    time: Array  #: [s], ``(n,)``.
+    position: Array  #: [m], ``(n, 3)``.
+    rotation: Array | None  #: ``(n, 3, 3)``; None where the file has no orientations.
+    line: NDArray[np.intp]  #: In the file, ``(n,)``.
+    source: str  #: The file, for messages.
+    resolution: float = 0.0  #: Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
+    simulated: bool = False  #: Whether a virtual instrument read any of them.
 
 
 @dataclass(frozen=True, eq=False)
 class Pushes:
-    """Rows of ``forces.csv``: where the tip is while it is pushed, in the instrument's frame.
+    """Rows of ``forces.csv``: where the tip is while it is pushed, in the instrument's frame."""
 
-    Attributes
-    ----------
-    direction
-        Of the force, along the robot's base axes: ``+x``, ``-x`` to ``-z``.
-    force
-        [N], ``(n,)``.
-    cycle
-        From 1, ``(n,)``.
-    position
-        [m], ``(n, 3)``.
-    line
-        In the file, ``(n,)``.
-    source
-        The file, for messages.
-    resolution
-        Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
-    simulated
-        Whether a virtual instrument read any of them.
-    """
-
-    direction: Names
-    force: Array
-    cycle: NDArray[np.intp]
-    position: Array
-    line: NDArray[np.intp]
-    source: str
-    resolution: float = 0.0
-    simulated: bool = False
+    direction: Names  #: Of the force, along the robot's base axes: ``+x``, ``-x`` to ``-z``.
+    force: Array  #: [N], ``(n,)``.
+    cycle: NDArray[np.intp]  #: From 1, ``(n,)``.
+    position: Array  #: [m], ``(n, 3)``.
+    line: NDArray[np.intp]  #: In the file, ``(n,)``.
+    source: str  #: The file, for messages.
+    resolution: float = 0.0  #: Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
+    simulated: bool = False  #: Whether a virtual instrument read any of them.

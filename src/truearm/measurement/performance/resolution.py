@@ -20,12 +20,9 @@ _LEAST: Final = 6
 def resolution_of(numbers: Array, group: NDArray[np.intp]) -> float:
     """Return the step of which all differences within groups are multiples; 0 where there is none, or nothing differs.
 
-    Parameters
-    ----------
-    numbers
-        As written, in the unit of the file, ``(n, d)``: all columns are those of one instrument.
-    group
-        Rows of one group differ by scatter alone, ``(n,)``; of rows over time all are one group.
+    Args:
+        numbers: As written, in the unit of the file, ``(n, d)``: all columns are those of one instrument.
+        group: Rows of one group differ by scatter alone, ``(n,)``; of rows over time all are one group.
     """
     order = np.argsort(group, kind="stable")
     same = np.diff(group[order]) == 0

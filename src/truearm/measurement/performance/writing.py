@@ -57,12 +57,9 @@ def poses_text(read: AttainedPoses) -> str:
 def samples_text(read: Samples, place: str, *, conditions: bool = True) -> str:
     """Return samples as ``paths.csv`` or ``settling.csv`` holds them.
 
-    Parameters
-    ----------
-    place
-        Heading of the column of places: ``path`` or ``pose``.
-    conditions
-        Whether there are columns of velocity and load.
+    Args:
+        place: Heading of the column of places: ``path`` or ``pose``.
+        conditions: Whether there are columns of velocity and load.
     """
     mark = [SIMULATED] if read.simulated else []
     heading = ["criterion", place, "cycle", *(_SHARES if conditions else ()), "time [s]", *_PLACE]

@@ -83,10 +83,8 @@ def read_csv(path: Path) -> Dataset:
     A row with an empty x, y or z has no position, and one with an empty qw, qx, qy or qz no orientation: it
     stays, as a missing reading. Quaternions must have length 1 within 1e-3 and are then normalised.
 
-    Returns
-    -------
-    Dataset
-        Configurations in order of first appearance; rows of the role ``reference`` are in ``references``.
+    Returns:
+        Dataset: Configurations in order of first appearance; rows of the role ``reference`` are in ``references``.
     """
     text = read_text(path)
     header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
@@ -159,12 +157,9 @@ def read_csv(path: Path) -> Dataset:
 def refuse_other_separators(text: str, where: str, otherwise: str = "") -> None:
     """Refuse a text whose header is not separated by commas.
 
-    Parameters
-    ----------
-    where
-        Names the header.
-    otherwise
-        What can be done besides saving it again, for the end of that sentence.
+    Args:
+        where: Names the header.
+        otherwise: What can be done besides saving it again, for the end of that sentence.
     """
     heading = next(line for line in lines_of(text) if line.strip())
     seen = next((name for sign, name in _SEPARATORS.items() if sign in heading), None)

@@ -34,61 +34,29 @@ _NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Layout:
-    """How the text of a table is laid out.
+    """How the text of a table is laid out."""
 
-    Attributes
-    ----------
-    delimiter
-        The character between two cells; None for any run of blanks.
-    decimal
-        The decimal sign, ``.`` or ``,``.
-    header
-        Line that holds the column names, counted from 1; None if there is none and columns go by number.
-    first_row
-        First line that may hold data; None for the one after the header.
-    comment
-        Lines that begin with this text are skipped; None if there are no comments.
-    """
-
-    delimiter: str | None = ","
-    decimal: str = "."
+    delimiter: str | None = ","  #: The character between two cells; None for any run of blanks.
+    decimal: str = "."  #: The decimal sign, ``.`` or ``,``.
+    #: Line that holds the column names, counted from 1; None if there is none and columns go by number.
     header: int | None = 1
-    first_row: int | None = None
-    comment: str | None = None
+    first_row: int | None = None  #: First line that may hold data; None for the one after the header.
+    comment: str | None = None  #: Lines that begin with this text are skipped; None if there are no comments.
 
 
 @dataclass(frozen=True)
 class Cells:
-    """The cells of a table, column by column, without the blanks around them.
+    """The cells of a table, column by column, without the blanks around them."""
 
-    Attributes
-    ----------
-    source
-        The file, for messages.
-    header
-        Line of the column names; None if there is none.
-    names
-        Name of each column as the file has it; its number if there is no header.
-    lines
-        Line of each row.
-    columns
-        The cells, ``columns[column][row]``.
-    decimal
-        The decimal sign.
-    absent
-        Texts that mean that nothing was measured, besides an empty cell; None where a file can name none.
-    sheet
-        Sheet of a workbook that they come from; None for a text.
-    """
-
-    source: str
-    header: int | None
-    names: tuple[str, ...]
-    lines: tuple[int, ...]
-    columns: tuple[tuple[str, ...], ...]
-    decimal: str = "."
+    source: str  #: The file, for messages.
+    header: int | None  #: Line of the column names; None if there is none.
+    names: tuple[str, ...]  #: Name of each column as the file has it; its number if there is no header.
+    lines: tuple[int, ...]  #: Line of each row.
+    columns: tuple[tuple[str, ...], ...]  #: The cells, ``columns[column][row]``.
+    decimal: str = "."  #: The decimal sign.
+    #: Texts that mean that nothing was measured, besides an empty cell; None where a file can name none.
     absent: tuple[str, ...] | None = None
-    sheet: str | None = None
+    sheet: str | None = None  #: Sheet of a workbook that they come from; None for a text.
 
     def some(self, kept: Sequence[bool]) -> Cells:
         """Return some of the rows."""
@@ -134,16 +102,11 @@ class Cells:
     def numbers(self, column: int, unit: str, *, missing: bool = False, deviation: bool = False) -> Array:
         """Return a column of numbers in SI units [m, rad or 1], ``(rows,)``.
 
-        Parameters
-        ----------
-        column
-            Which one.
-        unit
-            The unit of the column.
-        missing
-            Whether a cell may be empty; it is then NaN.
-        deviation
-            Whether they are standard deviations, all of them above zero.
+        Args:
+            column: Which one.
+            unit: The unit of the column.
+            missing: Whether a cell may be empty; it is then NaN.
+            deviation: Whether they are standard deviations, all of them above zero.
         """
         cells = self.columns[column]
         if self.decimal == ",":
@@ -218,12 +181,9 @@ class Cells:
 def sheet_place(source: str, sheet: str, row: int, column: int) -> str:
     """Return the file and the place of a cell as spreadsheets show it, such as ``Points!B7``.
 
-    Parameters
-    ----------
-    source
-        The file, with or without its sheet.
-    row, column
-        The row counted from 1, the column counted from 0.
+    Args:
+        source: The file, with or without its sheet.
+        row, column: The row counted from 1, the column counted from 0.
     """
     name = sheet if re.fullmatch(r"\w+", sheet) else f"'{sheet}'"
     return f"{source.removesuffix(f', sheet {sheet}')}, {name}!{column_letters(column)}{row}"

@@ -40,14 +40,10 @@ def columns_beside_joints(
 ) -> Columns:
     """Return place and unit of every column by its name, joint positions among them, or refuse the header.
 
-    Parameters
-    ----------
-    shown
-        The columns besides joint positions, as one writes them.
-    units
-        The units of those that need one.
-    optional
-        Those that may be left out.
+    Args:
+        shown: The columns besides joint positions, as one writes them.
+        units: The units of those that need one.
+        optional: Those that may be left out.
     """
     columns = _found_columns(cells, shown, units, _JOINTS)
     joint_names(columns, f"{cells.source}, line {cells.header}")
@@ -59,10 +55,8 @@ def named_columns(
 ) -> Columns:
     """Return place and unit of every column by its name in a table without joint positions, or refuse the header.
 
-    Parameters
-    ----------
-    shown, units, optional
-        As for :func:`columns_beside_joints`.
+    Args:
+        shown, units, optional: As for :func:`columns_beside_joints`.
     """
     return _complete(cells, _found_columns(cells, shown, units), shown, optional)
 

@@ -34,15 +34,11 @@ def read_configurations(path: Path) -> Dataset:
     Such a table has the columns ``configuration`` and ``joint_i`` or ``axis_i``, a row a configuration. Its columns
     ``approach_i``, ``order``, ``force_x`` to ``force_z`` and ``reads`` say nothing of where the arm stands.
 
-    Returns
-    -------
-    Dataset
-        Of a plan with one missing reading for each configuration.
+    Returns:
+        Dataset: Of a plan with one missing reading for each configuration.
 
-    Raises
-    ------
-    InputError
-        If the file is neither of them, or a cell cannot be used.
+    Raises:
+        InputError: If the file is neither of them, or a cell cannot be used.
     """
     table = _table_of(path)
     if table is None:
@@ -53,15 +49,12 @@ def read_configurations(path: Path) -> Dataset:
 def read_stops(path: Path) -> Dataset | None:
     """Read where the arm stops right before each configuration of a plan, ``approach_i`` of its table.
 
-    Returns
-    -------
-    Dataset
-        With these joint positions, counted as those of the configurations; None where the file does not have them.
+    Returns:
+        Dataset: With these joint positions, counted as those of the configurations; None where the file does not have
+            them.
 
-    Raises
-    ------
-    InputError
-        If some of its columns are missing or have no unit, or a cell cannot be used.
+    Raises:
+        InputError: If some of its columns are missing or have no unit, or a cell cannot be used.
     """
     table = _table_of(path)
     stops = None if table is None else stops_in(table.cells, _found(table))

@@ -30,18 +30,11 @@ _PAPER_DEVIATION: Final = 1e-5
 
 @dataclass(frozen=True)
 class Page:
-    """A page and what was read while the circle on it was drawn.
+    """A page and what was read while the circle on it was drawn."""
 
-    Attributes
-    ----------
-    scan
-        Image of the page.
-    points
-        CSV with the columns ``configuration``, ``joint_1 [deg]`` .. (or ``axis_1 [deg]`` .., as the controller shows
-        them), ``angle [deg]`` on the page and ``height [mm]`` over it.
-    """
-
-    scan: Path
+    scan: Path  #: Image of the page.
+    #: CSV with the columns ``configuration``, ``joint_1 [deg]`` .. (or ``axis_1 [deg]`` .., as the controller shows
+    #: them), ``angle [deg]`` on the page and ``height [mm]`` over it.
     points: Path
 
 
@@ -50,25 +43,18 @@ def read_drawn_circles(
 ) -> Dataset:
     """Read drawn circles as distances from their centres and heights over their papers.
 
-    Parameters
-    ----------
-    pages
-        By name.
-    dpi
-        Resolution of the scans, or that along x and that along y; what the files say if None.
-    sigma
-        Standard deviation of radius and height [m]; nothing is declared if None.
+    Args:
+        pages: By name.
+        dpi: Resolution of the scans, or that along x and that along y; what the files say if None.
+        sigma: Standard deviation of radius and height [m]; nothing is declared if None.
 
-    Returns
-    -------
-    Dataset
-        Its target is the tip of the ``pencil``; fixtures are the points ``centre_NAME`` and the planes ``paper_NAME``,
-        and the one lies in the other. A gap in the line is a missing distance.
+    Returns:
+        Dataset: Its target is the tip of the ``pencil``; fixtures are the points ``centre_NAME`` and the planes
+            ``paper_NAME``, and the one lies in the other. A gap in the line is a missing distance.
 
-    Raises
-    ------
-    InputError
-        If a page shows no circle, a table cannot be used, or two pages have a configuration of the same name.
+    Raises:
+        InputError: If a page shows no circle, a table cannot be used, or two pages have a configuration of the same
+            name.
     """
     drawn = {name: _page(page, dpi) for name, page in pages.items()}
     _refuse_twice(pages, drawn)

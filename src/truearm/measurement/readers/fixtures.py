@@ -20,10 +20,8 @@ _OF_SETUP: Final = ("target", "role", "fixture", "x", "y", "z", "distance", "hei
 def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -> None:
     """Refuse distances and heights from nothing, below what they can be, or beside another length.
 
-    Parameters
-    ----------
-    places
-        The column of each name.
+    Args:
+        places: The column of each name.
     """
     position = np.isfinite(readings.position).any(axis=1)
     lengths: dict[str, Array] = {}
@@ -71,14 +69,10 @@ def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -
 def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Dataset) -> Dataset:
     """Read what is known of the fixtures: where they stand, how far from each other or how high over one, and how well.
 
-    Parameters
-    ----------
-    cells
-        The rows of the role ``fixture``.
-    columns
-        Place and unit of each column.
-    data
-        What is measured against them.
+    Args:
+        cells: The rows of the role ``fixture``.
+        columns: Place and unit of each column.
+        data: What is measured against them.
     """
     for heading, (place, _) in columns.items():
         if heading not in _OF_SETUP:

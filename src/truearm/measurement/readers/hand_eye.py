@@ -47,21 +47,11 @@ _UNITS: Final = dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS) | {"sigma_rot
 
 @dataclass(frozen=True, eq=False)
 class HandEyeReadings:
-    """What a camera saw of a board, as readings of what is on the flange.
+    """What a camera saw of a board, as readings of what is on the flange."""
 
-    Attributes
-    ----------
-    data
-        Poses of the target ``camera`` in the board's frame, or of the target ``board`` in the camera's.
-    views
-        The poses as they came, with the lens if pictures were read.
-    ahead
-        How far before the camera the target is [m]: a point of its axis; zero for a board on the flange.
-    """
-
-    data: Dataset
-    views: Views
-    ahead: float
+    data: Dataset  #: Poses of the target ``camera`` in the board's frame, or of the target ``board`` in the camera's.
+    views: Views  #: The poses as they came, with the lens if pictures were read.
+    ahead: float  #: How far before the camera the target is [m]: a point of its axis; zero for a board on the flange.
 
 
 def pictures_named(path: Path) -> tuple[Path, ...]:
@@ -77,19 +67,13 @@ def read_hand_eye(
 ) -> HandEyeReadings:
     """Read a table of poses of a board in a camera, or of pictures of it.
 
-    Parameters
-    ----------
-    on_flange
-        What moves with the robot; the other one stands beside it.
-    board
-        What the pictures show; None for a table of poses.
-    ahead
-        How far before a camera on the flange the target is [m]; None for where the board was on average.
+    Args:
+        on_flange: What moves with the robot; the other one stands beside it.
+        board: What the pictures show; None for a table of poses.
+        ahead: How far before a camera on the flange the target is [m]; None for where the board was on average.
 
-    Raises
-    ------
-    InputError
-        If a column, a unit or a picture is missing, or a picture does not show the board.
+    Raises:
+        InputError: If a column, a unit or a picture is missing, or a picture does not show the board.
     """
     cells = read_named(path)
     if board is None:

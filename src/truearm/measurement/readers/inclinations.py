@@ -64,10 +64,8 @@ def read_inclinations(path: Path) -> Inclinations:
     centre of gravity) and a force on the flange (with a moment) are of the whole configuration. An empty angle is a
     missing reading.
 
-    Raises
-    ------
-    InputError
-        Naming file, line and column of what cannot be used.
+    Raises:
+        InputError: Naming file, line and column of what cannot be used.
     """
     text = read_text(path)
     header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())

@@ -35,23 +35,16 @@ def read_matrices(
     only importer in which zeros stand for nothing: a row of zeros, or one with a NaN, in the file of a target
     or a reference point is a missing reading. All configurations stay, even where all readings are missing.
 
-    Parameters
-    ----------
-    joints
-        Joint positions, one column a joint; all joints are revolute.
-    targets, references
-        Name and file of each point on the tool and of each fixed point beside the robot; columns x, y, z.
-    angle_unit, length_unit
-        Units of the joints and of the positions.
-    joints_are
-        ``model``, or ``controller`` if it shows these joint positions.
+    Args:
+        joints: Joint positions, one column a joint; all joints are revolute.
+        targets, references: Name and file of each point on the tool and of each fixed point beside the robot; columns
+            x, y, z.
+        angle_unit, length_unit: Units of the joints and of the positions.
+        joints_are: ``model``, or ``controller`` if it shows these joint positions.
 
-    Returns
-    -------
-    Dataset
-        The readings, configuration by configuration.
-    Mapping
-        How many readings are missing, by name.
+    Returns:
+        Dataset: The readings, configuration by configuration.
+        Mapping: How many readings are missing, by name.
     """
     checked_unit(angle_unit, ANGLE_UNITS, parameter="angle_unit")
     checked_unit(length_unit, LENGTH_UNITS, parameter="length_unit")

@@ -37,23 +37,16 @@ def measuring_order(
     Times and running numbers give ranks: 1, 2, 3. A number that all rows of a configuration share, and that of a
     label, stays as it is, so that gaps are gaps.
 
-    Parameters
-    ----------
-    entry
-        What the mapping says.
-    places
-        The columns that it names: none, one, or two with the day and the time.
-    labels
-        Of the configurations, those that were not measured included.
-    of_row
-        Configuration of each row, ``(rows,)``.
-    where
-        The entry in the mapping, for messages.
+    Args:
+        entry: What the mapping says.
+        places: The columns that it names: none, one, or two with the day and the time.
+        labels: Of the configurations, those that were not measured included.
+        of_row: Configuration of each row, ``(rows,)``.
+        where: The entry in the mapping, for messages.
 
-    Raises
-    ------
-    InputError
-        If the labels are not numbered, a time or number cannot be read, or configurations overlap or coincide.
+    Raises:
+        InputError: If the labels are not numbered, a time or number cannot be read, or configurations overlap or
+            coincide.
     """
     if entry.by == "labels":
         return _by_labels(cells, labels, of_row, where)

@@ -46,12 +46,11 @@ def read_attained_poses(path: Path) -> AttainedPoses:
     [%]``, ``load [%]``, ``time [s]`` (may be left out), ``x [mm]``, ``y [mm]``, ``z [mm]``, and ``qw``, ``qx``,
     ``qy``, ``qz`` or none of them. Cells of columns that may be left out may be empty.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be used: a column or unit that is missing or not known, cells that are empty or no numbers,
-        cycles that are not whole, velocities or loads that are not between 0 and 100 %, quaternions that do not have
-        length 1, or two rows of one cycle. Whether criteria and poses are those of a plan is not asked here.
+    Raises:
+        InputError: If the file cannot be used: a column or unit that is missing or not known, cells that are empty or
+            no numbers, cycles that are not whole, velocities or loads that are not between 0 and 100 %, quaternions
+            that do not have length 1, or two rows of one cycle. Whether criteria and poses are those of a plan is not
+            asked here.
     """
     cells = read_named(path)
     quaternion = () if any(name.startswith("q") for name in cells.names) else _QUATERNION
@@ -101,11 +100,9 @@ def read_pushes(path: Path) -> Pushes:
     Columns: ``direction`` (``+x`` to ``-z`` of the robot's base), ``force [N]``, ``cycle``, ``x [mm]``, ``y [mm]``,
     ``z [mm]``.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be used: a column or unit that is missing or not known, cells that are empty or no numbers, a
-        direction that is not known, a force below zero, or cycles that are not whole.
+    Raises:
+        InputError: If the file cannot be used: a column or unit that is missing or not known, cells that are empty or
+            no numbers, a direction that is not known, a force below zero, or cycles that are not whole.
     """
     cells = read_named(path)
     columns = named_columns(cells, _PUSHES, _PUSH_UNITS)

@@ -91,10 +91,8 @@ def read_path_samples(path: Path) -> Samples:
     ``cycle``, ``qw`` to ``qz`` (all or none), ``velocity [%]`` and ``load [%]``. Without a cycle, in a row or at all,
     rows are a stream of a whole test. Time increases within a cycle, and within a stream.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read or a row cannot be used, naming line and column.
+    Raises:
+        InputError: If the file cannot be read or a row cannot be used, naming line and column.
     """
     return _read(path, "path")
 

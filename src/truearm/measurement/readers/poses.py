@@ -26,21 +26,11 @@ _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses as a file has them.
+    """Poses as a file has them."""
 
-    Attributes
-    ----------
-    labels
-        One for each pose, none twice.
-    position
-        [m], ``(poses, 3)``.
-    quaternion
-        (w, x, y, z) of length 1, ``(poses, 4)``; None if the file has none.
-    """
-
-    labels: tuple[str, ...]
-    position: Array
-    quaternion: Array | None
+    labels: tuple[str, ...]  #: One for each pose, none twice.
+    position: Array  #: [m], ``(poses, 3)``.
+    quaternion: Array | None  #: (w, x, y, z) of length 1, ``(poses, 4)``; None if the file has none.
 
 
 def read_poses(path: Path) -> Poses:

@@ -57,21 +57,11 @@ _HEADINGS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class RoboDKTable:
-    """What a table holds.
+    """What a table holds."""
 
-    Attributes
-    ----------
-    data
-        The readings; targets are numbered as their tool points first appear.
-    tool_points
-        Where each target is in the flange frame, as RoboDK was told [m], ``(targets, 3)``.
-    missing
-        How many readings are missing.
-    """
-
-    data: Dataset
-    tool_points: Array
-    missing: int
+    data: Dataset  #: The readings; targets are numbered as their tool points first appear.
+    tool_points: Array  #: Where each target is in the flange frame, as RoboDK was told [m], ``(targets, 3)``.
+    missing: int  #: How many readings are missing.
 
 
 def read_robodk(
@@ -85,19 +75,13 @@ def read_robodk(
 
     Lines that follow each other with the same joint positions and other tool points are one configuration.
 
-    Parameters
-    ----------
-    angle_unit
-        Of the angles of measured poses; None for a table of points.
-    joints_are
-        ``model``, or ``controller`` if it shows these joint positions.
-    delimiter, decimal
-        What stands between columns, and the decimal sign.
+    Args:
+        angle_unit: Of the angles of measured poses; None for a table of points.
+        joints_are: ``model``, or ``controller`` if it shows these joint positions.
+        delimiter, decimal: What stands between columns, and the decimal sign.
 
-    Raises
-    ------
-    InputError
-        If it is no such table, or the unit of its angles is not said.
+    Raises:
+        InputError: If it is no such table, or the unit of its angles is not said.
     """
     text = read_text(path)
     header = 1 + next((number for number, line in enumerate(lines_of(text)) if line.strip()), 0)
@@ -170,12 +154,10 @@ def read_robodk(
 def robodk_csv(data: Dataset, tool_points: Sequence[Array], rotations: Sequence[Array | None]) -> str:
     """Return readings as such a table; of poses with angles in radians.
 
-    Parameters
-    ----------
-    data
-        Positions, or poses, of six revolute joints.
-    tool_points, rotations
-        Where each target is in the flange frame [m], ``(3,)``, and how it is turned, ``(3, 3)``; None for a point.
+    Args:
+        data: Positions, or poses, of six revolute joints.
+        tool_points, rotations: Where each target is in the flange frame [m], ``(3,)``, and how it is turned, ``(3,
+            3)``; None for a point.
     """
     poses = data.quaternion is not None
     measured = SIMULATED if data.simulated else _MEASURED

@@ -163,12 +163,9 @@ def unlikely_radians(
 
     An angle of an orientation never needs to. A joint may, so that half of the rows must have one.
 
-    Parameters
-    ----------
-    entry
-        What the mapping says of the joints.
-    joints
-        The table that has the columns that it names; None if it names none.
+    Args:
+        entry: What the mapping says of the joints.
+        joints: The table that has the columns that it names; None if it names none.
     """
     found: list[Notice] = []
     for number, reading in enumerate(content.readings, 1):

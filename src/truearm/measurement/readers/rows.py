@@ -26,33 +26,15 @@ _FIRST = 1
 
 @dataclass(frozen=True)
 class Configurations:
-    """Configurations in order of first appearance.
+    """Configurations in order of first appearance."""
 
-    Attributes
-    ----------
-    labels
-        Their names.
-    joints
-        Joint positions [rad; m for prismatic joints], ``(configurations, joints)``.
-    kinds
-        ``revolute`` or ``prismatic`` for each joint.
-    of_row
-        Configuration of each row they were found in, ``(rows,)``.
-    joints_are
-        ``model``, or ``controller`` if it shows these joint positions.
-    before
-        Where the arm stops right before each, where a plan says so.
-    simulated
-        Whether a virtual instrument read any of their rows.
-    """
-
-    labels: tuple[str, ...]
-    joints: Array
-    kinds: tuple[str, ...]
-    of_row: IntArray
-    joints_are: JointsOf = "model"
-    before: Configurations | None = None
-    simulated: bool = False
+    labels: tuple[str, ...]  #: Their names.
+    joints: Array  #: Joint positions [rad; m for prismatic joints], ``(configurations, joints)``.
+    kinds: tuple[str, ...]  #: ``revolute`` or ``prismatic`` for each joint.
+    of_row: IntArray  #: Configuration of each row they were found in, ``(rows,)``.
+    joints_are: JointsOf = "model"  #: ``model``, or ``controller`` if it shows these joint positions.
+    before: Configurations | None = None  #: Where the arm stops right before each, where a plan says so.
+    simulated: bool = False  #: Whether a virtual instrument read any of their rows.
 
 
 def found_configurations(
@@ -112,49 +94,28 @@ def order_of_labels(labels: Sequence[str]) -> IntArray | None:
 
 @dataclass(frozen=True)
 class Readings:
-    """Readings as a file has them, in file order.
+    """Readings as a file has them, in file order."""
 
-    Attributes
-    ----------
-    source
-        The file, for messages.
-    lines
-        Line of each reading.
-    configuration
-        Index of its configuration, ``(readings,)``.
-    targets
-        Name of its target.
-    reference
-        Whether that is a reference point, ``(readings,)``.
-    position
-        [m], ``(readings, 3)``, NaN where a coordinate is missing.
-    quaternion
-        (w, x, y, z), ``(readings, 4)``, NaN where it is missing; None if the file has none.
-    sigma, sigma_rot
-        Declared standard deviations [m], [rad], ``(readings,)``, NaN where missing; None if there are none.
-    fixture
-        Name of the fixture that each is measured against, empty for none; None if the file names none.
-    distance, height
-        From, or over, the fixture [m], ``(readings,)``, NaN where missing; None if the file has none.
-    visit
-        Which visit of its configuration each was taken on, ``(readings,)``; None if the file does not say.
-    called
-        What the file calls its columns ``sigma``, ``sigma_rot`` and ``quaternion``, where that is something else.
-    """
-
-    source: str
-    lines: Sequence[int]
-    configuration: IntArray
-    targets: Sequence[str]
-    reference: NDArray[np.bool_]
-    position: Array
+    source: str  #: The file, for messages.
+    lines: Sequence[int]  #: Line of each reading.
+    configuration: IntArray  #: Index of its configuration, ``(readings,)``.
+    targets: Sequence[str]  #: Name of its target.
+    reference: NDArray[np.bool_]  #: Whether that is a reference point, ``(readings,)``.
+    position: Array  #: [m], ``(readings, 3)``, NaN where a coordinate is missing.
+    #: (w, x, y, z), ``(readings, 4)``, NaN where it is missing; None if the file has none.
     quaternion: Array | None = None
+    #: sigma, sigma_rot: declared standard deviations [m], [rad], ``(readings,)``, NaN where missing; None if there are
+    #: none.
     sigma: Array | None = None
     sigma_rot: Array | None = None
+    #: Name of the fixture that each is measured against, empty for none; None if the file names none.
     fixture: Sequence[str] | None = None
+    #: distance, height: from, or over, the fixture [m], ``(readings,)``, NaN where missing; None if the file has none.
     distance: Array | None = None
     height: Array | None = None
+    #: Which visit of its configuration each was taken on, ``(readings,)``; None if the file does not say.
     visit: IntArray | None = None
+    #: What the file calls its columns ``sigma``, ``sigma_rot`` and ``quaternion``, where that is something else.
     called: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -163,11 +124,9 @@ def dataset_of(readings: Readings, configurations: Configurations, order: IntArr
 
     A position or a quaternion of which a part is missing is missing. Quaternions are normalised.
 
-    Parameters
-    ----------
-    order
-        Number of each configuration in the order of measurement, ``(configurations,)``, each there once; None for what
-        the labels tell.
+    Args:
+        order: Number of each configuration in the order of measurement, ``(configurations,)``, each there once; None
+            for what the labels tell.
     """
     _refuse_both_roles(readings)
     if readings.reference.all():

@@ -19,23 +19,15 @@ def refuse_out_of_order(
 ) -> None:
     """Refuse samples of one cycle, or of one stream, of which a later one has no later time.
 
-    Parameters
-    ----------
-    source
-        The file.
-    time
-        Of each sample [s], ``(n,)``.
-    code
-        Whose cycle or stream it is, ``(n,)``.
-    order
-        Samples of one code together, each in the order of the file, ``(n,)``.
-    lines
-        In the file, ``(n,)``.
+    Args:
+        source: The file.
+        time: Of each sample [s], ``(n,)``.
+        code: Whose cycle or stream it is, ``(n,)``.
+        order: Samples of one code together, each in the order of the file, ``(n,)``.
+        lines: In the file, ``(n,)``.
 
-    Raises
-    ------
-    InputError
-        That names the two samples.
+    Raises:
+        InputError: That names the two samples.
     """
     step = np.diff(time[order])
     wrong = np.flatnonzero((np.diff(code[order]) == 0) & (step <= 0.0))

@@ -48,18 +48,10 @@ def is_workbook(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class Workbook:
-    """A workbook, once with the values of its formulas and once with the formulas.
+    """A workbook, once with the values of its formulas and once with the formulas."""
 
-    Attributes
-    ----------
-    path
-        The file.
-    values, formulas
-        What openpyxl made of it; both read their sheets when they are asked for.
-    """
-
-    path: Path
-    values: Any
+    path: Path  #: The file.
+    values: Any  #: values, formulas: what openpyxl made of it; both read their sheets when they are asked for.
     formulas: Any
 
     @property
@@ -122,19 +114,13 @@ def sheet_cells(book: Workbook, name: str | None, layout: Layout, entry: str) ->
 
     Rows without any content are skipped, and so are columns behind the last one with a name.
 
-    Parameters
-    ----------
-    name
-        Of the sheet; None for the only one.
-    layout
-        Its header and first row; the rest is of texts.
-    entry
-        Where the name of the sheet was given, for messages.
+    Args:
+        name: Of the sheet; None for the only one.
+        layout: Its header and first row; the rest is of texts.
+        entry: Where the name of the sheet was given, for messages.
 
-    Raises
-    ------
-    InputError
-        If it is no workbook, has no such sheet, a formula has no value, or cells of the table are merged.
+    Raises:
+        InputError: If it is no workbook, has no such sheet, a formula has no value, or cells of the table are merged.
     """
     title = _chosen(book, name, entry)
     with _readable(book.path):

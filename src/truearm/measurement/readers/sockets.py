@@ -27,18 +27,10 @@ _LENGTHS: Final = ("mm", "m", "um", "in")
 
 @dataclass(frozen=True)
 class Apart:
-    """How far apart two sockets are.
+    """How far apart two sockets are."""
 
-    Attributes
-    ----------
-    distance
-        Of the centres of a ball in them [m].
-    sigma
-        Its standard deviation [m].
-    """
-
-    distance: float
-    sigma: float
+    distance: float  #: Of the centres of a ball in them [m].
+    sigma: float  #: Its standard deviation [m].
 
     @classmethod
     def of_text(cls, text: str, parameter: str = "apart") -> Apart:
@@ -57,20 +49,14 @@ class Apart:
 def read_sockets(path: Path, apart: Apart, ball: float, sigma: float | None) -> Dataset:
     """Read a CSV with the columns ``configuration``, ``joint_1 [deg]`` .. (or ``axis_1`` ..) and ``socket``.
 
-    Parameters
-    ----------
-    apart
-        What is known of the sockets.
-    ball
-        Diameter of the ball [m].
-    sigma
-        How well the ball comes to rest in a socket, a standard deviation of each coordinate [m]; None if that is not
-        known.
+    Args:
+        apart: What is known of the sockets.
+        ball: Diameter of the ball [m].
+        sigma: How well the ball comes to rest in a socket, a standard deviation of each coordinate [m]; None if that is
+            not known.
 
-    Raises
-    ------
-    InputError
-        If there are not two sockets, or they are closer than the ball is large.
+    Raises:
+        InputError: If there are not two sockets, or they are closer than the ball is large.
     """
     if apart.distance < ball:
         raise InputError(

@@ -16,10 +16,8 @@ STOP_COLUMN: Final = re.compile(r"(?P<name>approach_[1-9][0-9]{0,3})\s*(?:\[(?P<
 def stops_in(cells: Cells, found: Configurations) -> Configurations | None:
     """Return the joint positions of these stops, counted as those of the configurations; None where there are none.
 
-    Raises
-    ------
-    InputError
-        If some columns are missing, have no unit or are there twice, or a cell cannot be used.
+    Raises:
+        InputError: If some columns are missing, have no unit or are there twice, or a cell cannot be used.
     """
     where = f"{cells.source}, line {cells.header}"
     there: dict[str, tuple[int, str]] = {}

@@ -42,24 +42,12 @@ from truearm.shown import counted
 
 @dataclass(frozen=True)
 class TableFiles:
-    """The files of a table.
+    """The files of a table."""
 
-    Attributes
-    ----------
-    table
-        The table itself.
-    mapping
-        Its mapping file, or the name of a preset.
-    content
-        What the mapping says.
-    joints
-        The second file that holds the joints; None if the table holds them.
-    """
-
-    table: Path
-    mapping: Path
-    content: MappingFile
-    joints: Path | None
+    table: Path  #: The table itself.
+    mapping: Path  #: Its mapping file, or the name of a preset.
+    content: MappingFile  #: What the mapping says.
+    joints: Path | None  #: The second file that holds the joints; None if the table holds them.
 
     @property
     def read(self) -> tuple[Path, ...]:
@@ -131,19 +119,13 @@ def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, jo
     the mapping, or beside the table if the mapping is a preset. With ``key`` it also gives the order of the
     configurations, and one that was not measured stays, as missing readings.
 
-    Parameters
-    ----------
-    mapping
-        The file, or the name of a preset.
-    joints_are
-        Whose joint positions they are; None for what the mapping says.
-    joints
-        The file of the joints; None for the one that the mapping names.
+    Args:
+        mapping: The file, or the name of a preset.
+        joints_are: Whose joint positions they are; None for what the mapping says.
+        joints: The file of the joints; None for the one that the mapping names.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be used, or the mapping says that the joint positions are another's.
+    Raises:
+        InputError: If a file cannot be used, or the mapping says that the joint positions are another's.
     """
     return read_with(_files(path, mapping, joints), joints_are)[0]
 
@@ -211,29 +193,15 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
 
 @dataclass(frozen=True, eq=False)
 class MappedRows:
-    """What the rows of a table hold, row by row; a row has as many readings as the mapping has entries of them.
+    """What the rows of a table hold, row by row; a row has as many readings as the mapping has entries of them."""
 
-    Attributes
-    ----------
-    cells
-        The rows, those to be skipped left out.
-    labels
-        Of each row's configuration, ``(rows,)``; None where every row is a configuration of its own.
-    targets
-        Of each reading, ``(readings,)``.
-    position
-        [m], ``(readings, 3)``, NaN where nothing is.
-    quaternion
-        (w, x, y, z) as the table has it, ``(readings, 4)``; None if there is none.
-    sigma, sigma_rot
-        Standard deviations [m], [rad], ``(readings,)``; None if the table has none.
-    """
-
-    cells: Cells
+    cells: Cells  #: The rows, those to be skipped left out.
+    #: Of each row's configuration, ``(rows,)``; None where every row is a configuration of its own.
     labels: tuple[str, ...] | None
-    targets: tuple[str, ...]
-    position: Array
-    quaternion: Array | None
+    targets: tuple[str, ...]  #: Of each reading, ``(readings,)``.
+    position: Array  #: [m], ``(readings, 3)``, NaN where nothing is.
+    quaternion: Array | None  #: (w, x, y, z) as the table has it, ``(readings, 4)``; None if there is none.
+    #: sigma, sigma_rot: standard deviations [m], [rad], ``(readings,)``; None if the table has none.
     sigma: Array | None
     sigma_rot: Array | None
 
@@ -241,10 +209,8 @@ class MappedRows:
 def mapped_rows(cells: Cells, content: MappingFile, mapping: Path) -> MappedRows:
     """Return what the rows of a table hold, whatever configurations there are.
 
-    Raises
-    ------
-    InputError
-        If a column is missing, or a cell cannot be what its column holds.
+    Raises:
+        InputError: If a column is missing, or a cell cannot be what its column holds.
     """
     named, labels, found = _named_rows(cells, content, mapping)
     return _mapped(named, labels, found, content, mapping)

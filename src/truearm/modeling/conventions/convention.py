@@ -15,21 +15,12 @@ JOINT: Final = "theta_offset"
 
 @dataclass(frozen=True)
 class Convention:
-    """The order of a link's elementary transforms.
+    """The order of a link's elementary transforms."""
 
-    Attributes
-    ----------
-    name
-        As robot files spell it.
-    link
-        Column name and motion of each transform, in order; the joint turns at ``theta_offset``.
-    optional
-        Columns that a link has only when its row gives them.
-    """
-
-    name: str
+    name: str  #: As robot files spell it.
+    #: Column name and motion of each transform, in order; the joint turns at ``theta_offset``.
     link: tuple[tuple[str, Motion], ...]
-    optional: tuple[str, ...] = ()
+    optional: tuple[str, ...] = ()  #: Columns that a link has only when its row gives them.
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -64,10 +55,8 @@ class Convention:
     def elements(self, number: int, row: Mapping[str, float], kind: JointKind) -> tuple[Element, ...]:
         """Build the elements of link `number` (from 1); its joint reads variable ``number - 1``.
 
-        Parameters
-        ----------
-        row
-            Nominal value of each column [m and rad]; absent columns are zero.
+        Args:
+            row: Nominal value of each column [m and rad]; absent columns are zero.
         """
         link = list(self.link)
         if kind == "prismatic" and self.slide not in self.columns:

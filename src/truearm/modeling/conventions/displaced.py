@@ -19,12 +19,9 @@ def closest(axis: Sequence[float]) -> int:
 def small_turns(number: int, axis: Sequence[float]) -> tuple[Element, ...]:
     """Return the turns that tilt an axis: without the one that lies closest to it, where the joint zero does the same.
 
-    Parameters
-    ----------
-    number
-        Of the link, for the names ``rx_i``, ``ry_i``, ``rz_i``.
-    axis
-        Unit vector in the frame of the turns.
+    Args:
+        number: Of the link, for the names ``rx_i``, ``ry_i``, ``rz_i``.
+        axis: Unit vector in the frame of the turns.
     """
     return tuple(
         Element(motion, parameter=f"r{motion[1]}_{number}") for k, motion in enumerate(_TURNS) if k != closest(axis)

@@ -50,12 +50,9 @@ def displaced_joint(
 ) -> tuple[Element, ...]:
     """Return the elements of a joint about an axis of the base frame, as given at zero joint positions.
 
-    Parameters
-    ----------
-    axis, point
-        Unit vector along the axis and a point of it [m], in the base frame.
-    zero
-        Column that is the joint's zero.
+    Args:
+        axis, point: Unit vector along the axis and a point of it [m], in the base frame.
+        zero: Column that is the joint's zero.
     """
     return (
         *slides_across(number, axis, point),

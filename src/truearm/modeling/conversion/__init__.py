@@ -62,11 +62,9 @@ def converted(robot: Robot, convention_name: str) -> Robot:
     left out too, because they are values of parameters that are no more. The robot's history says whether the base
     moved and what was left out.
 
-    Raises
-    ------
-    InputError
-        If there is no such convention, or the convention cannot describe the robot: axes that are nearly parallel
-        in a DH table or the S-model.
+    Raises:
+        InputError: If there is no such convention, or the convention cannot describe the robot: axes that are nearly
+            parallel in a DH table or the S-model.
     """
     if convention_name not in CONVERSIONS:
         raise InputError(

@@ -10,15 +10,8 @@ from truearm.modeling.chain import Array
 
 @dataclass(frozen=True)
 class Links:
-    """The links of a robot in another convention; what is left behind the last row becomes the flange.
+    """The links of a robot in another convention; what is left behind the last row becomes the flange."""
 
-    Attributes
-    ----------
-    rows
-        From base to flange [m and rad].
-    base
-        ``T_world_base`` ``(4, 4)`` of a convention whose base frame lies on the first axis; None if the base stays.
-    """
-
-    rows: tuple[Mapping[str, float], ...]
+    rows: tuple[Mapping[str, float], ...]  #: From base to flange [m and rad].
+    #: ``T_world_base`` ``(4, 4)`` of a convention whose base frame lies on the first axis; None if the base stays.
     base: Array | None = None

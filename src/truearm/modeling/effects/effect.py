@@ -21,24 +21,14 @@ Rates = Mapping[str, Mapping[int, Array]]
 
 @dataclass(frozen=True)
 class Layout:
-    """Which variables the chain of a robot has: its joints, two tilts behind each of them, and its lengths.
+    """Which variables the chain of a robot has: its joints, two tilts behind each of them, and its lengths."""
 
-    Attributes
-    ----------
-    kinds
-        Kind of each joint; variable i moves joint i, from 0.
-    lengths
-        Joint (from 0) and nominal value [m] of each slide of fixed length along the links.
-    transmission_periods
-        How often each joint's gear errs in a turn, None where that is not known; may be left out.
-    balancers
-        How many springs and gas cylinders relieve the joints.
-    """
-
-    kinds: tuple[JointKind, ...]
+    kinds: tuple[JointKind, ...]  #: Kind of each joint; variable i moves joint i, from 0.
+    #: Joint (from 0) and nominal value [m] of each slide of fixed length along the links.
     lengths: tuple[tuple[int, float], ...] = ()
+    #: How often each joint's gear errs in a turn, None where that is not known; may be left out.
     transmission_periods: tuple[int | None, ...] = ()
-    balancers: int = 0
+    balancers: int = 0  #: How many springs and gas cylinders relieve the joints.
 
     @property
     def joints(self) -> range:
@@ -69,45 +59,31 @@ class Layout:
 class Effect(ABC):
     """Small deflections of the joints: about or along their own axes, across them, or of the links' lengths.
 
-    Parameters
-    ----------
-    layout
-        The variables of the robot's chain.
-
-    Attributes
-    ----------
-    name
-        As files and models spell it; also the group of its parameters.
-    loaded, ordered, warmed
-        Whether it depends on loads, on the order in which configurations were reached, on the temperature.
-    tilts, stretches
-        Whether it tilts joints, or changes lengths.
-    non_negative
-        Whether its parameters are springs, plays or gaps: nobody may state a negative one, and one that a fit finds is
-        told.
-    kinematic
-        Whether it belongs to the kinematics of the rigid arm. Values far from nominal then mean another robot, other
-        units or another order of the joints.
-    selectable
-        Whether it is tried where cross-validation chooses the effects; others are left to those who ask for them.
-    part_of
-        Name of the effect that it says how something differs from: a model without that one would have it stand in for
-        it. Empty where there is none.
-    exportable
-        Whether the Python file of a robot computes it, see :mod:`truearm.modeling.formats.python_file`.
+    Args:
+        layout: The variables of the robot's chain.
     """
 
     layout: Layout
-    name: ClassVar[str]
+    name: ClassVar[str]  #: As files and models spell it; also the group of its parameters.
+    #: loaded, ordered, warmed: whether it depends on loads, on the order in which configurations were reached, on the
+    #: temperature.
     loaded: ClassVar[bool] = False
     ordered: ClassVar[bool] = False
     warmed: ClassVar[bool] = False
-    tilts: ClassVar[bool] = False
+    tilts: ClassVar[bool] = False  #: tilts, stretches: whether it tilts joints, or changes lengths.
     stretches: ClassVar[bool] = False
+    #: Whether its parameters are springs, plays or gaps: nobody may state a negative one, and one that a fit finds is
+    #: told.
     non_negative: ClassVar[bool] = False
+    #: Whether it belongs to the kinematics of the rigid arm. Values far from nominal then mean another robot, other
+    #: units or another order of the joints.
     kinematic: ClassVar[bool] = False
+    #: Whether it is tried where cross-validation chooses the effects; others are left to those who ask for them.
     selectable: ClassVar[bool] = True
+    #: Name of the effect that it says how something differs from: a model without that one would have it stand in for
+    #: it. Empty where there is none.
     part_of: ClassVar[str] = ""
+    #: Whether the Python file of a robot computes it, see :mod:`truearm.modeling.formats.python_file`.
     exportable: ClassVar[bool] = False
 
     @property
@@ -119,12 +95,9 @@ class Effect(ABC):
     def deflection(self, at: Postures, values: Mapping[str, float | Array]) -> Mapping[int, Array]:
         """Return what is added to each variable that it moves [rad or m], each ``(n,)`` or ``(trials, n)``.
 
-        Parameters
-        ----------
-        at
-            The postures, with their loads where the effect depends on them.
-        values
-            Parameter values, each a number or ``(trials, 1)``.
+        Args:
+            at: The postures, with their loads where the effect depends on them.
+            values: Parameter values, each a number or ``(trials, 1)``.
         """
 
     @abstractmethod

@@ -53,21 +53,16 @@ class BalancerEntry(BaseModel):
     def balancer(self, number: int, links: int, length: str, where: str) -> Balancer:
         """Return the balancer that the entry describes.
 
-        Parameters
-        ----------
-        number
-            Of the balancer, from 1.
-        links
-            How many links the robot has.
-        length
-            Unit of the file's lengths. Force is in N, stiffness in N/mm, pressure in bar and area in mm^2, always.
-        where
-            Names the entry in messages.
+        Args:
+            number: Of the balancer, from 1.
+            links: How many links the robot has.
+            length: Unit of the file's lengths. Force is in N, stiffness in N/mm, pressure in bar and area in mm^2,
+                always.
+            where: Names the entry in messages.
 
-        Raises
-        ------
-        InputError
-            If a link is none, both anchors are on one link, or the force is not stated, or stated twice, or absurd.
+        Raises:
+            InputError: If a link is none, both anchors are on one link, or the force is not stated, or stated twice, or
+                absurd.
         """
         anchors = []
         for name, entry in (("fixed", self.fixed), ("moving", self.moving)):
@@ -129,15 +124,11 @@ class BalancerEntry(BaseModel):
 def check_anchors(robot: Robot, where: str) -> None:
     """Refuse a balancer whose anchors are one point, or one of whose anchors lies on the axis it should relieve.
 
-    Parameters
-    ----------
-    where
-        Names the robot file in messages.
+    Args:
+        where: Names the robot file in messages.
 
-    Raises
-    ------
-    InputError
-        Naming the balancer.
+    Raises:
+        InputError: Naming the balancer.
     """
     for number, balancer in enumerate(robot.balancers, 1):
         here = f"{where}, balancers[{number}]"

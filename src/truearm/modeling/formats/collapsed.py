@@ -12,13 +12,10 @@ from truearm.modeling.robot import Robot
 def collapsed(robot: Robot) -> tuple[list[Array], list[Array]]:
     """Return the constant transforms around the joint variables of `robot`, each ``(4, 4)``.
 
-    Returns
-    -------
-    origins
-        From one joint variable to the next, from the base on and to the flange at last. A joint's own value
-        (its zero) belongs to the one before it, because the joint turns about that very axis.
-    behind
-        From each joint variable to the end of its link, in whose frame its centre of gravity is given.
+    Returns:
+        origins: From one joint variable to the next, from the base on and to the flange at last. A joint's own value
+            (its zero) belongs to the one before it, because the joint turns about that very axis.
+        behind: From each joint variable to the end of its link, in whose frame its centre of gravity is given.
     """
     origins, behind = [], []
     pending: list[Element] = []

@@ -106,20 +106,14 @@ class ControllerEntry(BaseModel):
     def controller(self, joints: Sequence[Joint], length: str, angle: str, where: str) -> Controller:
         """Return the controller that the entry describes.
 
-        Parameters
-        ----------
-        joints
-            Of the robot.
-        length, angle
-            Units of the file.
-        where
-            Names the entry in messages.
+        Args:
+            joints: Of the robot.
+            length, angle: Units of the file.
+            where: Names the entry in messages.
 
-        Raises
-        ------
-        InputError
-            If a joint is not one of the robot's or stands there twice, its pulses are those of another kind of joint,
-            it is coupled with itself or with a joint of another kind, or the couplings cannot be undone.
+        Raises:
+            InputError: If a joint is not one of the robot's or stands there twice, its pulses are those of another kind
+                of joint, it is coupled with itself or with a joint of another kind, or the couplings cannot be undone.
         """
         numbers = {joint.name: number for number, joint in enumerate(joints, 1)}
         counted: dict[int, CountedJoint] = {}

@@ -20,17 +20,12 @@ from truearm.modeling.robot import Robot
 def with_controller_kinematics(robot: Robot, said: str, folder: Path) -> Robot:
     """Return a robot with what its controller computes with.
 
-    Parameters
-    ----------
-    said
-        ``nominal``, ``proprietary``, ``unknown`` or the name of a file.
-    folder
-        Where such a file lies if its name is no whole path.
+    Args:
+        said: ``nominal``, ``proprietary``, ``unknown`` or the name of a file.
+        folder: Where such a file lies if its name is no whole path.
 
-    Raises
-    ------
-    InputError
-        If it is none of the words and there is no such file, or the file is of another type of robot.
+    Raises:
+        InputError: If it is none of the words and there is no such file, or the file is of another type of robot.
     """
     kinematics = STATED.get(said)
     if kinematics is None:
@@ -52,14 +47,10 @@ def with_controller_kinematics(robot: Robot, said: str, folder: Path) -> Robot:
 def refuse_rows_of_another_type(robot: Robot, where: str) -> None:
     """Refuse rows of a controller that no arm of the robot's type has, as those of a file are refused.
 
-    Parameters
-    ----------
-    where
-        Names the rows in messages.
+    Args:
+        where: Names the rows in messages.
 
-    Raises
-    ------
-    InputError
-        With how far the flange or a link is from the nominal one; or if the robot is of another kind.
+    Raises:
+        InputError: With how far the flange or a link is from the nominal one; or if the robot is of another kind.
     """
     refuse_far(controller_robot(robot), robot, where)

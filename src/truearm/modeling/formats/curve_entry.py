@@ -41,12 +41,9 @@ class CurveEntry(BaseModel):
 def curve_entries(known: Mapping[str, Parameter], joints: int) -> tuple[list[dict[str, object]], set[str]]:
     """Return the entries of the curves of a robot, in degrees, and the names of the parameters that they hold.
 
-    Parameters
-    ----------
-    known
-        Parameters that differ from the plain nominal ones.
-    joints
-        How many joints there are.
+    Args:
+        known: Parameters that differ from the plain nominal ones.
+        joints: How many joints there are.
     """
     made: list[dict[str, object]] = []
     held: set[str] = set()
@@ -80,20 +77,14 @@ def curve_parameters(
 ) -> dict[str, Parameter]:
     """Return the parameters that the entries of curves state.
 
-    Parameters
-    ----------
-    effect
-        Of the robot; None if it has no curves.
-    angle
-        Unit of angles in the file.
-    where
-        Names the file in messages.
+    Args:
+        effect: Of the robot; None if it has no curves.
+        angle: Unit of angles in the file.
+        where: Names the file in messages.
 
-    Raises
-    ------
-    InputError
-        If there is no such joint or term, one stands twice, a list has other numbers than it should, or one of them is
-        larger than any curve.
+    Raises:
+        InputError: If there is no such joint or term, one stands twice, a list has other numbers than it should, or one
+            of them is larger than any curve.
     """
     found: dict[str, Parameter] = {}
     for place, entry in enumerate(entries, 1):
@@ -152,10 +143,8 @@ def curve_parameters(
 def coefficient_si(value: float, unit: str, where: str, *, deviation: bool) -> float:
     """Return a coefficient of a curve, or its prior or `deviation`, in radians.
 
-    Raises
-    ------
-    InputError
-        If it is larger than any curve of a joint.
+    Raises:
+        InputError: If it is larger than any curve of a joint.
     """
     size = sized_si(value, unit, where, deviation=deviation)
     if abs(size) > _LARGEST:

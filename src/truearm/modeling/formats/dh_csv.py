@@ -58,10 +58,8 @@ def read_dh_csv(path: Path, convention_name: TableConvention) -> DHTable:
     order and unit, ``beta [deg]`` in a Hayati table, and ``type`` where a joint slides. Behind the rows the frames
     ``base`` and ``flange`` may stand, under the header ``frame,x [mm],y [mm],z [mm],qw,qx,qy,qz``.
 
-    Parameters
-    ----------
-    convention_name
-        The form the numbers are in; no table says it of itself.
+    Args:
+        convention_name: The form the numbers are in; no table says it of itself.
     """
     text = read_text(path)
     refuse_beyond("entries", text.count("\n") + text.count("\r") + text.count(","), where=str(path))

@@ -53,24 +53,12 @@ _REST: Final = 1e-12
 
 @dataclass(frozen=True)
 class DHRow:
-    """A joint's row; the joint variable is added to `theta_offset`, or to `d` where it slides.
+    """A joint's row; the joint variable is added to `theta_offset`, or to `d` where it slides."""
 
-    Attributes
-    ----------
-    joint
-        Name of the joint.
-    kind
-        ``revolute`` or ``prismatic``.
-    a, d
-        [m].
-    alpha, theta_offset, beta
-        [rad]; beta is that of a Hayati table.
-    """
-
-    joint: str
-    kind: JointKind
-    a: float
-    alpha: float
+    joint: str  #: Name of the joint.
+    kind: JointKind  #: ``revolute`` or ``prismatic``.
+    a: float  #: a, d: [m].
+    alpha: float  #: alpha, theta_offset, beta: [rad]; beta is that of a Hayati table.
     d: float
     theta_offset: float
     beta: float = 0.0
@@ -78,24 +66,13 @@ class DHRow:
 
 @dataclass(frozen=True)
 class DHTable:
-    """A robot as ``base``, then one link for each row, then ``flange``.
+    """A robot as ``base``, then one link for each row, then ``flange``."""
 
-    Attributes
-    ----------
-    convention_name
-        ``standard-dh``, ``modified-dh`` or ``hayati``: the order in which a row's transforms stand.
-    rows
-        From base to flange.
-    base
-        From the world to the first row.
-    flange
-        From the last row to the flange.
-    """
-
+    #: ``standard-dh``, ``modified-dh`` or ``hayati``: the order in which a row's transforms stand.
     convention_name: TableConvention
-    rows: tuple[DHRow, ...]
-    base: Transform
-    flange: Transform
+    rows: tuple[DHRow, ...]  #: From base to flange.
+    base: Transform  #: From the world to the first row.
+    flange: Transform  #: From the last row to the flange.
 
     def joints(self) -> tuple[Joint, ...]:
         """Return the rows as joints of a robot of this convention."""
@@ -109,10 +86,8 @@ def dh_table(robot: Robot, convention_name: DHConvention) -> DHTable:
     The base frame of the table lies on the first axis, where that is nearest to the robot's base, and its x
     axis is as near to the base's as can be; for most robots it is the base itself.
 
-    Parameters
-    ----------
-    convention_name
-        ``standard-dh`` or ``modified-dh``.
+    Args:
+        convention_name: ``standard-dh`` or ``modified-dh``.
     """
     axes = _axes(robot)
     base, flange = base_and_flange(robot)

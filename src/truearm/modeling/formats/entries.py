@@ -42,10 +42,8 @@ Name = Annotated[str, StringConstraints(strict=True), AfterValidator(_name)]
 def checksum(text: str) -> str:
     """Return a text that tells the kinematics of controllers apart, as it is printed: one line, and short.
 
-    Raises
-    ------
-    InputError
-        If it is another text.
+    Raises:
+        InputError: If it is another text.
     """
     if not is_one_line(text) or len(text) > LONGEST_CHECKSUM:
         raise InputError(

@@ -26,39 +26,25 @@ from truearm.units import from_si, to_si
 
 @dataclass(frozen=True)
 class Export:
-    """A robot in another format.
+    """A robot in another format."""
 
-    Attributes
-    ----------
-    text
-        Content of the file.
-    frames
-        Which frames its numbers refer to.
-    left_out
-        What it cannot hold, one sentence each.
-    """
-
-    text: str
-    frames: str
-    left_out: tuple[str, ...]
+    text: str  #: Content of the file.
+    frames: str  #: Which frames its numbers refer to.
+    left_out: tuple[str, ...]  #: What it cannot hold, one sentence each.
 
 
 def exported(robot: Robot, format_: str) -> Export:
     """Return a robot, nominal or calibrated, in another format.
 
-    Parameters
-    ----------
-    format_
-        ``dh`` (standard DH table), ``mdh`` (modified DH table), ``hayati`` (standard DH table with beta between nearly
-        parallel axes), ``urdf``, ``json`` (everything, schema ``truearm-model/1``), ``python`` (a module for forward
-        and inverse kinematics that needs only NumPy) or ``ur-kinematics`` (the kinematics file of the ROS driver of
-        Universal Robots).
+    Args:
+        format_: ``dh`` (standard DH table), ``mdh`` (modified DH table), ``hayati`` (standard DH table with beta
+            between nearly parallel axes), ``urdf``, ``json`` (everything, schema ``truearm-model/1``), ``python`` (a
+            module for forward and inverse kinematics that needs only NumPy) or ``ur-kinematics`` (the kinematics file
+            of the ROS driver of Universal Robots).
 
-    Raises
-    ------
-    InputError
-        If there is no such format, or it cannot describe the robot: axes that are nearly parallel in a DH table, a
-        prismatic joint without limits in a URDF.
+    Raises:
+        InputError: If there is no such format, or it cannot describe the robot: axes that are nearly parallel in a DH
+            table, a prismatic joint without limits in a URDF.
     """
     if format_ not in FORMATS:
         raise InputError(

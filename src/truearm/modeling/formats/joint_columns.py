@@ -23,10 +23,8 @@ JOINT_COLUMN: Final = re.compile(r"(joint|axis)_([1-9][0-9]{0,3})")
 def joint_names(names: Iterable[str], where: str) -> tuple[JointsOf, list[str]]:
     """Return whose joint positions the columns of a file hold, and those columns in their order.
 
-    Raises
-    ------
-    InputError
-        If there are columns of both kinds, or none, or a number is missing.
+    Raises:
+        InputError: If there are columns of both kinds, or none, or a number is missing.
     """
     found = sorted((int(match[2]), match[1]) for name in names if (match := JOINT_COLUMN.fullmatch(name)))
     kinds = dict.fromkeys(kind for _, kind in found)
@@ -60,14 +58,10 @@ def counting(robot: Robot, joints_are: JointsOf) -> Controller | None:
 def joint_headings(joints: Sequence[Joint], controller: Controller | None = None, name: str | None = None) -> list[str]:
     """Return the names of the columns of joint positions, with their units.
 
-    Parameters
-    ----------
-    joints
-        Of the robot.
-    controller
-        Who shows them; None for the model's.
-    name
-        What they are called before their numbers, ``joint`` or ``axis`` if None.
+    Args:
+        joints: Of the robot.
+        controller: Who shows them; None for the model's.
+        name: What they are called before their numbers, ``joint`` or ``axis`` if None.
     """
     called = name or COLUMN["model" if controller is None else "controller"]
     return [f"{called}_{number} [{unit}]" for number, unit in enumerate(_units(joints), 1)]

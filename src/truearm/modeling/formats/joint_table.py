@@ -18,14 +18,10 @@ def joints_csv(
 ) -> str:
     """Return solutions as CSV, one row a pose and branch, joints in deg or mm.
 
-    Parameters
-    ----------
-    labels
-        Name of each pose.
-    joints
-        Of the robot.
-    controller
-        Who shows the joint positions, ``axis_i``; None for the model's, ``joint_i``.
+    Args:
+        labels: Name of each pose.
+        joints: Of the robot.
+        controller: Who shows the joint positions, ``axis_i``; None for the model's, ``joint_i``.
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

@@ -32,10 +32,8 @@ Row = tuple[float, ...]
 def python_text(robot: Robot, comments: Sequence[str]) -> str:
     """Return a Python module with ``forward`` and ``inverse`` of a robot whose world is its base frame.
 
-    Parameters
-    ----------
-    comments
-        What the module says of itself, one line each.
+    Args:
+        comments: What the module says of itself, one line each.
     """
     source = resources.files("truearm.modeling.formats").joinpath("python_template.py").read_text("utf-8")
     lines = source.split("\n")

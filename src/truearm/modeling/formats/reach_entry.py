@@ -25,19 +25,13 @@ class ReachEntry(BaseModel):
     def reach(self, joints: int, length: str, where: str) -> Reach:
         """Return the reach that the entry describes.
 
-        Parameters
-        ----------
-        joints
-            How many the robot has.
-        length
-            Unit of the file.
-        where
-            Names the entry in messages.
+        Args:
+            joints: How many the robot has.
+            length: Unit of the file.
+            where: Names the entry in messages.
 
-        Raises
-        ------
-        InputError
-            If the robot has no such axis, or one of axis and point is missing.
+        Raises:
+            InputError: If the robot has no such axis, or one of axis and point is missing.
         """
         distance = sized_si(self.distance, length, f"{where}.distance")
         if self.axis is None and self.to is None:

@@ -19,12 +19,9 @@ _SAME_FRAME: Final = 1e-9
 def left_out(robot: Robot, format_: str, held: Collection[str] = ()) -> list[str]:
     """Say what of a robot a file cannot hold: joint effects, balancers, the place of the base, targets.
 
-    Parameters
-    ----------
-    format_
-        What the file is, as a sentence begins: ``A URDF``.
-    held
-        Names of the joint effects that it holds after all; with that of balancers the balancers themselves.
+    Args:
+        format_: What the file is, as a sentence begins: ``A URDF``.
+        held: Names of the joint effects that it holds after all; with that of balancers the balancers themselves.
     """
     said = []
     for effect in robot.effects:

@@ -59,11 +59,9 @@ def read_urdf(path: Path, tip: str | None = None) -> Robot:
     The base frame is the root link. A link's mass takes in the links fixed to it, on and off the chain; what
     moves off the chain, a gripper's fingers, is left out.
 
-    Parameters
-    ----------
-    tip
-        Link at the end of the chain. If None, the moving joints must lie on one path, and the end is the link
-        ``tool0`` or else ``flange`` fixed behind the last of them, or else that joint's own link.
+    Args:
+        tip: Link at the end of the chain. If None, the moving joints must lie on one path, and the end is the link
+            ``tool0`` or else ``flange`` fixed behind the last of them, or else that joint's own link.
     """
     content = read_bytes(path)
     tree = read_tree(content, str(path))
@@ -103,12 +101,9 @@ def _controller(tree: Tree, last: str, end: str) -> Controller:
     There ``base`` is the base frame of the controller, fixed to the root, and ``tool0`` its tool that is all zeros (ROS
     REP 199, draft). How it counts the joints is not said: FANUC's and ABB's drivers change that.
 
-    Parameters
-    ----------
-    last
-        Link behind the last moving joint.
-    end
-        Of the chain.
+    Args:
+        last: Link behind the last moving joint.
+        end: Of the chain.
     """
     bases, tools = dict(tree.fixed_behind(tree.root)), dict(tree.fixed_behind(last))
     if "base" not in bases or "tool0" not in tools or end not in tools:
@@ -123,15 +118,11 @@ def _controller(tree: Tree, last: str, end: str) -> Controller:
 def calibrated_urdf(source: bytes, robot: Robot) -> tuple[bytes, list[str]]:
     """Return the URDF that `robot` was read from with its calibrated geometry and joint zeros.
 
-    Parameters
-    ----------
-    source
-        Content of the file the robot was read from. All its bytes stay but the numbers that change.
+    Args:
+        source: Content of the file the robot was read from. All its bytes stay but the numbers that change.
 
-    Returns
-    -------
-    content, left_out
-        The new file, and in words what a URDF cannot hold.
+    Returns:
+        content, left_out: The new file, and in words what a URDF cannot hold.
     """
     where = "the URDF to calibrate"
     tree = read_tree(source, where)
@@ -156,22 +147,12 @@ def calibrated_urdf(source: bytes, robot: Robot) -> tuple[bytes, list[str]]:
 
 @dataclass(frozen=True)
 class _Link:
-    """A moving joint of the chain.
-
-    Attributes
-    ----------
-    prefix
-        From the link behind the moving joint before to this joint's parent link, ``(4, 4)``.
-    rpy
-        Angles of the joint's own origin [rad].
-    row
-        Row of convention ``urdf``: prefix and origin in one.
-    """
+    """A moving joint of the chain."""
 
     joint: UrdfJoint
-    prefix: Array
-    rpy: Triple
-    row: Mapping[str, float]
+    prefix: Array  #: From the link behind the moving joint before to this joint's parent link, ``(4, 4)``.
+    rpy: Triple  #: Angles of the joint's own origin [rad].
+    row: Mapping[str, float]  #: Row of convention ``urdf``: prefix and origin in one.
     limits: tuple[float, float] | None
 
     @property

@@ -23,10 +23,8 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     Links are ``base_link``, ``link_1`` ... and ``tool0``. The constant transforms between two joint variables
     are multiplied into one origin. The base link is the base frame: where it stands in the world is left out.
 
-    Returns
-    -------
-    text, left_out
-        The file, and in words what a URDF cannot hold or the robot does not say.
+    Returns:
+        text, left_out: The file, and in words what a URDF cannot hold or the robot does not say.
     """
     names = [*(joint.name for joint in robot.joints), "tool0_joint"]
     for name in names:

@@ -47,14 +47,10 @@ _SINGULAR: Final = 0.01
 class BranchSearch:
     """The search for the branches of poses on the calibrated arm.
 
-    Parameters
-    ----------
-    task
-        The poses, with their whole orientation.
-    seed, turned
-        Joint positions to stay near to, and what they turn the joints by [rad], ``(n, 6)`` each.
-    rule, form
-        Names and closed form of the robot's branches.
+    Args:
+        task: The poses, with their whole orientation.
+        seed, turned: Joint positions to stay near to, and what they turn the joints by [rad], ``(n, 6)`` each.
+        rule, form: Names and closed form of the robot's branches.
     """
 
     def __init__(self, task: PoseTask, seed: Array, turned: Array, rule: BranchRule, form: ClosedForm) -> None:

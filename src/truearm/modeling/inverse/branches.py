@@ -86,15 +86,9 @@ def joint_axes(kinematics: ForwardKinematics) -> list[Line]:
 
 @dataclass(frozen=True)
 class BranchRule:
-    """How the branches of one arm are told apart.
+    """How the branches of one arm are told apart."""
 
-    Attributes
-    ----------
-    shoulder, elbow, wrist
-        The sign, 1 or -1, of the expression that means front, up and noflip.
-    """
-
-    shoulder: float
+    shoulder: float  #: shoulder, elbow, wrist: the sign, 1 or -1, of the expression that means front, up and noflip.
     elbow: float
     wrist: float
 

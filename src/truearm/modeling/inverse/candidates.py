@@ -19,31 +19,19 @@ REACHED: Final = 1e-9
 class Candidates:
     """Joints found for the poses of a task, in as many ways as were tried.
 
-    Parameters
-    ----------
-    task
-        The poses.
-    seed
-        Joint positions that the answer of each pose shall lie near to [rad or m], ``(n, joints)``.
-    rule
-        Of the robot's branches, where they have names.
+    Args:
+        task: The poses.
+        seed: Joint positions that the answer of each pose shall lie near to [rad or m], ``(n, joints)``.
+        rule: Of the robot's branches, where they have names.
 
-    Attributes
-    ----------
-    pose
-        Index of the pose of each candidate, ``(candidates,)``; the other arrays have the same first axis.
-    joints
-        Joint positions [rad or m], in the turn nearest to the seed within the limits.
-    variables
-        What the joint positions turn the joints by, with tilts [rad or m], ``(joints or more, candidates)``.
-    position_error, orientation_error
-        [m], [rad]; 0 where the orientation is free.
-    reached
-        Whether both are zero within 1e-9.
-    beyond
-        Which joints are beyond their limits.
-    number
-        Of the branch; -1 without names.
+    Attributes:
+        pose: Index of the pose of each candidate, ``(candidates,)``; the other arrays have the same first axis.
+        joints: Joint positions [rad or m], in the turn nearest to the seed within the limits.
+        variables: What the joint positions turn the joints by, with tilts [rad or m], ``(joints or more, candidates)``.
+        position_error, orientation_error: [m], [rad]; 0 where the orientation is free.
+        reached: Whether both are zero within 1e-9.
+        beyond: Which joints are beyond their limits.
+        number: Of the branch; -1 without names.
     """
 
     def __init__(self, task: PoseTask, seed: Array, rule: BranchRule | None) -> None:
@@ -61,14 +49,10 @@ class Candidates:
     def add(self, pose: NDArray[np.intp], starts: Array, *, bold: bool = False, most: int = MOST_STEPS) -> None:
         """Solve the poses with these indices and keep what comes out.
 
-        Parameters
-        ----------
-        starts
-            What the joints have turned by [rad or m], ``(candidates, joints)``.
-        bold
-            Whether steps need not come nearer.
-        most
-            Steps at most.
+        Args:
+            starts: What the joints have turned by [rad or m], ``(candidates, joints)``.
+            bold: Whether steps need not come nearer.
+            most: Steps at most.
         """
         if not len(pose):
             return

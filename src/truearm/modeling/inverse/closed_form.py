@@ -31,29 +31,19 @@ _THREADS: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """What the joints of the nominal arm turn by to reach poses.
+    """What the joints of the nominal arm turn by to reach poses."""
 
-    Attributes
-    ----------
-    joints
-        [rad], ``(n, 8, 6)``; NaN where a pose has fewer solutions.
-    nearest
-        Whether the nominal arm only comes near to the pose in this way (a least-squares solution), ``(n, 8)``.
-    """
-
-    joints: Array
+    joints: Array  #: [rad], ``(n, 8, 6)``; NaN where a pose has fewer solutions.
+    #: Whether the nominal arm only comes near to the pose in this way (a least-squares solution), ``(n, 8)``.
     nearest: NDArray[np.bool_]
 
 
 class ClosedForm:
     """The closed form of a robot's nominal arm.
 
-    Parameters
-    ----------
-    robot
-        One that has a :func:`~truearm.modeling.inverse.branches.branch_rule`.
-    target
-        The tip of the poses that will be asked for; the flange if None.
+    Args:
+        robot: One that has a :func:`~truearm.modeling.inverse.branches.branch_rule`.
+        target: The tip of the poses that will be asked for; the flange if None.
     """
 
     def __init__(self, robot: Robot, target: str | None) -> None:

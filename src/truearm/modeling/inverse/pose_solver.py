@@ -49,30 +49,14 @@ _DAMPING: Final = (1e-6, 1e12)
 
 @dataclass(frozen=True, eq=False)
 class PoseTask:
-    """Poses the tip of a robot shall have, in the world.
+    """Poses the tip of a robot shall have, in the world."""
 
-    Attributes
-    ----------
-    robot
-        With its parameter values and joint effects.
-    target
-        Name of the target that is the tip; the flange if None.
-    orientation
-        How much of the orientation counts.
-    position
-        [m], ``(3, n)``.
-    rotation
-        Columns of the rotation matrix, each ``(3, n)``.
-    length
-        Reach of the arm [m]: an error as long as this weighs as much as one of 1 rad.
-    """
-
-    robot: Robot
-    target: str | None
-    orientation: Orientation
-    position: Array
-    rotation: tuple[Array, Array, Array]
-    length: float
+    robot: Robot  #: With its parameter values and joint effects.
+    target: str | None  #: Name of the target that is the tip; the flange if None.
+    orientation: Orientation  #: How much of the orientation counts.
+    position: Array  #: [m], ``(3, n)``.
+    rotation: tuple[Array, Array, Array]  #: Columns of the rotation matrix, each ``(3, n)``.
+    length: float  #: Reach of the arm [m]: an error as long as this weighs as much as one of 1 rad.
 
     def of(self, rows: NDArray[np.intp]) -> PoseTask:
         """Return the task of some poses, which may be repeated."""
@@ -149,18 +133,10 @@ class PoseTask:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Where the steps of many poses ended.
+    """Where the steps of many poses ended."""
 
-    Attributes
-    ----------
-    variables
-        [rad or m], ``(joints or more, n)``.
-    error
-        As :meth:`PoseTask.error` gives it.
-    """
-
-    variables: Array
-    error: Array
+    variables: Array  #: [rad or m], ``(joints or more, n)``.
+    error: Array  #: As :meth:`PoseTask.error` gives it.
 
     @property
     def size(self) -> Array:
@@ -171,15 +147,11 @@ class Solved:
 def solve(task: PoseTask, starts: Array, *, bold: bool = False, most: int = MOST_STEPS) -> Solved:
     """Go from starts to the poses of a task, or as near to them as can be.
 
-    Parameters
-    ----------
-    starts
-        What the joints have turned by, for each pose [rad or m], ``(n, joints)``.
-    bold
-        Whether a step is taken even if the error grows, undamped. Along a bent valley near a singular posture that is
-        faster by far, and it ends anywhere if there is no solution.
-    most
-        Steps at most.
+    Args:
+        starts: What the joints have turned by, for each pose [rad or m], ``(n, joints)``.
+        bold: Whether a step is taken even if the error grows, undamped. Along a bent valley near a singular posture
+            that is faster by far, and it ends anywhere if there is no solution.
+        most: Steps at most.
     """
     part, now = task, task.variables(starts)
     found, damping = now.copy(), np.ones(len(starts))

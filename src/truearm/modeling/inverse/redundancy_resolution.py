@@ -28,14 +28,10 @@ from truearm.modeling.inverse.pose_solver import Orientation
 def chosen_rows(orientation: Orientation, rotation: Array, length: float) -> Array:
     """Return the matrix S ``(3, 5 or 6, 6)`` that chooses what counts of a twist.
 
-    Parameters
-    ----------
-    orientation
-        How much of the orientation counts.
-    rotation
-        The constant orientation, ``(3, 3)``: its x and y axes are those about which the z axis can lean.
-    length
-        Distance that weighs as much as 1 rad [m].
+    Args:
+        orientation: How much of the orientation counts.
+        rotation: The constant orientation, ``(3, 3)``: its x and y axes are those about which the z axis can lean.
+        length: Distance that weighs as much as 1 rad [m].
     """
     rows = np.eye(6)
     rows[:3] /= length
@@ -50,10 +46,8 @@ def jacobian_rates(turning: Array, columns: Array) -> Array:
     With the Jacobian ``(n, 6, joints)`` for both it is the derivative itself. With the Jacobian's derivative by time
     once for the one and once for the other, the sum is its derivative by time.
 
-    Returns
-    -------
-    rates
-        ``(n, 6, joints, joints)``: row, column, joint that moves.
+    Returns:
+        rates: ``(n, 6, joints, joints)``: row, column, joint that moves.
     """
     w, v, u = (part.swapaxes(1, 2)[:, None] for part in (turning[:, 3:], columns[:, :3], columns[:, 3:]))
     w = w.swapaxes(1, 2)  # (n, mover, 1, 3) against (n, 1, column, 3)
@@ -69,16 +63,11 @@ def jacobian_rates(turning: Array, columns: Array) -> Array:
 def step(S: Array, J: Array, away: Array, error: Array) -> Array:
     """Return Newton's step towards the pose, and to the reference posture among the joint positions that give it.
 
-    Parameters
-    ----------
-    S
-        ``(rows, 6)``.
-    J
-        Geometric Jacobian, ``(n, 6, joints)``.
-    away
-        Joint positions less reference posture, ``(n, joints)``.
-    error
-        What is missing of the pose, ``(n, rows)``.
+    Args:
+        S: ``(rows, 6)``.
+        J: Geometric Jacobian, ``(n, 6, joints)``.
+        away: Joint positions less reference posture, ``(n, joints)``.
+        error: What is missing of the pose, ``(n, rows)``.
     """
     A = S @ J
     pull = _multipliers(A, away)

@@ -50,43 +50,21 @@ class PoseStatus(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class JointSolutions:
-    """Joint positions for poses, one row a pose, or one a pose and branch where all branches were asked for.
+    """Joint positions for poses, one row a pose, or one a pose and branch where all branches were asked for."""
 
-    Attributes
-    ----------
-    poses
-        How many poses were asked for.
-    pose
-        Index of each row's pose, ascending, ``(rows,)``. Every pose has at least one row.
-    joints
-        Joint positions [rad or m], ``(rows, joints)``.
-    status
-        How each search ended.
-    branch
-        Name of the branch of each row; empty where the robot's branches have no names.
-    position_error
-        Distance from the pose asked for [m], ``(rows,)``.
-    orientation_error
-        Angle from it [rad], ``(rows,)``; between the z axes where only those count, NaN where no orientation does.
-    beyond
-        Which joint positions are beyond their limits, ``(rows, joints)``.
-    singular_value
-        How little the pose moves with a joint motion of norm 1, positions in reach lengths, ``(rows,)``. It is 0 in a
-        singular posture.
-    joint_names
-        As the robot has them.
-    """
-
-    poses: int
-    pose: NDArray[np.intp]
-    joints: Array
-    status: tuple[PoseStatus, ...]
-    branch: tuple[str, ...]
-    position_error: Array
+    poses: int  #: How many poses were asked for.
+    pose: NDArray[np.intp]  #: Index of each row's pose, ascending, ``(rows,)``. Every pose has at least one row.
+    joints: Array  #: Joint positions [rad or m], ``(rows, joints)``.
+    status: tuple[PoseStatus, ...]  #: How each search ended.
+    branch: tuple[str, ...]  #: Name of the branch of each row; empty where the robot's branches have no names.
+    position_error: Array  #: Distance from the pose asked for [m], ``(rows,)``.
+    #: Angle from it [rad], ``(rows,)``; between the z axes where only those count, NaN where no orientation does.
     orientation_error: Array
-    beyond: NDArray[np.bool_]
+    beyond: NDArray[np.bool_]  #: Which joint positions are beyond their limits, ``(rows, joints)``.
+    #: How little the pose moves with a joint motion of norm 1, positions in reach lengths, ``(rows,)``. It is 0 in a
+    #: singular posture.
     singular_value: Array
-    joint_names: tuple[str, ...]
+    joint_names: tuple[str, ...]  #: As the robot has them.
 
     def __repr__(self) -> str:
         counts = Counter(status.value for status in self.status)

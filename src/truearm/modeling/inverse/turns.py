@@ -34,10 +34,8 @@ def nearest_turns(robot: Robot, joints: Array, seed: Array) -> Array:
 
     Where no turn lies within the limits, the one that passes them least is taken.
 
-    Parameters
-    ----------
-    seed
-        ``(joints,)`` or ``(n, joints)`` [rad or m].
+    Args:
+        seed: ``(joints,)`` or ``(n, joints)`` [rad or m].
     """
     low, high = limits(robot)
     nearest = np.round((seed - joints) / _TURN)

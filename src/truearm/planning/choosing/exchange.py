@@ -31,24 +31,13 @@ _LEAST_GAIN: Final = 1e-9  # of the logarithm of the objective
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Measurements to choose from.
+    """Measurements to choose from."""
 
-    Attributes
-    ----------
-    rows
-        Derivatives of each by the parameters, per standard deviation, ``(candidates, rows, parameters)``.
-    known
-        Information that is there beforehand, ``(parameters, parameters)``, positive definite.
-    colouring
-        Factor of the information of an average choice, ``(parameters, parameters)``.
-    packed
-        Distinct entries of the information of each candidate on parameters that an average choice tells equally well,
-        where single precision is enough, ``(candidates, entries)``.
-    """
-
-    rows: Array
-    known: Array
-    colouring: Array
+    rows: Array  #: Derivatives of each by the parameters, per standard deviation, ``(candidates, rows, parameters)``.
+    known: Array  #: Information that is there beforehand, ``(parameters, parameters)``, positive definite.
+    colouring: Array  #: Factor of the information of an average choice, ``(parameters, parameters)``.
+    #: Distinct entries of the information of each candidate on parameters that an average choice tells equally well,
+    #: where single precision is enough, ``(candidates, entries)``.
     packed: NDArray[np.float32]
 
     @classmethod
@@ -84,22 +73,15 @@ class Candidates:
 def most_informative(rows: Array, count: int, known: Array, objective: Objective) -> list[int]:
     """Return the indices of `count` measurements that together tell most.
 
-    Parameters
-    ----------
-    rows
-        Derivatives of each possible measurement by the parameters, per standard deviation,
-        ``(candidates, rows, parameters)``.
-    count
-        How many to choose.
-    known
-        Information that is there beforehand, ``(parameters, parameters)``, positive definite.
-    objective
-        What is made large.
+    Args:
+        rows: Derivatives of each possible measurement by the parameters, per standard deviation, ``(candidates, rows,
+            parameters)``.
+        count: How many to choose.
+        known: Information that is there beforehand, ``(parameters, parameters)``, positive definite.
+        objective: What is made large.
 
-    Raises
-    ------
-    InputError
-        If there are fewer candidates.
+    Raises:
+        InputError: If there are fewer candidates.
     """
     _refuse_too_many(count, len(rows))
     return _chosen(Candidates.of(rows, known, count), count, objective)
@@ -110,15 +92,11 @@ def most_informative_number(rows: Array, known: Array) -> list[int]:
 
     One is added, taken away or exchanged as long as the index rises (Nubiola, section 2.5.2).
 
-    Parameters
-    ----------
-    rows, known
-        As for :func:`most_informative`.
+    Args:
+        rows, known: As for :func:`most_informative`.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than 11 candidates.
+    Raises:
+        InputError: If there are fewer than 11 candidates.
     """
     _refuse_too_many(FIRST, len(rows))
     objective = O1()

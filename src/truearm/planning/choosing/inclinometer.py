@@ -34,20 +34,11 @@ CANDIDATES: Final = 1500
 
 @dataclass(frozen=True, eq=False)
 class TiltingPlan:
-    """What to measure before geometry is identified.
+    """What to measure before geometry is identified."""
 
-    Attributes
-    ----------
-    inclined
-        Pairs of postures for inclinometers.
-    posed
-        Pairs of postures for poses.
-    expected
-        Standard deviation that each constant of the joints will have [SI]; its prior for one that stays unknown.
-    """
-
-    inclined: Pairs
-    posed: Pairs
+    inclined: Pairs  #: Pairs of postures for inclinometers.
+    posed: Pairs  #: Pairs of postures for poses.
+    #: Standard deviation that each constant of the joints will have [SI]; its prior for one that stays unknown.
     expected: Mapping[str, float]
 
 
@@ -67,32 +58,20 @@ def plan_tilting(
 ) -> TiltingPlan:
     """Choose pairs of postures.
 
-    Parameters
-    ----------
-    robot
-        Nominal, with masses, limits and payload.
-    inclined, posed
-        Number of pairs for inclinometers and for poses.
-    force
-        Of a string or weight on the flange [N], along or against x, y or z of the base; 0 leaves gravity alone.
-    move
-        How far joints move within a pair at most [rad]; 0 keeps the joint positions and changes the load only. Poses
-        are always compared at the same joint positions.
-    axes
-        Which axes of each link its inclinometer has: 0, 1 and 2 for x, y and z.
-    candidates
-        Pairs to draw and to choose from.
-    deviation
-        Standard deviation of a change of inclination [rad].
-    pose_deviation
-        Standard deviation of a coordinate of the flange's position [m].
-    finder
-        What the arm keeps clear of in every posture; None for nothing.
+    Args:
+        robot: Nominal, with masses, limits and payload.
+        inclined, posed: Number of pairs for inclinometers and for poses.
+        force: Of a string or weight on the flange [N], along or against x, y or z of the base; 0 leaves gravity alone.
+        move: How far joints move within a pair at most [rad]; 0 keeps the joint positions and changes the load only.
+            Poses are always compared at the same joint positions.
+        axes: Which axes of each link its inclinometer has: 0, 1 and 2 for x, y and z.
+        candidates: Pairs to draw and to choose from.
+        deviation: Standard deviation of a change of inclination [rad].
+        pose_deviation: Standard deviation of a coordinate of the flange's position [m].
+        finder: What the arm keeps clear of in every posture; None for nothing.
 
-    Raises
-    ------
-    InputError
-        If nothing may differ within a pair, or too few postures decide to which side the joints tilt.
+    Raises:
+        InputError: If nothing may differ within a pair, or too few postures decide to which side the joints tilt.
     """
     if not (force >= 0.0 and move >= 0.0 and (move > 0.0 or force > 0.0)):
         raise InputError(

@@ -42,72 +42,36 @@ _FEWEST_ELSEWHERE: Final = 50
 
 @dataclass(frozen=True, eq=False)
 class MeasurementPlan:
-    """Configurations to measure, in the order in which to measure them.
+    """Configurations to measure, in the order in which to measure them."""
 
-    Attributes
-    ----------
-    robot
-        With the targets that are measured.
-    model
-        What will be identified.
-    objective
-        ``O1`` to ``O5``, or ``error``.
-    labels
-        Name of each configuration.
-    chosen
-        Indices among the candidates, ``(n,)``.
-    joints
-        Readings [rad or m], ``(n, joints)``.
-    before
-        Where each joint stops before, so that all come to a configuration moving forward and backlash cancels; as
-        far as the limits allow, those of the constraints too, ``(n, joints)``; None where it does not stop there.
-    indices
-        O1 to O5 of the whole.
-    candidates
-        How many configurations there were to choose from, before constraints.
-    rejected
-        How many of them break each constraint; one may break several.
-    usable
-        How many break none.
-    left_out
-        Parameters that the candidates do not tell from others, or hardly at all.
-    seconds
-        Processor time of the search alone.
-    prediction
-        How accurate the calibration will be.
-    reads
-        What the device reads at each configuration, in words; nothing if no device was named.
-    fixtures
-        Where fixtures stand in the base frame [m], ``(3,)`` each; of a plane the foot of its distance from the origin.
-    drawn
-        How the candidates were drawn; None if they were given, or are a device's.
-    among
-        The usable candidates [rad or m], ``(usable, joints)``.
-    """
-
-    robot: Robot
-    model: Model
-    objective: str
-    labels: tuple[str, ...]
-    chosen: NDArray[np.intp]
-    joints: Array
+    robot: Robot  #: With the targets that are measured.
+    model: Model  #: What will be identified.
+    objective: str  #: ``O1`` to ``O5``, or ``error``.
+    labels: tuple[str, ...]  #: Name of each configuration.
+    chosen: NDArray[np.intp]  #: Indices among the candidates, ``(n,)``.
+    joints: Array  #: Readings [rad or m], ``(n, joints)``.
+    #: Where each joint stops before, so that all come to a configuration moving forward and backlash cancels; as far as
+    #: the limits allow, those of the constraints too, ``(n, joints)``; None where it does not stop there.
     before: Array | None
-    indices: Mapping[str, float]
-    candidates: int
-    rejected: Mapping[str, int]
-    usable: int
-    left_out: tuple[str, ...]
-    seconds: float
-    prediction: Prediction
+    indices: Mapping[str, float]  #: O1 to O5 of the whole.
+    candidates: int  #: How many configurations there were to choose from, before constraints.
+    rejected: Mapping[str, int]  #: How many of them break each constraint; one may break several.
+    usable: int  #: How many break none.
+    left_out: tuple[str, ...]  #: Parameters that the candidates do not tell from others, or hardly at all.
+    seconds: float  #: Processor time of the search alone.
+    prediction: Prediction  #: How accurate the calibration will be.
+    #: What the device reads at each configuration, in words; nothing if no device was named.
     reads: tuple[str, ...] = ()
+    #: Where fixtures stand in the base frame [m], ``(3,)`` each; of a plane the foot of its distance from the origin.
     fixtures: Mapping[str, Array] = field(default_factory=dict)
-    drawn: Drawn | None = None
+    drawn: Drawn | None = None  #: How the candidates were drawn; None if they were given, or are a device's.
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:
         """``robot``, if it is for a robot that was calibrated with simulated measurements."""
         return self.robot.simulated_from
 
+    #: The usable candidates [rad or m], ``(usable, joints)``.
     among: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 
@@ -132,17 +96,12 @@ def driven_candidates(robot: Robot, count: int, rng: np.random.Generator, finder
 
     There are fewer than `count` if the cell leaves little room.
 
-    Parameters
-    ----------
-    robot
-        Whose configurations they are.
-    finder
-        What is kept clear, and the limits.
+    Args:
+        robot: Whose configurations they are.
+        finder: What is kept clear, and the limits.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises:
+        InputError: If there is none.
     """
     drawn = drawn_clear(finder, count, _approach(robot), rng)
     return _forward(drawn.joints), drawn
@@ -176,10 +135,9 @@ def device_candidates(
 ) -> tuple[Robot, Dataset, Postures]:
     """Return configurations that a device could measure.
 
-    Returns
-    -------
-    The robot where the device has it stand, with its tool; what the device would read of it without noise; and the
-    postures, each joint coming to them moving forward.
+    Returns:
+        The robot where the device has it stand, with its tool; what the device would read of it without noise; and the
+        postures, each joint coming to them moving forward.
     """
     seen = in_view_of(device, robot)
     readings = device.campaign(seen, _AsSaid(seen.rigid), count, 0.0, rng)
@@ -208,47 +166,31 @@ def plan_measurements(
 ) -> MeasurementPlan:
     """Choose configurations to measure.
 
-    Parameters
-    ----------
-    robot
-        Nominal or calibrated, with targets, see :func:`with_targets`; derivatives are taken at its parameter values.
-    candidates
-        To choose from.
-    model
-        What will be identified.
-    poses
-        How many; None lets O1 decide.
-    rng
-        For the prediction.
-    objective
-        ``O1`` to ``O5``; ``error`` for the mean square error where the robot shall be accurate.
-    accurate_at
-        Where that is; None for everywhere.
-    noise
-        Standard deviation of a coordinate about a well identified model [m].
-    labels
-        Names of the candidates; numbers in the order of measurement if None.
-    constraints, where
-        What a configuration must keep besides the robot's limits, and the file that says so, for messages.
-    seen_from_the_origin
-        Whether the instrument stands at the origin of the robot's world, as after a calibration.
-    readings
-        What a device would read at the candidates, see :func:`device_candidates`; None for the positions of all targets
-        at each.
-    finder
-        What the arm keeps clear of, at the candidates, on the ways to those that are chosen and where its accuracy is
-        predicted; None for nothing.
-    drawn
-        How the candidates were drawn, see :func:`driven_candidates`.
-    progress
-        Called with a few words at each step.
+    Args:
+        robot: Nominal or calibrated, with targets, see :func:`with_targets`; derivatives are taken at its parameter
+            values.
+        candidates: To choose from.
+        model: What will be identified.
+        poses: How many; None lets O1 decide.
+        rng: For the prediction.
+        objective: ``O1`` to ``O5``; ``error`` for the mean square error where the robot shall be accurate.
+        accurate_at: Where that is; None for everywhere.
+        noise: Standard deviation of a coordinate about a well identified model [m].
+        labels: Names of the candidates; numbers in the order of measurement if None.
+        constraints, where: What a configuration must keep besides the robot's limits, and the file that says so, for
+            messages.
+        seen_from_the_origin: Whether the instrument stands at the origin of the robot's world, as after a calibration.
+        readings: What a device would read at the candidates, see :func:`device_candidates`; None for the positions of
+            all targets at each.
+        finder: What the arm keeps clear of, at the candidates, on the ways to those that are chosen and where its
+            accuracy is predicted; None for nothing.
+        drawn: How the candidates were drawn, see :func:`driven_candidates`.
+        progress: Called with a few words at each step.
 
-    Raises
-    ------
-    InputError
-        If the objective is not known or does not decide on a number, too few candidates keep the constraints, or
-        there are fewer rows than parameters, candidates that were drawn are all alike, or there are ways to fewer
-        candidates than are chosen.
+    Raises:
+        InputError: If the objective is not known or does not decide on a number, too few candidates keep the
+            constraints, or there are fewer rows than parameters, candidates that were drawn are all alike, or there are
+            ways to fewer candidates than are chosen.
     """
     _check_objective(objective, poses, accurate_at)
     seen = model.prepared(robot)

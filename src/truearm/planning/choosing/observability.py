@@ -141,14 +141,9 @@ class OfInterest(Objective):
 
     That is the Schur complement (D_s-optimality: Atkinson, Donev and Tobias 2007, "Optimum experimental designs, with
     SAS", section 10.3).
-
-    Attributes
-    ----------
-    count
-        How many of the parameters, the first ones, are of interest.
     """
 
-    count: int
+    count: int  #: How many of the parameters, the first ones, are of interest.
 
     def value(self, information: Array) -> Array:
         """Return the logarithm of the determinant."""
@@ -168,14 +163,9 @@ class OfPredictions(Objective):
 
     That is the trace of the covariance times the mean information of the predictions (I- or V-optimality: Atkinson,
     Donev and Tobias 2007, "Optimum experimental designs, with SAS", section 10.6).
-
-    Attributes
-    ----------
-    weight
-        Mean of D' D over the predictions, D their derivatives by the parameters, ``(m, m)``.
     """
 
-    weight: Array
+    weight: Array  #: Mean of D' D over the predictions, D their derivatives by the parameters, ``(m, m)``.
 
     @classmethod
     def of(cls, rows: Array) -> OfPredictions:

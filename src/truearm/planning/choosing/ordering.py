@@ -22,17 +22,12 @@ def smallest_moves(joints: Array) -> Array:
 def all_moving_order(joints: Array, least_move: float) -> NDArray[np.intp]:
     """Return an order of configurations, in which all joints move if one was found.
 
-    Parameters
-    ----------
-    joints
-        ``(n, joints)``, one or more; the first stays the first.
-    least_move
-        What every joint shall move at least from one to the next [rad, or m].
+    Args:
+        joints: ``(n, joints)``, one or more; the first stays the first.
+        least_move: What every joint shall move at least from one to the next [rad, or m].
 
-    Returns
-    -------
-    order
-        Indices, ``(n,)``. Whether all joints move is for :func:`smallest_moves` of ``joints[order]`` to say.
+    Returns:
+        order: Indices, ``(n,)``. Whether all joints move is for :func:`smallest_moves` of ``joints[order]`` to say.
     """
     cost = _costs(joints, least_move)
     return _exchanged(_nearest_neighbours(cost), cost)

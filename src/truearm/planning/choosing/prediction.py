@@ -40,56 +40,27 @@ _MEAN_LENGTH: Final = math.sqrt(8.0 / math.pi)
 
 @dataclass(frozen=True, eq=False)
 class There:
-    """How far the model will be off where the robot is wanted to be accurate [m], without the noise of a reading.
+    """How far the model will be off where the robot is wanted to be accurate [m], without the noise of a reading."""
 
-    Attributes
-    ----------
-    places
-        Where the flange is, in the world, ``(k, 3)``.
-    error
-        Mean error of the targets there after the plan, ``(k,)``.
-    by_o1
-        The same after as many configurations that O1 chooses; None where the plan is O1's.
-    """
-
-    places: Array
-    error: Array
-    by_o1: Array | None
+    places: Array  #: Where the flange is, in the world, ``(k, 3)``.
+    error: Array  #: Mean error of the targets there after the plan, ``(k,)``.
+    by_o1: Array | None  #: The same after as many configurations that O1 chooses; None where the plan is O1's.
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Mean errors of positions that were not measured [m].
+    """Mean errors of positions that were not measured [m]."""
 
-    Attributes
-    ----------
-    floor
-        What no number of poses goes below: the noise of the reading that judges.
-    planned
-        Of the plan.
-    numbers
-        Numbers of poses.
-    chosen, random
-        Error after as many poses, chosen by O1 and drawn at random, ``(numbers,)``.
-    places
-        Where the flange is at random configurations, in the world, ``(k, 3)``.
-    error
-        Mean error of the targets there, of the model alone, without the noise of a reading, ``(k,)``.
-    there
-        The same where the robot is wanted to be accurate; None if nothing was said of that.
-    nominal
-        Mean error of the robot that is not calibrated, by the priors of what the model identifies of its joints, seen
-        from where base and targets are known [m].
-    """
-
-    floor: float
-    planned: float
-    numbers: NDArray[np.intp]
-    chosen: Array
+    floor: float  #: What no number of poses goes below: the noise of the reading that judges.
+    planned: float  #: Of the plan.
+    numbers: NDArray[np.intp]  #: Numbers of poses.
+    chosen: Array  #: chosen, random: error after as many poses, chosen by O1 and drawn at random, ``(numbers,)``.
     random: Array
-    places: Array
-    error: Array
-    there: There | None = None
+    places: Array  #: Where the flange is at random configurations, in the world, ``(k, 3)``.
+    error: Array  #: Mean error of the targets there, of the model alone, without the noise of a reading, ``(k,)``.
+    there: There | None = None  #: The same where the robot is wanted to be accurate; None if nothing was said of that.
+    #: Mean error of the robot that is not calibrated, by the priors of what the model identifies of its joints, seen
+    #: from where base and targets are known [m].
     nominal: float = 0.0
 
     @property
@@ -107,14 +78,10 @@ class Prediction:
 def variances(candidates: Sensitivity, measured: NDArray[np.intp], elsewhere: Sensitivity) -> Array:
     """Return the mean variance of a coordinate at each configuration elsewhere, in variances of the noise, ``(k,)``.
 
-    Parameters
-    ----------
-    candidates
-        What could be measured.
-    measured
-        Which of them are.
-    elsewhere
-        Where the model is judged, of the same parameters.
+    Args:
+        candidates: What could be measured.
+        measured: Which of them are.
+        elsewhere: Where the model is judged, of the same parameters.
     """
     known = candidates.known
     rows = candidates.rows[measured]
@@ -149,16 +116,11 @@ def predict(
 ) -> Prediction:
     """Predict the error after measuring the chosen candidates, and how it falls with their number.
 
-    Parameters
-    ----------
-    candidates
-        What could be measured.
-    chosen
-        What is.
-    elsewhere
-        The same at the configurations `q` where the model is judged.
-    noise
-        Standard deviation of a coordinate [m].
+    Args:
+        candidates: What could be measured.
+        chosen: What is.
+        elsewhere: The same at the configurations `q` where the model is judged.
+        noise: Standard deviation of a coordinate [m].
     """
     known = candidates.known
 

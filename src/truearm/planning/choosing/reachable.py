@@ -29,14 +29,10 @@ Indices = NDArray[np.intp]
 class Reachable:
     """Candidates as they are found to have a way from the safe configuration, or none.
 
-    Parameters
-    ----------
-    finder
-        Finds the ways.
-    joints
-        The candidates, ``(n, joints)`` [rad or m].
-    before
-        Where the arm stops right before each, ``(n, joints)``.
+    Args:
+        finder: Finds the ways.
+        joints: The candidates, ``(n, joints)`` [rad or m].
+        before: Where the arm stops right before each, ``(n, joints)``.
     """
 
     def __init__(self, finder: WayFinder, joints: Array, before: Array) -> None:
@@ -56,14 +52,10 @@ class Reachable:
     def with_straight_ways(self, at: Indices, wanted: int, progress: Callable[[str], None]) -> Indices:
         """Return those of candidates to which a way is known: all with straight ones, and others until it is enough.
 
-        Parameters
-        ----------
-        at
-            To choose from, in any order.
-        wanted
-            How many are chosen.
-        progress
-            Called with a few words at each step.
+        Args:
+            at: To choose from, in any order.
+            wanted: How many are chosen.
+            progress: Called with a few words at each step.
         """
         progress(f"looking which of {len(at)} configurations are driven to straight")
         check, left = self.finder.check, at[~(self.known | self.lost)[at]]
@@ -110,27 +102,18 @@ def chosen_with_ways(
 
     Those without a way are left out, and it is chosen again; after some rounds only those count whose ways are known.
 
-    Parameters
-    ----------
-    choose
-        Returns which of some candidates are best; it may refuse.
-    usable
-        Which candidates there are.
-    reachable
-        What is known of their ways; None for no need of any.
-    poses
-        How many are chosen at least.
-    progress
-        Called with a few words at each step.
+    Args:
+        choose: Returns which of some candidates are best; it may refuse.
+        usable: Which candidates there are.
+        reachable: What is known of their ways; None for no need of any.
+        poses: How many are chosen at least.
+        progress: Called with a few words at each step.
 
-    Returns
-    -------
-    Which are chosen; and how many were left out, by why.
+    Returns:
+        Which are chosen; and how many were left out, by why.
 
-    Raises
-    ------
-    InputError
-        If there are fewer with ways than are chosen, with what is in the way.
+    Raises:
+        InputError: If there are fewer with ways than are chosen, with what is in the way.
     """
     left = usable
     progress(f"choosing among {len(left)} configurations")

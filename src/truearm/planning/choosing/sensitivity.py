@@ -27,25 +27,16 @@ _LEVER: Final = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """Derivatives of readings by parameters in their sizes.
+    """Derivatives of readings by parameters in their sizes."""
 
-    Attributes
-    ----------
-    free
-        The model's parameters, base and targets among them.
-    size
-        Physical size of each parameter [SI]: its prior, and for base, targets and fixtures, whose priors are wide
-        because nobody measured them beforehand, that of geometry, 1 mm and 0.1 deg.
-    rows
-        Derivatives of the readings, in deviations of a reading per size, ``(configurations, rows, parameters)``. Three
-        rows are a target's coordinates, or a distance or height and two zeros.
-    beside
-        Information of what is known of fixtures, ``(parameters, parameters)``; None if nothing is.
-    """
-
-    free: FreeParameters
+    free: FreeParameters  #: The model's parameters, base and targets among them.
+    #: Physical size of each parameter [SI]: its prior, and for base, targets and fixtures, whose priors are wide
+    #: because nobody measured them beforehand, that of geometry, 1 mm and 0.1 deg.
     size: Array
+    #: Derivatives of the readings, in deviations of a reading per size, ``(configurations, rows, parameters)``. Three
+    #: rows are a target's coordinates, or a distance or height and two zeros.
     rows: Array
+    #: Information of what is known of fixtures, ``(parameters, parameters)``; None if nothing is.
     beside: Array | None = None
 
     @cached_property
@@ -71,24 +62,16 @@ def sensitivity(
 ) -> Sensitivity:
     """Return what the positions of all targets would tell.
 
-    Parameters
-    ----------
-    robot
-        With targets and the model's effects, see :meth:`truearm.identification.solving.models.Model.prepared`.
-    postures
-        Where it is read.
-    free
-        Which parameters are asked about.
-    noise
-        Standard deviation of a coordinate about a well identified model [m].
-    gauge
-        What does not count: where the base is, the size of everything
-        (:func:`truearm.identification.solving.redundancy.gauge_freedoms`).
+    Args:
+        robot: With targets and the model's effects, see :meth:`truearm.identification.solving.models.Model.prepared`.
+        postures: Where it is read.
+        free: Which parameters are asked about.
+        noise: Standard deviation of a coordinate about a well identified model [m].
+        gauge: What does not count: where the base is, the size of everything
+            (:func:`truearm.identification.solving.redundancy.gauge_freedoms`).
 
-    Raises
-    ------
-    InputError
-        If the robot has no targets, or an effect of the model needs to know more than the postures tell.
+    Raises:
+        InputError: If the robot has no targets, or an effect of the model needs to know more than the postures tell.
     """
     check_known(robot, postures)
     refuse_beyond(
@@ -111,14 +94,10 @@ def sensitivity(
 def sensitivity_of_readings(robot: Robot, data: Dataset, free: FreeParameters, noise: float) -> Sensitivity:
     """Return what the readings of a device would tell, whatever they are.
 
-    Parameters
-    ----------
-    robot
-        With its targets and the fixtures of the readings.
-    data
-        Readings; what they say does not matter. What is known of fixtures counts as known.
-    free, noise
-        As for :func:`sensitivity`; an angle counts as what it moves at a radius of 0.1 m.
+    Args:
+        robot: With its targets and the fixtures of the readings.
+        data: Readings; what they say does not matter. What is known of fixtures counts as known.
+        free, noise: As for :func:`sensitivity`; an angle counts as what it moves at a radius of 0.1 m.
     """
     check_known(robot, data.postures)
     kinds = {observation.name: noise for observation in OBSERVATIONS} | {"orientation": noise / _LEVER}

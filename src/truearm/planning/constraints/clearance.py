@@ -41,10 +41,8 @@ def skeleton(robot: Robot, q: Array | Postures) -> list[Array]:
 def smallest_clearance(robot: Robot, q: Array | Postures, near: float) -> Array:
     """Return the smallest distance between links that are not neighbours [m], ``(n,)``; infinite if there are none.
 
-    Parameters
-    ----------
-    near
-        Links that hang together by links shorter than this in all count as neighbours [m].
+    Args:
+        near: Links that hang together by links shorter than this in all count as neighbours [m].
     """
     segments, pairs = _apart(robot, q)
     smallest = np.full(segments[0][0].shape[0], np.inf)
@@ -60,20 +58,14 @@ def refuse_clearance(robot: Robot, clearance: float, low: Array, high: Array, wh
     Links whose connection is shorter than the clearance count as neighbours, so that a large one asks less than a small
     one does.
 
-    Parameters
-    ----------
-    clearance
-        Between the middle lines of links that are not neighbours [m].
-    low, high
-        Limits of the joints, ``(joints,)`` [rad or m].
-    where
-        The entry, for messages.
+    Args:
+        clearance: Between the middle lines of links that are not neighbours [m].
+        low, high: Limits of the joints, ``(joints,)`` [rad or m].
+        where: The entry, for messages.
 
-    Raises
-    ------
-    InputError
-        If it is less than 1 mm, the robot has no links that are not neighbours, or links that come within 50 mm of
-        each other count as neighbours by it, though they hang together by 50 mm or more.
+    Raises:
+        InputError: If it is less than 1 mm, the robot has no links that are not neighbours, or links that come within
+            50 mm of each other count as neighbours by it, though they hang together by 50 mm or more.
     """
     if clearance < LEAST_CLEARANCE:
         raise InputError(

@@ -47,54 +47,32 @@ class _Units(BaseModel):
 
 
 class Box(BaseModel):
-    """Where the flange or all targets must be, in the base frame.
-
-    Attributes
-    ----------
-    of
-        What must be in it.
-    x, y, z
-        Lowest and highest coordinate; any if left out.
-    """
+    """Where the flange or all targets must be, in the base frame."""
 
     model_config = _CLOSED
-    of: Literal["flange", "targets"]
-    x: _Range | None = None
+    of: Literal["flange", "targets"]  #: What must be in it.
+    x: _Range | None = None  #: x, y, z: lowest and highest coordinate; any if left out.
     y: _Range | None = None
     z: _Range | None = None
 
 
 class KeptOut(BaseModel):
-    """A box that the arm stays out of, in the base frame.
-
-    Attributes
-    ----------
-    x, y, z
-        Lowest and highest coordinate; without end if left out.
-    """
+    """A box that the arm stays out of, in the base frame."""
 
     model_config = _CLOSED
-    x: _Range | None = None
+    x: _Range | None = None  #: x, y, z: lowest and highest coordinate; without end if left out.
     y: _Range | None = None
     z: _Range | None = None
 
 
 class Visibility(BaseModel):
-    """Which way targets must look: all that are named, into the instrument.
-
-    Attributes
-    ----------
-    within
-        How far a target may look past the instrument.
-    targets
-        Direction in which each target looks, in the flange frame.
-    instrument
-        Place of the instrument in the base frame; the origin of the world for a robot with its own targets.
-    """
+    """Which way targets must look: all that are named, into the instrument."""
 
     model_config = _CLOSED
-    within: _Positive
+    within: _Positive  #: How far a target may look past the instrument.
+    #: Direction in which each target looks, in the flange frame.
     targets: Annotated[dict[str, _Vector], Field(min_length=1)]
+    #: Place of the instrument in the base frame; the origin of the world for a robot with its own targets.
     instrument: _Vector | None = None
 
     @model_validator(mode="after")
@@ -106,36 +84,20 @@ class Visibility(BaseModel):
 
 
 class Constraints(BaseModel):
-    """Schema ``truearm-constraints/1``.
-
-    Attributes
-    ----------
-    limits
-        Lowest and highest joint position by joint number, within the robot's own limits.
-    moments
-        Sign of the moment of the load about a joint's axis, by joint number.
-    box
-        A box for the flange or the targets.
-    floor
-        Lowest height of targets, flange and joints from the third on, in the base frame.
-    visibility
-        Which way the targets must look.
-    clearance
-        Smallest distance between the middle lines of links that are not neighbours.
-    keep_out
-        Boxes that the arm stays out of, by name.
-    """
+    """Schema ``truearm-constraints/1``."""
 
     model_config = _CLOSED
     truearm: Literal["truearm-constraints/1"]
     units: _Units
+    #: Lowest and highest joint position by joint number, within the robot's own limits.
     limits: dict[_JointNumber, _Range] = {}
+    #: Sign of the moment of the load about a joint's axis, by joint number.
     moments: dict[_JointNumber, Literal["positive", "negative"]] = {}
-    box: Box | None = None
-    floor: _Number | None = None
-    visibility: Visibility | None = None
-    clearance: _Positive | None = None
-    keep_out: dict[_Name, KeptOut] = {}
+    box: Box | None = None  #: A box for the flange or the targets.
+    floor: _Number | None = None  #: Lowest height of targets, flange and joints from the third on, in the base frame.
+    visibility: Visibility | None = None  #: Which way the targets must look.
+    clearance: _Positive | None = None  #: Smallest distance between the middle lines of links that are not neighbours.
+    keep_out: dict[_Name, KeptOut] = {}  #: Boxes that the arm stays out of, by name.
 
 
 def read_constraints(path: Path) -> Constraints:
@@ -148,22 +110,16 @@ def allowed(
 ) -> Mapping[str, Allowed]:
     """Return for each constraint at which postures it is kept, ``(n,)``; every one is asked about all postures.
 
-    Parameters
-    ----------
-    robot
-        With targets.
-    constraints
-        None leaves the robot's own limits alone.
-    where
-        The constraints file, for messages.
-    seen_from_the_origin
-        Whether the instrument stands at the origin of the robot's world, unless the constraints say where.
+    Args:
+        robot: With targets.
+        constraints: None leaves the robot's own limits alone.
+        where: The constraints file, for messages.
+        seen_from_the_origin: Whether the instrument stands at the origin of the robot's world, unless the constraints
+            say where.
 
-    Raises
-    ------
-    InputError
-        For a joint or target that the robot does not have, a range the wrong way round, a moment of a robot
-        without masses, or an instrument whose place nobody knows.
+    Raises:
+        InputError: For a joint or target that the robot does not have, a range the wrong way round, a moment of a robot
+            without masses, or an instrument whose place nobody knows.
     """
     q = postures.joints
     world = robot.base
@@ -221,10 +177,8 @@ def limits_of(robot: Robot, constraints: Constraints | None, where: str) -> tupl
 
     They are infinite where nothing is said.
 
-    Raises
-    ------
-    InputError
-        For a joint that the robot does not have, or a range the wrong way round.
+    Raises:
+        InputError: For a joint that the robot does not have, or a range the wrong way round.
     """
     low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
     if constraints is None:
@@ -240,10 +194,8 @@ def limits_of(robot: Robot, constraints: Constraints | None, where: str) -> tupl
 def keep_out(constraints: Constraints, where: str) -> dict[str, tuple[Array, Array]]:
     """Return lowest and highest corner of each box that the arm stays out of [m], infinite where it does not end.
 
-    Raises
-    ------
-    InputError
-        For a range the wrong way round, and for a box without any.
+    Raises:
+        InputError: For a range the wrong way round, and for a box without any.
     """
     refuse_beyond("keep_out", len(constraints.keep_out), where=f"{where}, keep_out")
     corners = {}

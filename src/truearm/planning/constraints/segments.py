@@ -17,10 +17,8 @@ def segment_distance(p1: Array, q1: Array, p2: Array, q2: Array) -> Array:
     The least of the distance from each end to the other segment, and of that between the lines where their feet lie
     inside both.
 
-    Parameters
-    ----------
-    p1, q1, p2, q2
-        ``(..., 3, n)``, broadcast against each other.
+    Args:
+        p1, q1, p2, q2: ``(..., 3, n)``, broadcast against each other.
     """
     u, v, w = q1 - p1, q2 - p2, p1 - p2
     a, b, c = _dot(u, u), _dot(u, v), _dot(v, v)
@@ -50,10 +48,8 @@ def box_distance(p: Array, q: Array, low: Array, high: Array) -> Array:
     The square of the distance of a point from a box is convex along a line, so the nearest one is found by halving: to
     1/4096 of the segment's length, and never too near.
 
-    Parameters
-    ----------
-    low, high
-        Corners of the box, ``(3,)``; infinite where it does not end.
+    Args:
+        low, high: Corners of the box, ``(3,)``; infinite where it does not end.
     """
     along = q - p
     shape = (*p.shape[:-2], p.shape[-1])

@@ -36,34 +36,19 @@ _SAMPLE: Final = 300
 
 @dataclass(frozen=True)
 class Capsule:
-    """A line between two points of the arm, or lines that stand for a plate, and its radius.
+    """A line between two points of the arm, or lines that stand for a plate, and its radius."""
 
-    Attributes
-    ----------
-    start, end
-        Numbers of the points, see :meth:`ArmCapsules.points`.
-    radius
-        [m].
-    tool
-        Whether it holds a target.
-    lines
-        Numbers of the points at both ends of each line; one line from start to end, unless it is a plate.
-    gap
-        How far a point of the plate is from the nearest of its lines along the parallel axes at most [m].
-    joints
-        Those with parallel axes between which a plate lies.
-    across
-        The points at both ends of its line at right angles to these axes, at one side; None if it has none. Two plates
-        of the same axes are as far apart as these lines.
-    """
-
-    start: int
+    start: int  #: start, end: numbers of the points, see :meth:`ArmCapsules.points`.
     end: int
-    radius: float
-    tool: bool = False
+    radius: float  #: [m].
+    tool: bool = False  #: Whether it holds a target.
+    #: Numbers of the points at both ends of each line; one line from start to end, unless it is a plate.
     lines: tuple[tuple[int, int], ...] = ()
+    #: How far a point of the plate is from the nearest of its lines along the parallel axes at most [m].
     gap: float = 0.0
-    joints: tuple[int, ...] = ()
+    joints: tuple[int, ...] = ()  #: Those with parallel axes between which a plate lies.
+    #: The points at both ends of its line at right angles to these axes, at one side; None if it has none. Two plates
+    #: of the same axes are as far apart as these lines.
     across: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
@@ -78,24 +63,12 @@ class Capsule:
 
 @dataclass(frozen=True, eq=False)
 class _Row:
-    """Points side by side along a joint's axis, at which links may lie that a model has elsewhere.
+    """Points side by side along a joint's axis, at which links may lie that a model has elsewhere."""
 
-    Attributes
-    ----------
-    joint
-        From 1.
-    first
-        Number of the first of the points.
-    places
-        Where each is along the axis from the origin of the joint [m], evenly.
-    group
-        The joints with parallel axes.
-    """
-
-    joint: int
-    first: int
-    places: Array
-    group: Beside
+    joint: int  #: From 1.
+    first: int  #: Number of the first of the points.
+    places: Array  #: Where each is along the axis from the origin of the joint [m], evenly.
+    group: Beside  #: The joints with parallel axes.
 
 
 class ArmCapsules:

@@ -23,40 +23,21 @@ _STANDING: Final = np.cos(np.deg2rad(30.0))
 
 @dataclass(frozen=True, eq=False)
 class KeepOut:
-    """A box that the arm stays out of, its faces along the axes of the base frame.
+    """A box that the arm stays out of, its faces along the axes of the base frame."""
 
-    Attributes
-    ----------
-    name
-        In messages.
-    low, high
-        Two corners [m], ``(3,)``; infinite where it does not end.
-    """
-
-    name: str
-    low: Array
+    name: str  #: In messages.
+    low: Array  #: low, high: two corners [m], ``(3,)``; infinite where it does not end.
     high: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """What stands around an arm, in its base frame.
+    """What stands around an arm, in its base frame."""
 
-    Attributes
-    ----------
-    floor
-        Height of the floor [m]; None if there is none to keep clear of.
-    boxes
-        What the arm stays out of.
-    clearance
-        Room to keep to each of them, and between links that are not neighbours [m].
-    surface
-        What the plane at the height `floor` is called: the mounting surface of an arm that does not stand on a floor.
-    """
-
-    floor: float | None = 0.0
-    boxes: tuple[KeepOut, ...] = field(default=())
-    clearance: float = CLEARANCE
+    floor: float | None = 0.0  #: Height of the floor [m]; None if there is none to keep clear of.
+    boxes: tuple[KeepOut, ...] = field(default=())  #: What the arm stays out of.
+    clearance: float = CLEARANCE  #: Room to keep to each of them, and between links that are not neighbours [m].
+    #: What the plane at the height `floor` is called: the mounting surface of an arm that does not stand on a floor.
     surface: str = FLOOR
 
 

@@ -38,21 +38,11 @@ _NEAR: Final = " come near each other"
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """Ways that were looked at.
+    """Ways that were looked at."""
 
-    Attributes
-    ----------
-    clear
-        Whether the clearance is kept all the way, ``(n,)``.
-    room
-        The smallest room that was found [m], ``(n,)``.
-    worst
-        Number of what comes nearest, see :meth:`CollisionCheck.words`, ``(n,)``.
-    """
-
-    clear: NDArray[np.bool_]
-    room: Array
-    worst: NDArray[np.intp]
+    clear: NDArray[np.bool_]  #: Whether the clearance is kept all the way, ``(n,)``.
+    room: Array  #: The smallest room that was found [m], ``(n,)``.
+    worst: NDArray[np.intp]  #: Number of what comes nearest, see :meth:`CollisionCheck.words`, ``(n,)``.
 
 
 class CollisionCheck:
@@ -66,17 +56,12 @@ class CollisionCheck:
     Links between parallel axes are plates, wide enough to hold the link wherever along the axes it may lie: rooms to
     them are never more than those to the link.
 
-    Attributes
-    ----------
-    left_out
-        What no posture keeps apart, in words.
-    connected
-        How much of the arm is left out where two links are connected, of the two of which it is most [m].
+    Attributes:
+        left_out: What no posture keeps apart, in words.
+        connected: How much of the arm is left out where two links are connected, of the two of which it is most [m].
 
-    Raises
-    ------
-    InputError
-        If a box holds the base of the robot.
+    Raises:
+        InputError: If a box holds the base of the robot.
     """
 
     def __init__(self, robot: Robot, cell: Cell) -> None:
@@ -100,10 +85,8 @@ class CollisionCheck:
     def rooms(self, q: Array) -> Array:
         """Return the room to everything at joint positions ``(n, joints)`` [m], ``(rooms, n)``; below zero they touch.
 
-        Parameters
-        ----------
-        q
-            Of the model [rad or m].
+        Args:
+            q: Of the model [rad or m].
         """
         parts = [self._measure(self.arm.points(part)) for part in _parts(q)]
         return np.concatenate([np.zeros((len(self._rooms), 0)), *parts], axis=1)

@@ -21,24 +21,13 @@ _MOST_NAMED: Final = 5
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """Configurations that were drawn and are clear.
+    """Configurations that were drawn and are clear."""
 
-    Attributes
-    ----------
-    joints
-        ``(n, joints)`` [rad or m].
-    tried
-        How many were drawn.
-    wanted
-        How many should be clear.
-    lost
-        How many came near the floor, a box (``keep_out`` and its name), the arm's own links, or where the arm stops
-        right before them to one of these (``approach``); each is lost to one thing alone, the floor first.
-    """
-
-    joints: Array
-    tried: int
-    wanted: int
+    joints: Array  #: ``(n, joints)`` [rad or m].
+    tried: int  #: How many were drawn.
+    wanted: int  #: How many should be clear.
+    #: How many came near the floor, a box (``keep_out`` and its name), the arm's own links, or where the arm stops
+    #: right before them to one of these (``approach``); each is lost to one thing alone, the floor first.
     lost: Mapping[str, int]
 
     @property
@@ -55,19 +44,14 @@ def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.G
 
     They are drawn evenly. Where fewer than half of those that are clear have a straight way, all that are clear count.
 
-    Parameters
-    ----------
-    finder
-        What is kept clear, the safe configuration and the limits.
-    count
-        How many are wanted; there are fewer if the cell leaves little room.
-    approach
-        How far before a configuration each joint stops, to come to it moving forward, ``(joints,)`` [rad or m].
+    Args:
+        finder: What is kept clear, the safe configuration and the limits.
+        count: How many are wanted; there are fewer if the cell leaves little room.
+        approach: How far before a configuration each joint stops, to come to it moving forward, ``(joints,)`` [rad or
+            m].
 
-    Raises
-    ------
-    InputError
-        If none was found that is clear.
+    Raises:
+        InputError: If none was found that is clear.
     """
     low, high = finder.low, finder.high
     first = np.minimum(low + approach, (low + high) / 2.0)

@@ -29,15 +29,11 @@ def safe_configuration(check: CollisionCheck, low: Array, high: Array) -> Array:
     most room. A joint whose limits do not hold zero rests in the middle of them. If none of these is clear, some that
     are drawn are tried.
 
-    Parameters
-    ----------
-    low, high
-        Within which it lies, each ``(joints,)``.
+    Args:
+        low, high: Within which it lies, each ``(joints,)``.
 
-    Raises
-    ------
-    InputError
-        If none of them keeps the clearance.
+    Raises:
+        InputError: If none of them keeps the clearance.
     """
     joints = check.arm.robot.joints
     turning = np.array([joint.kind == "revolute" for joint in joints])
@@ -79,10 +75,8 @@ def _best(check: CollisionCheck, at: Array, rest: Array) -> tuple[Array, float]:
 def checked_home(check: CollisionCheck, home: Array, low: Array, high: Array) -> Array:
     """Return a safe configuration that was given, or refuse it.
 
-    Raises
-    ------
-    InputError
-        If a joint is beyond its limits, or on another turn, or the arm does not keep the clearance there.
+    Raises:
+        InputError: If a joint is beyond its limits, or on another turn, or the arm does not keep the clearance there.
     """
     for k, joint in enumerate(check.arm.robot.joints):
         if not low[k] - 1e-9 <= home[k] <= high[k] + 1e-9:

@@ -20,10 +20,8 @@ def joint_window(
     A joint that can turn further than once is kept to one turn, from -180 to 180 deg where its limits have that: the
     arm reaches the same poses, and cables and hoses are not wound up.
 
-    Raises
-    ------
-    InputError
-        If the constraints leave a joint nothing, or name one that the robot does not have.
+    Raises:
+        InputError: If the constraints leave a joint nothing, or name one that the robot does not have.
     """
     first, last = limits_of(robot, constraints, where)
     low, high = np.empty_like(first), np.empty_like(last)

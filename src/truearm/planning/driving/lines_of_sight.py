@@ -25,18 +25,12 @@ def hidden(
     The links are as thick as a plan keeps them clear, see :class:`ArmCapsules`, each where the model has it: links
     beside parallel axes hide what their model hides.
 
-    Parameters
-    ----------
-    robot
-        Where it stands.
-    joints
-        As the model counts them [rad or m], ``(n, joints)``.
-    eye
-        Where the instrument is, in the world [m], ``(3,)``.
-    points
-        That are looked at, in the world [m], ``(3,)`` each.
-    boxes
-        In the base frame.
+    Args:
+        robot: Where it stands.
+        joints: As the model counts them [rad or m], ``(n, joints)``.
+        eye: Where the instrument is, in the world [m], ``(3,)``.
+        points: That are looked at, in the world [m], ``(3,)`` each.
+        boxes: In the base frame.
     """
     base, arm = robot.base, ArmCapsules(robot)
     at = arm.points(joints)

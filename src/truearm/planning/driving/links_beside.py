@@ -32,24 +32,13 @@ class Beside:
     """Joints whose axes are parallel, and where along them their links may lie.
 
     Places are along the axis of the first, from its origin, positive to the side to which more of them lie.
-
-    Attributes
-    ----------
-    joints
-        From 1, one after the other.
-    low, high
-        Between which places the links are taken to lie [m]; zero is between them.
-    origins
-        Where the origin of each joint is [m].
-    side
-        1 if that side is along the axis of the first, -1 if it is against it.
     """
 
-    joints: tuple[int, ...]
-    low: float
+    joints: tuple[int, ...]  #: From 1, one after the other.
+    low: float  #: low, high: between which places the links are taken to lie [m]; zero is between them.
     high: float
-    origins: tuple[float, ...]
-    side: float
+    origins: tuple[float, ...]  #: Where the origin of each joint is [m].
+    side: float  #: 1 if that side is along the axis of the first, -1 if it is against it.
 
 
 def links_beside(robot: Robot) -> tuple[Beside, ...]:

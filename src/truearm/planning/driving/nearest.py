@@ -21,10 +21,8 @@ def nearest_on(check: CollisionCheck, joints: Array) -> dict[str, float]:
     Each way is halved as long as a part of it could be nearer than the nearest found, by how fast rooms change at most.
     The distances hold all the way: somewhere the arm comes as near but for 0.1 mm or 0.2 % of them.
 
-    Returns
-    -------
-    distances
-        By the floor, each box and the links, the smallest first. Negative where they touch.
+    Returns:
+        distances: By the floor, each box and the links, the smallest first. Negative where they touch.
     """
     whats = list(dict.fromkeys(check.whats))
     thing = np.array([whats.index(what) for what in check.whats], dtype=np.intp)

@@ -15,22 +15,12 @@ from truearm.planning.driving.cell import Cell
 
 @dataclass(frozen=True)
 class Piece:
-    """A capsule without what is next to one of its ends, as shares of the length of each of its lines.
+    """A capsule without what is next to one of its ends, as shares of the length of each of its lines."""
 
-    Attributes
-    ----------
-    capsule
-        With its lines.
-    first, last
-        Where the piece begins and ends: 0 at the start of a line, 1 at its end.
-    whole
-        Which lines begin at their start all the same.
-    """
-
-    capsule: Capsule
-    first: float = 0.0
+    capsule: Capsule  #: With its lines.
+    first: float = 0.0  #: first, last: where the piece begins and ends: 0 at the start of a line, 1 at its end.
     last: float = 1.0
-    whole: frozenset[int] = frozenset()
+    whole: frozenset[int] = frozenset()  #: Which lines begin at their start all the same.
 
     def lines(self) -> list[tuple[int, int, float, float]]:
         """Return for each line the points at its ends, and the shares between which it counts."""
@@ -42,29 +32,15 @@ class Piece:
 
 @dataclass(frozen=True)
 class Room:
-    """What is kept clear of what: the floor, a box, or another link.
+    """What is kept clear of what: the floor, a box, or another link."""
 
-    Attributes
-    ----------
-    what
-        The floor, a box or the links: by what postures are rejected and distances are said.
-    words
-        What comes near what.
-    piece, other
-        The link, and the other one of two; no link for the floor.
-    point, radius
-        What is kept above the floor, and its thickness [m].
-    box
-        Number of the box.
-    """
-
-    what: str
-    words: str
-    piece: Piece | None = None
+    what: str  #: The floor, a box or the links: by what postures are rejected and distances are said.
+    words: str  #: What comes near what.
+    piece: Piece | None = None  #: piece, other: the link, and the other one of two; no link for the floor.
     other: Piece | None = None
-    point: int = 0
+    point: int = 0  #: point, radius: what is kept above the floor, and its thickness [m].
     radius: float = 0.0
-    box: int = 0
+    box: int = 0  #: Number of the box.
 
 
 class Measure:

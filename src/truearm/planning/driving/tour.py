@@ -20,55 +20,27 @@ HOME: Final = "home"
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """A configuration that is driven to with all joints moving at once, from the one before.
+    """A configuration that is driven to with all joints moving at once, from the one before."""
 
-    Attributes
-    ----------
-    joints
-        Joint positions of the model [rad or m], ``(joints,)``.
-    kind
-        Why the arm stops there.
-    label
-        Name of the configuration that is measured; None for every other kind.
-    """
-
-    joints: Array
-    kind: StopKind
-    label: str | None = None
+    joints: Array  #: Joint positions of the model [rad or m], ``(joints,)``.
+    kind: StopKind  #: Why the arm stops there.
+    label: str | None = None  #: Name of the configuration that is measured; None for every other kind.
 
 
 @dataclass(frozen=True, eq=False)
 class Tour:
-    """Stops in driving order; the first and the last are the safe configuration.
+    """Stops in driving order; the first and the last are the safe configuration."""
 
-    Attributes
-    ----------
-    stops
-        Three or more.
-    floor
-        Height of the floor in the base frame [m]; None if none is kept clear.
-    clearance
-        What is kept between the arm and the floor, boxes and its own links [m].
-    room
-        The smallest such distance on the ways [m]; infinite if there is nothing to come close to.
-    surface
-        What the plane at the height `floor` is called.
-    distances
-        How near the arm comes to each thing on the ways [m], the smallest first: ``floor``, ``keep_out`` and the name
-        of a box, ``links`` for its own.
-    notices
-        What is to be known of what was kept clear.
-    connected
-        How much of the arm is left out of the distance of its links where two are connected, at most [m].
-    """
-
-    stops: tuple[Stop, ...]
-    floor: float | None
-    clearance: float
-    room: float
-    surface: str = FLOOR
+    stops: tuple[Stop, ...]  #: Three or more.
+    floor: float | None  #: Height of the floor in the base frame [m]; None if none is kept clear.
+    clearance: float  #: What is kept between the arm and the floor, boxes and its own links [m].
+    room: float  #: The smallest such distance on the ways [m]; infinite if there is nothing to come close to.
+    surface: str = FLOOR  #: What the plane at the height `floor` is called.
+    #: How near the arm comes to each thing on the ways [m], the smallest first: ``floor``, ``keep_out`` and the name of
+    #: a box, ``links`` for its own.
     distances: Mapping[str, float] = field(default_factory=dict)
-    notices: tuple[Notice, ...] = ()
+    notices: tuple[Notice, ...] = ()  #: What is to be known of what was kept clear.
+    #: How much of the arm is left out of the distance of its links where two are connected, at most [m].
     connected: float = 0.0
 
     @property

@@ -55,14 +55,10 @@ def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list
 def distance_words(distances: Mapping[str, float], floor: float | None, surface: str, connected: float) -> str:
     """Return how near an arm comes to each thing, as :func:`~.nearest.nearest_on` has it; nothing if to none.
 
-    Parameters
-    ----------
-    floor
-        Its height [m]; None if none is kept clear.
-    surface
-        What it is called.
-    connected
-        How much of the arm is left out where two links are connected, at most [m].
+    Args:
+        floor: Its height [m]; None if none is kept clear.
+        surface: What it is called.
+        connected: How much of the arm is left out where two links are connected, at most [m].
     """
     # Down to a tenth of a millimetre: never more than there is.
     near = [

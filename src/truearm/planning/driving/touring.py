@@ -28,22 +28,15 @@ def unreached(finder: WayFinder, joints: Array, before: Array | None) -> list[in
 def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Array | None = None) -> Tour:
     """Return a tour through configurations in their order.
 
-    Parameters
-    ----------
-    finder
-        Finds the ways, from its safe configuration on.
-    joints
-        Where to measure, by the model, ``(n, joints)`` [rad or m].
-    labels
-        Their names.
-    before
-        Where to stop right before each, ``(n, joints)``; None to drive there from anywhere.
+    Args:
+        finder: Finds the ways, from its safe configuration on.
+        joints: Where to measure, by the model, ``(n, joints)`` [rad or m].
+        labels: Their names.
+        before: Where to stop right before each, ``(n, joints)``; None to drive there from anywhere.
 
-    Raises
-    ------
-    InputError
-        If a configuration is not clear, no way was found from one to the next, or a joint would be wound up by more
-        than a turn.
+    Raises:
+        InputError: If a configuration is not clear, no way was found from one to the next, or a joint would be wound up
+            by more than a turn.
     """
     entered = joints if before is None else before
     _refuse_near(finder, entered, joints, labels)

@@ -24,31 +24,19 @@ _DRAWN: Final = 600
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A way that keeps clear.
+    """A way that keeps clear."""
 
-    Attributes
-    ----------
-    over
-        Configurations in between, ``(k, joints)``; none of a straight way.
-    room
-        The smallest room on it [m].
-    """
-
-    over: Array
-    room: float
+    over: Array  #: Configurations in between, ``(k, joints)``; none of a straight way.
+    room: float  #: The smallest room on it [m].
 
 
 class WayFinder:
     """Finds ways that keep clear, from a safe configuration on.
 
-    Parameters
-    ----------
-    check
-        What is kept clear of what.
-    home
-        The safe configuration, ``(joints,)`` [rad or m].
-    low, high
-        Between which joints stay, each ``(joints,)``.
+    Args:
+        check: What is kept clear of what.
+        home: The safe configuration, ``(joints,)`` [rad or m].
+        low, high: Between which joints stay, each ``(joints,)``.
     """
 
     def __init__(self, check: CollisionCheck, home: Array, low: Array, high: Array) -> None:
@@ -135,10 +123,9 @@ class WayFinder:
 def touched(check: CollisionCheck, joints: Array) -> tuple[int, float, str] | None:
     """Return where a row of configurations ``(n, joints)``, driven one after the other, comes too near to something.
 
-    Returns
-    -------
-    The number of the move (0 from the first to the second), the room there [m], and what comes near what; None if the
-    clearance is kept all the way.
+    Returns:
+        The number of the move (0 from the first to the second), the room there [m], and what comes near what; None if
+        the clearance is kept all the way.
     """
     starts, ends = (joints[:-1], joints[1:]) if len(joints) > 1 else (joints, joints)
     looked = check.ways(starts, ends)

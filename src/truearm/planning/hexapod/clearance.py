@@ -34,16 +34,11 @@ def arm_links(robot: Robot, joints: Array) -> tuple[Array, Array]:
 def clearance(robot: Robot, joints: Array, starts: Array, ends: Array, arm_radius: float = ARM_RADIUS) -> Array:
     """Return the smallest room between the arm and bars [m], ``(n,)``; below zero they touch.
 
-    Parameters
-    ----------
-    robot
-        The arm; its world is the frame of the bars.
-    joints
-        Joint positions ``(n, joints)`` [rad or m].
-    starts, ends
-        Both ends of every bar at each configuration [m], ``(bars, 3, n)``.
-    arm_radius
-        Of the arm's links [m].
+    Args:
+        robot: The arm; its world is the frame of the bars.
+        joints: Joint positions ``(n, joints)`` [rad or m].
+        starts, ends: Both ends of every bar at each configuration [m], ``(bars, 3, n)``.
+        arm_radius: Of the arm's links [m].
     """
     first, last = arm_links(robot, joints)
     apart = segment_distance(first[:, None], last[:, None], starts[None], ends[None])

@@ -38,24 +38,12 @@ _AGAIN: Final = 5
 
 @dataclass(frozen=True, eq=False)
 class Reachable:
-    """What a robot can measure with the device at one place or several.
+    """What a robot can measure with the device at one place or several."""
 
-    Attributes
-    ----------
-    rows
-        Configurations, in the order in which to measure them.
-    clearance
-        Room between arm and bars at each [m], ``(rows,)``.
-    left_out
-        How many branches of poses were left out, by reason.
-    poses
-        How many poses were asked for, on all sides and at all places.
-    """
-
-    rows: tuple[PlannedRow, ...]
-    clearance: Array
-    left_out: Mapping[str, int]
-    poses: int
+    rows: tuple[PlannedRow, ...]  #: Configurations, in the order in which to measure them.
+    clearance: Array  #: Room between arm and bars at each [m], ``(rows,)``.
+    left_out: Mapping[str, int]  #: How many branches of poses were left out, by reason.
+    poses: int  #: How many poses were asked for, on all sides and at all places.
 
     @property
     def poses_reached(self) -> int:
@@ -76,30 +64,19 @@ def reachable(
 ) -> Reachable:
     """Return the configurations in which a robot can be measured.
 
-    Parameters
-    ----------
-    robot
-        With six joints that are solved in closed form, see :mod:`truearm.modeling.inverse`.
-    fixture
-        Of the base fixture in the robot's base frame.
-    wanted
-        Poses of the device for the robot's tool.
-    device
-        Nominal lengths.
-    largest_turn
-        No joint that turns is used beyond this, whatever its limits [rad]; Nubiola (4.4) takes 180 deg, for the
-        cables.
-    arm_radius
-        Of the arm's links [m], see :mod:`truearm.planning.hexapod.clearance`.
-    branches
-        Only branches whose names begin so, such as ``front-up``; all of them if empty.
-    fourth_cup
-        Whether there is a fourth cup, and the poses are taken on all four sides.
+    Args:
+        robot: With six joints that are solved in closed form, see :mod:`truearm.modeling.inverse`.
+        fixture: Of the base fixture in the robot's base frame.
+        wanted: Poses of the device for the robot's tool.
+        device: Nominal lengths.
+        largest_turn: No joint that turns is used beyond this, whatever its limits [rad]; Nubiola (4.4) takes 180 deg,
+            for the cables.
+        arm_radius: Of the arm's links [m], see :mod:`truearm.planning.hexapod.clearance`.
+        branches: Only branches whose names begin so, such as ``front-up``; all of them if empty.
+        fourth_cup: Whether there is a fourth cup, and the poses are taken on all four sides.
 
-    Raises
-    ------
-    InputError
-        If the robot has no closed form, there is no such branch, or nothing is left; with the reasons.
+    Raises:
+        InputError: If the robot has no closed form, there is no such branch, or nothing is left; with the reasons.
     """
     for begin in branches:
         if not any(branch.startswith(begin) for branch in BRANCHES):
@@ -167,17 +144,13 @@ def reachable_at_places(
 ) -> Reachable:
     """Return the configurations in which a robot can be measured with the base fixture at one place after the other.
 
-    Parameters
-    ----------
-    fixtures
-        Of the base fixture in the robot's base frame; several are called ``fixture_1``, ``fixture_2`` and so on.
-    robot, wanted, arm_radius, branches, fourth_cup
-        As for :func:`reachable`.
+    Args:
+        fixtures: Of the base fixture in the robot's base frame; several are called ``fixture_1``, ``fixture_2`` and so
+            on.
+        robot, wanted, arm_radius, branches, fourth_cup: As for :func:`reachable`.
 
-    Raises
-    ------
-    InputError
-        As :func:`reachable`, if nothing is left at one of the places.
+    Raises:
+        InputError: As :func:`reachable`, if nothing is left at one of the places.
     """
     found = []
     for number, fixture in enumerate(fixtures, 1):

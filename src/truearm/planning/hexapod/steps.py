@@ -26,10 +26,8 @@ _ANEW: Final = (
 def steps_text(plan: Reachable, robot: Robot, controller: Controller | None = None, device: Device = DEVICE) -> str:
     """Return the plan step by step; figures go into the sheet.
 
-    Parameters
-    ----------
-    controller
-        Who shows the joint positions; None for the model's.
+    Args:
+        controller: Who shows the joint positions; None for the model's.
     """
     base, tool, leg = (f"{length * 1e3:g} mm" for length in (device.base, device.tool, device.leg))
     with_sides, places = any(row.side > 1 for row in plan.rows), any(row.place for row in plan.rows)

@@ -20,22 +20,15 @@ def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:
     A calibrated robot has them already. Any other robot takes them from a tool of its file, with the tool's mass if it
     carries nothing yet, and stands in the origin.
 
-    Parameters
-    ----------
-    robot
-        The arm.
-    tool
-        Name of the tool; the first one if None.
+    Args:
+        robot: The arm.
+        tool: Name of the tool; the first one if None.
 
-    Returns
-    -------
-    robot, cups
-        Cups T1, T2, T3 in the flange frame [m], ``(3, 3)``.
+    Returns:
+        robot, cups: Cups T1, T2, T3 in the flange frame [m], ``(3, 3)``.
 
-    Raises
-    ------
-    InputError
-        If the robot has no such tool, or it has not three targets.
+    Raises:
+        InputError: If the robot has no such tool, or it has not three targets.
     """
     if tool is not None or not robot.targets:
         if tool is not None and tool not in robot.tools:

@@ -16,30 +16,14 @@ Readings = Literal["poses", "paths", "settling", "forces"]
 
 @dataclass(frozen=True)
 class PerformanceTest:
-    """A test: measurements that are evaluated together, and never with those of another.
+    """A test: measurements that are evaluated together, and never with those of another."""
 
-    Attributes
-    ----------
-    id
-        What its rows have in the column ``criterion``.
-    name
-        In words.
-    criteria
-        What is evaluated from it.
-    readings
-        In which file its rows are.
-    cycles
-        How often each place is gone to, or each path run.
-    places
-        Poses, paths or corners, as a plan calls them.
-    """
-
-    id: str
-    name: str
-    criteria: tuple[str, ...]
-    readings: Readings
-    cycles: int
-    places: tuple[str, ...]
+    id: str  #: What its rows have in the column ``criterion``.
+    name: str  #: In words.
+    criteria: tuple[str, ...]  #: What is evaluated from it.
+    readings: Readings  #: In which file its rows are.
+    cycles: int  #: How often each place is gone to, or each path run.
+    places: tuple[str, ...]  #: Poses, paths or corners, as a plan calls them.
 
 
 _ALL_POSES: Final = ("P1", "P2", "P3", "P4", "P5")

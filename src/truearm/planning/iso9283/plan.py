@@ -80,42 +80,27 @@ def performance_plan(
 ) -> PerformancePlan:
     """Plan the tests of a robot.
 
-    Parameters
-    ----------
-    robot
-        The nominal arm.
-    target
-        Name of the target that is measured; the flange if None.
-    tests
-        Keys of :data:`truearm.planning.iso9283.criteria.TESTS`.
-    cube
-        In which the poses lie; None for the largest that the arm can be tested in, by all tests.
-    plane
-        Which of its diagonal planes.
-    rotation
-        Orientation of the tip at all poses, in the base frame, ``(3, 3)``; None for the one that allows most.
-    rated_load, rated_velocity
-        [kg], and of the tip along a path [m/s].
-    velocities, loads
-        Shares of them, 0 to 1, that are tested.
-    limit_band
-        Within which of the final pose the tip is said to stand [m].
-    hours
-        How long the drift is watched.
-    ahead, nearest, floor
-        Where the largest cube is looked for, as :func:`truearm.planning.poses.largest_cube.largest_cube` has them.
-    unclear
-        What keeps the arm from standing at joint positions ``(n, joints)`` [rad or m], in words, nothing if it may at
-        all of them; None for anywhere.
-    unsuited
-        What of a plan cannot be driven, in words, nothing if all can; None for all. Where one of these two is given and
-        the cube is left open, smaller ones everywhere in the largest are tried.
+    Args:
+        robot: The nominal arm.
+        target: Name of the target that is measured; the flange if None.
+        tests: Keys of :data:`truearm.planning.iso9283.criteria.TESTS`.
+        cube: In which the poses lie; None for the largest that the arm can be tested in, by all tests.
+        plane: Which of its diagonal planes.
+        rotation: Orientation of the tip at all poses, in the base frame, ``(3, 3)``; None for the one that allows most.
+        rated_load, rated_velocity: [kg], and of the tip along a path [m/s].
+        velocities, loads: Shares of them, 0 to 1, that are tested.
+        limit_band: Within which of the final pose the tip is said to stand [m].
+        hours: How long the drift is watched.
+        ahead, nearest, floor: Where the largest cube is looked for, as
+            :func:`truearm.planning.poses.largest_cube.largest_cube` has them.
+        unclear: What keeps the arm from standing at joint positions ``(n, joints)`` [rad or m], in words, nothing if it
+            may at all of them; None for anywhere.
+        unsuited: What of a plan cannot be driven, in words, nothing if all can; None for all. Where one of these two is
+            given and the cube is left open, smaller ones everywhere in the largest are tried.
 
-    Raises
-    ------
-    InputError
-        If the arm has fewer than six joints, or cannot come to every pose and along every path of the cube, or those
-        are not clear or cannot be driven.
+    Raises:
+        InputError: If the arm has fewer than six joints, or cannot come to every pose and along every path of the cube,
+            or those are not clear or cannot be driven.
     """
     if len(robot.joints) < _LEAST_JOINTS:
         raise InputError(

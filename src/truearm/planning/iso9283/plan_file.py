@@ -185,11 +185,9 @@ def plan_text(plan: PerformancePlan) -> str:
 def read_plan(path: Path) -> PerformancePlan:
     """Read a plan, and the robot file beside it.
 
-    Raises
-    ------
-    InputError
-        With the entry, if a name occurs twice or is not known, joint positions do not bring the tip to their pose, or a
-        pose lies outside the cube.
+    Raises:
+        InputError: With the entry, if a name occurs twice or is not known, joint positions do not bring the tip to
+            their pose, or a pose lies outside the cube.
     """
     content = read_yaml(path, PlanFile)
     beside = path.parent / content.robot

@@ -26,17 +26,10 @@ class Way:
     """A planned path by the distance travelled along it.
 
     Of a weave it is the line in the middle: how far the tip goes aside is for those who command it.
-
-    Attributes
-    ----------
-    path
-        As planned.
-    reoriented
-        Whether the orientation alternates on the way.
     """
 
-    path: PlannedPath
-    reoriented: bool = False
+    path: PlannedPath  #: As planned.
+    reoriented: bool = False  #: Whether the orientation alternates on the way.
 
     @cached_property
     def length(self) -> float:

@@ -42,27 +42,16 @@ _JUMP: Final = 0.3
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """Joint positions over time.
+    """Joint positions over time."""
 
-    Attributes
-    ----------
-    time
-        [s], ``(n,)``.
-    joints, velocity, acceleration
-        [rad or m], per s and per s^2, ``(n, joints)``.
-    singular_value
-        How little the tip moves with a joint motion of norm 1, positions in reach lengths, ``(n,)``; 0 in a singular
-        posture.
-    joint_names
-        As the robot has them.
-    """
-
-    time: Array
-    joints: Array
+    time: Array  #: [s], ``(n,)``.
+    joints: Array  #: joints, velocity, acceleration: [rad or m], per s and per s^2, ``(n, joints)``.
     velocity: Array
     acceleration: Array
+    #: How little the tip moves with a joint motion of norm 1, positions in reach lengths, ``(n,)``; 0 in a singular
+    #: posture.
     singular_value: Array
-    joint_names: tuple[str, ...]
+    joint_names: tuple[str, ...]  #: As the robot has them.
 
     def postures(self, joints: Array | None = None) -> Postures:
         """Return the postures of this motion, or of other joint positions ``(n, joints)`` with the same rates."""
@@ -81,27 +70,18 @@ def joint_motion(
 ) -> JointMotion:
     """Return the joint motion that brings the flange, or a target, along a trajectory.
 
-    Parameters
-    ----------
-    robot
-        Its geometry counts, its joint effects do not.
-    trajectory
-        In the robot's base frame.
-    target
-        Name of the target that shall move so; the flange if None.
-    orientation
-        ``free`` if only the position counts, ``axis`` if the tip's z axis shall keep its direction, ``full`` if the tip
-        shall keep its whole orientation.
-    rotation
-        The orientation to keep, in the base frame, ``(3, 3)``; not needed where it is free.
-    seed
-        Joint positions ``(joints,)`` [rad or m] near which the motion shall begin; zero if None.
+    Args:
+        robot: Its geometry counts, its joint effects do not.
+        trajectory: In the robot's base frame.
+        target: Name of the target that shall move so; the flange if None.
+        orientation: ``free`` if only the position counts, ``axis`` if the tip's z axis shall keep its direction,
+            ``full`` if the tip shall keep its whole orientation.
+        rotation: The orientation to keep, in the base frame, ``(3, 3)``; not needed where it is free.
+        seed: Joint positions ``(joints,)`` [rad or m] near which the motion shall begin; zero if None.
 
-    Raises
-    ------
-    InputError
-        If the motion cannot start, leaves the reach or the limits, or comes to a singular posture: with the place on
-        the path, the time, and the joint.
+    Raises:
+        InputError: If the motion cannot start, leaves the reach or the limits, or comes to a singular posture: with the
+            place on the path, the time, and the joint.
     """
     return _Follower(robot, trajectory, target, orientation, rotation).motion(seed)
 

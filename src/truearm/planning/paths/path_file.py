@@ -147,53 +147,29 @@ class PathFile(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class PlannedPath:
-    """A path over time, as a file describes it.
+    """A path over time, as a file describes it."""
 
-    Attributes
-    ----------
-    trajectory
-        Where the tip shall be, in the axes of :attr:`frame`.
-    section
-        Number of the section of each sample, from 1, ``(n,)``.
-    kinds
-        What each section is.
-    frame
-        ``nominal``, ``base`` or ``world``.
-    tip
-        What follows the path, in the flange frame [m]; None for a target or the flange.
-    target
-        Name of the target that follows it; None for the tip or the flange.
-    orientation, rotation
-        How much of the orientation is kept, and which, ``(3, 3)``.
-    joint_speeds
-        Largest speed of each joint by the second, in the file's unit of angles, or of lengths for joints that slide;
-        None if the file has none.
-    units
-        Length and angle of the file.
-    source
-        The file, for messages.
-    """
-
-    trajectory: Trajectory
-    section: NDArray[np.intp]
-    kinds: tuple[str, ...]
-    frame: PathFrame
+    trajectory: Trajectory  #: Where the tip shall be, in the axes of :attr:`frame`.
+    section: NDArray[np.intp]  #: Number of the section of each sample, from 1, ``(n,)``.
+    kinds: tuple[str, ...]  #: What each section is.
+    frame: PathFrame  #: ``nominal``, ``base`` or ``world``.
+    #: What follows the path, in the flange frame [m]; None for a target or the flange.
     tip: tuple[float, float, float] | None
-    target: str | None
-    orientation: Orientation
+    target: str | None  #: Name of the target that follows it; None for the tip or the flange.
+    orientation: Orientation  #: orientation, rotation: how much of the orientation is kept, and which, ``(3, 3)``.
     rotation: Array
+    #: Largest speed of each joint by the second, in the file's unit of angles, or of lengths for joints that slide;
+    #: None if the file has none.
     joint_speeds: tuple[float, ...] | None
-    units: tuple[str, str]
-    source: str
+    units: tuple[str, str]  #: Length and angle of the file.
+    source: str  #: The file, for messages.
 
 
 def read_path(file: FilePath) -> PlannedPath:
     """Read a path file.
 
-    Raises
-    ------
-    InputError
-        If its entries cannot be, or as :func:`planned_path`.
+    Raises:
+        InputError: If its entries cannot be, or as :func:`planned_path`.
     """
     return planned_path(read_yaml(file, PathFile), str(file))
 
@@ -201,16 +177,12 @@ def read_path(file: FilePath) -> PlannedPath:
 def planned_path(content: PathFile, source: str) -> PlannedPath:
     """Return the path over time that the entries of a file describe.
 
-    Parameters
-    ----------
-    source
-        The file, for messages.
+    Args:
+        source: The file, for messages.
 
-    Raises
-    ------
-    InputError
-        With the section, if a waypoint repeats, a circle has no radius or its points lie on a line, times do not rise,
-        a section with times does not begin and end at rest, or there would be too many samples.
+    Raises:
+        InputError: With the section, if a waypoint repeats, a circle has no radius or its points lie on a line, times
+            do not rise, a section with times does not begin and end at rest, or there would be too many samples.
     """
     length = content.units.length
 

@@ -36,14 +36,10 @@ class Path(Protocol):
     def at(self, distance: Array) -> tuple[Array, Array, Array]:
         """Return the path after distances ``(n,)`` [m].
 
-        Returns
-        -------
-        position
-            [m], ``(n, 3)``.
-        direction
-            First derivative by the distance, a unit vector, ``(n, 3)``.
-        curvature
-            Second derivative by the distance [1/m], ``(n, 3)``.
+        Returns:
+            position: [m], ``(n, 3)``.
+            direction: First derivative by the distance, a unit vector, ``(n, 3)``.
+            curvature: Second derivative by the distance [1/m], ``(n, 3)``.
         """
         ...
 
@@ -66,14 +62,10 @@ class Line:
 class Circle:
     """A full circle.
 
-    Parameters
-    ----------
-    centre
-        [m].
-    start
-        The point on the circle where it begins and ends [m].
-    normal
-        Axis about which it turns, counter-clockwise; any length. It must be at right angles to the radius.
+    Args:
+        centre: [m].
+        start: The point on the circle where it begins and ends [m].
+        normal: Axis about which it turns, counter-clockwise; any length. It must be at right angles to the radius.
     """
 
     def __init__(self, centre: ArrayLike, start: ArrayLike, normal: ArrayLike) -> None:
@@ -124,15 +116,12 @@ class Hermite:
     Direction is continuous everywhere, curvature within a section. At a waypoint curvature jumps, unless no velocities
     are given and those of the natural cubic spline are taken.
 
-    Parameters
-    ----------
-    waypoints
-        [m], ``(k, 3)``.
-    velocities
-        At the waypoints [m per unit of the parameter], ``(k, 3)``; those of the natural cubic spline if None.
-    knots
-        Value of the parameter at each waypoint, ascending, ``(k,)``: times [s] where velocities are in m/s;
-        0, 1, 2 and so on if None.
+    Args:
+        waypoints: [m], ``(k, 3)``.
+        velocities: At the waypoints [m per unit of the parameter], ``(k, 3)``; those of the natural cubic spline if
+            None.
+        knots: Value of the parameter at each waypoint, ascending, ``(k,)``: times [s] where velocities are in m/s; 0,
+            1, 2 and so on if None.
     """
 
     def __init__(
@@ -173,10 +162,8 @@ class Hermite:
     def length(self) -> float:
         """Length of the path [m].
 
-        Raises
-        ------
-        InputError
-            If the point stands still somewhere: there the path has no direction.
+        Raises:
+            InputError: If the point stands still somewhere: there the path has no direction.
         """
         return float(self._travelled[-1])
 

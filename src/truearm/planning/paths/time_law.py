@@ -20,20 +20,12 @@ from truearm.planning.paths.trajectory import Trajectory, sample_times
 
 @dataclass(frozen=True)
 class TimeLaw:
-    """The motion along a path of some length, from rest to rest.
+    """The motion along a path of some length, from rest to rest."""
 
-    Attributes
-    ----------
-    length
-        Of the path [m].
-    speed
-        Speed between the ramps [m/s]. On a path too short for both ramps the peak is lower: see :attr:`peak_speed`.
-    acceleration
-        Largest acceleration along the path [m/s^2]. What a bend adds, speed squared times curvature, is not in it.
-    """
-
-    length: float
+    length: float  #: Of the path [m].
+    #: Speed between the ramps [m/s]. On a path too short for both ramps the peak is lower: see :attr:`peak_speed`.
     speed: float
+    #: Largest acceleration along the path [m/s^2]. What a bend adds, speed squared times curvature, is not in it.
     acceleration: float
 
     def __post_init__(self) -> None:
@@ -71,19 +63,13 @@ class TimeLaw:
 def timed(path: Path, speed: float, acceleration: float, step: float) -> Trajectory:
     """Let a point run along a path, from rest to rest.
 
-    Parameters
-    ----------
-    path
-        Where it goes.
-    speed, acceleration
-        As :class:`TimeLaw` has them [m/s], [m/s^2].
-    step
-        Time between samples, or a little less, so that the last sample is the end [s].
+    Args:
+        path: Where it goes.
+        speed, acceleration: As :class:`TimeLaw` has them [m/s], [m/s^2].
+        step: Time between samples, or a little less, so that the last sample is the end [s].
 
-    Raises
-    ------
-    InputError
-        If a number is not positive, or the samples would be more than a million.
+    Raises:
+        InputError: If a number is not positive, or the samples would be more than a million.
     """
     law = TimeLaw(path.length, speed, acceleration)
     time = sample_times(law.duration, step)

@@ -17,18 +17,10 @@ _MOST_SAMPLES: Final = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Where a point is over time, in the robot's base frame.
+    """Where a point is over time, in the robot's base frame."""
 
-    Attributes
-    ----------
-    time
-        [s], ``(n,)``, rising.
-    position, velocity, acceleration
-        [m], [m/s], [m/s^2], ``(n, 3)``.
-    """
-
-    time: Array
-    position: Array
+    time: Array  #: [s], ``(n,)``, rising.
+    position: Array  #: position, velocity, acceleration: [m], [m/s], [m/s^2], ``(n, 3)``.
     velocity: Array
     acceleration: Array
 

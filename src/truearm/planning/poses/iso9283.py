@@ -40,27 +40,13 @@ _GOLDEN: Final = (math.sqrt(5.0) - 1.0) / 2.0
 
 @dataclass(frozen=True, eq=False)
 class DiagonalPlane:
-    """A rectangle that holds two opposite horizontal edges of a cube.
+    """A rectangle that holds two opposite horizontal edges of a cube."""
 
-    Attributes
-    ----------
-    name
-        Its corners.
-    centre
-        [m], in the base frame.
-    along
-        Unit vector along the horizontal edges.
-    across
-        Unit vector at right angles to it in the plane, upwards.
-    side
-        Of the cube [m]: the rectangle is ``side`` by ``sqrt(2) side``.
-    """
-
-    name: str
-    centre: Array
-    along: Array
-    across: Array
-    side: float
+    name: str  #: Its corners.
+    centre: Array  #: [m], in the base frame.
+    along: Array  #: Unit vector along the horizontal edges.
+    across: Array  #: Unit vector at right angles to it in the plane, upwards.
+    side: float  #: Of the cube [m]: the rectangle is ``side`` by ``sqrt(2) side``.
 
     @property
     def normal(self) -> Array:
@@ -112,12 +98,9 @@ class DiagonalPlane:
 class Cube:
     """A cube with edges along the axes of the base frame.
 
-    Parameters
-    ----------
-    centre
-        [m].
-    side
-        [m].
+    Args:
+        centre: [m].
+        side: [m].
     """
 
     centre: Array

@@ -56,23 +56,15 @@ def largest_cube(
     touches itself, its tool or its surroundings is not looked at: `nearest` and `floor` keep the cube away from base
     and table. Of many local searches the best one counts; the largest cube there is may be a hundredth larger.
 
-    Parameters
-    ----------
-    robot
-        The arm.
-    target
-        Name of the target that shall reach the points; the flange if None.
-    ahead
-        Direction from the base in which work is done.
-    nearest
-        How far ahead of the base's origin the cube begins at the nearest [m].
-    floor
-        How high above the base's origin it begins at the lowest [m].
+    Args:
+        robot: The arm.
+        target: Name of the target that shall reach the points; the flange if None.
+        ahead: Direction from the base in which work is done.
+        nearest: How far ahead of the base's origin the cube begins at the nearest [m].
+        floor: How high above the base's origin it begins at the lowest [m].
 
-    Raises
-    ------
-    InputError
-        If the arm reaches no cube in this direction.
+    Raises:
+        InputError: If the arm reaches no cube in this direction.
     """
     if ahead not in DIRECTIONS:
         raise InputError("there is no such direction", where="ahead", came=ahead, allowed=", ".join(DIRECTIONS))

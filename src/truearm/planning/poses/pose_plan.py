@@ -38,30 +38,14 @@ _ORDERS: Final = 10
 
 @dataclass(frozen=True, eq=False)
 class PosePlan:
-    """Poses to measure, in the order in which to measure them.
+    """Poses to measure, in the order in which to measure them."""
 
-    Attributes
-    ----------
-    cube
-        They lie on its diagonal planes.
-    points
-        Where the tip goes, in the base frame [m], ``(n, 3)``.
-    approach
-        Direction of the tip's z axis there, ``(n, 3)``.
-    plane
-        Name of the diagonal plane of each point.
-    joints
-        Joint positions that reach the points [rad or m], ``(n, joints)``.
-    target
-        Name of the target that goes there; the flange if None.
-    """
-
-    cube: Cube
-    points: Array
-    approach: Array
-    plane: tuple[str, ...]
-    joints: Array
-    target: str | None
+    cube: Cube  #: They lie on its diagonal planes.
+    points: Array  #: Where the tip goes, in the base frame [m], ``(n, 3)``.
+    approach: Array  #: Direction of the tip's z axis there, ``(n, 3)``.
+    plane: tuple[str, ...]  #: Name of the diagonal plane of each point.
+    joints: Array  #: Joint positions that reach the points [rad or m], ``(n, joints)``.
+    target: str | None  #: Name of the target that goes there; the flange if None.
 
     @property
     def smallest_move(self) -> float:
@@ -80,25 +64,17 @@ def plan_poses(
 ) -> PosePlan:
     """Return poses on the diagonal planes of a cube, ordered so that all joints move from one to the next.
 
-    Parameters
-    ----------
-    robot
-        The arm.
-    cube
-        From :func:`truearm.planning.poses.largest_cube.largest_cube`, or of one's own choice.
-    target
-        Name of the target that goes to the points; the flange if None.
-    count
-        How many poses.
-    least_move
-        What every joint moves at least from one pose to the next [rad; m for sliding joints].
-    seed
-        For the random configurations; the same seed gives the same poses.
+    Args:
+        robot: The arm.
+        cube: From :func:`truearm.planning.poses.largest_cube.largest_cube`, or of one's own choice.
+        target: Name of the target that goes to the points; the flange if None.
+        count: How many poses.
+        least_move: What every joint moves at least from one pose to the next [rad; m for sliding joints].
+        seed: For the random configurations; the same seed gives the same poses.
 
-    Raises
-    ------
-    InputError
-        If the count is not positive, a point is not reached, or no order was found in which all joints move.
+    Raises:
+        InputError: If the count is not positive, a point is not reached, or no order was found in which all joints
+            move.
     """
     if isinstance(count, bool) or count < 1:
         raise InputError("at least one pose is needed", where="count", came=count, allowed="1 or more")
@@ -126,23 +102,16 @@ def moving_order(
 ) -> NDArray[np.intp]:
     """Return an order of poses in which all joints move from one to the next, ``(n,)``.
 
-    Parameters
-    ----------
-    joints
-        Joint positions at the poses ``(n, joints)``. Where no order was found they are changed, if `again` allows it.
-    points
-        Where the tip goes [m], ``(n, 3)``.
-    target
-        Name of the target that goes there; the flange if None.
-    least_move
-        What every joint moves at least [rad; m for sliding joints].
-    again
-        Whether poses may be reached anew, in other orientations.
+    Args:
+        joints: Joint positions at the poses ``(n, joints)``. Where no order was found they are changed, if `again`
+            allows it.
+        points: Where the tip goes [m], ``(n, 3)``.
+        target: Name of the target that goes there; the flange if None.
+        least_move: What every joint moves at least [rad; m for sliding joints].
+        again: Whether poses may be reached anew, in other orientations.
 
-    Raises
-    ------
-    InputError
-        If no such order was found.
+    Raises:
+        InputError: If no such order was found.
     """
     stuck = np.zeros(0, dtype=np.intp)
     for _ in range(_ORDERS):
@@ -169,19 +138,14 @@ def joints_at(
 
     Each point is reached from the nearest of many random configurations.
 
-    Parameters
-    ----------
-    points
-        In the base frame [m], ``(n, 3)``.
-    target
-        Name of the target that goes there; the flange if None.
+    Args:
+        points: In the base frame [m], ``(n, 3)``.
+        target: Name of the target that goes there; the flange if None.
 
-    Returns
-    -------
-    joints
-        Joint positions within the limits ``(n, joints)`` [rad or m]; of no meaning where a point is not reached.
-    reached
-        ``(n,)``.
+    Returns:
+        joints: Joint positions within the limits ``(n, joints)`` [rad or m]; of no meaning where a point is not
+            reached.
+        reached: ``(n,)``.
     """
     joints = np.zeros((len(points), len(robot.joints)))
     regular, reached = np.zeros((2, len(points)), dtype=bool)

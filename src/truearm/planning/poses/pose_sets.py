@@ -46,37 +46,17 @@ _GOLDEN_ANGLE: Final = math.pi * (3.0 - math.sqrt(5.0))
 
 @dataclass(frozen=True, eq=False)
 class PoseSet:
-    """Poses that a robot can go to, in the order in which to go to them.
+    """Poses that a robot can go to, in the order in which to go to them."""
 
-    Attributes
-    ----------
-    name
-        Of the set.
-    labels
-        Of each pose.
-    position, rotation
-        Of the tip in the robot's base frame, ``(n, 3)`` [m] and ``(n, 3, 3)``.
-    joints
-        Joint positions that reach them [rad or m], ``(n, joints)``.
-    planes
-        Name of the diagonal plane of each pose; empty for poses on none.
-    target
-        Name of the target that goes there; the flange if None.
-    missed
-        Labels of the poses that the robot cannot go to, and are not among these.
-    cube
-        In which the poses lie; None for those on a sphere.
-    """
-
-    name: str
-    labels: tuple[str, ...]
-    position: Array
+    name: str  #: Of the set.
+    labels: tuple[str, ...]  #: Of each pose.
+    position: Array  #: position, rotation: of the tip in the robot's base frame, ``(n, 3)`` [m] and ``(n, 3, 3)``.
     rotation: Array
-    joints: Array
-    planes: tuple[str, ...]
-    target: str | None
-    missed: tuple[str, ...]
-    cube: Cube | None
+    joints: Array  #: Joint positions that reach them [rad or m], ``(n, joints)``.
+    planes: tuple[str, ...]  #: Name of the diagonal plane of each pose; empty for poses on none.
+    target: str | None  #: Name of the target that goes there; the flange if None.
+    missed: tuple[str, ...]  #: Labels of the poses that the robot cannot go to, and are not among these.
+    cube: Cube | None  #: In which the poses lie; None for those on a sphere.
 
     @property
     def smallest_move(self) -> float:
@@ -98,32 +78,21 @@ def pose_set(
 ) -> PoseSet:
     """Return a set of poses, and which of them the robot cannot go to.
 
-    Parameters
-    ----------
-    robot
-        The arm.
-    name
-        One of :data:`POSE_SETS`.
-    cube
-        Where the poses lie. A sphere is about its centre, and half its side is the radius.
-    plane
-        Name of the diagonal plane, for sets on one plane.
-    count
-        How many poses, for sets that leave it open; their own number if None.
-    target
-        Name of the target that goes to the poses; the flange if None.
-    rotation
-        Orientation of the tip at all poses, ``(3, 3)``; any if None.
-    least_move
-        What every joint moves at least from one pose to the next in the set 118 [rad; m for sliding joints].
-    seed
-        For the random configurations; the same seed gives the same poses.
+    Args:
+        robot: The arm.
+        name: One of :data:`POSE_SETS`.
+        cube: Where the poses lie. A sphere is about its centre, and half its side is the radius.
+        plane: Name of the diagonal plane, for sets on one plane.
+        count: How many poses, for sets that leave it open; their own number if None.
+        target: Name of the target that goes to the poses; the flange if None.
+        rotation: Orientation of the tip at all poses, ``(3, 3)``; any if None.
+        least_move: What every joint moves at least from one pose to the next in the set 118 [rad; m for sliding
+            joints].
+        seed: For the random configurations; the same seed gives the same poses.
 
-    Raises
-    ------
-    InputError
-        If there is no such set or plane, the number of poses is fixed, none of them is reached, or no order was found
-        in which all joints move.
+    Raises:
+        InputError: If there is no such set or plane, the number of poses is fixed, none of them is reached, or no order
+            was found in which all joints move.
     """
     if name not in POSE_SETS:
         raise InputError("there is no such set of poses", where="set", came=name, allowed=", ".join(POSE_SETS))

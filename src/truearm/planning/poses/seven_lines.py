@@ -27,21 +27,11 @@ DOWN: Final = np.diag([1.0, -1.0, -1.0])
 
 @dataclass(frozen=True, eq=False)
 class SevenLines:
-    """Poses of the line test, line after line.
+    """Poses of the line test, line after line."""
 
-    Attributes
-    ----------
-    position
-        Of the flange in the robot's base frame [m], ``(7 k, 3)``.
-    rotation
-        ``(3, 3)``, the same everywhere.
-    labels
-        ``x-1`` to ``xyz-k``.
-    """
-
-    position: Array
-    rotation: Array
-    labels: tuple[str, ...]
+    position: Array  #: Of the flange in the robot's base frame [m], ``(7 k, 3)``.
+    rotation: Array  #: ``(3, 3)``, the same everywhere.
+    labels: tuple[str, ...]  #: ``x-1`` to ``xyz-k``.
 
     @property
     def poses_each(self) -> int:
@@ -56,10 +46,8 @@ class SevenLines:
     def joints(self, robot: Robot) -> Array:
         """Return the nominal robot's joint positions ``(7 k, joints)``.
 
-        Raises
-        ------
-        InputError
-            If it cannot go to one of the poses, with its label.
+        Raises:
+            InputError: If it cannot go to one of the poses, with its label.
         """
         rotation = np.broadcast_to(self.rotation, (len(self.position), 3, 3))
         return usable_joints(inverse(robot, self.position, rotation, seed=self._seed(robot)), self.labels, "line test")
@@ -74,19 +62,13 @@ class SevenLines:
 def seven_lines(centre: ArrayLike, size: ArrayLike, poses_each: int = POSES_EACH, rotation: Array = DOWN) -> SevenLines:
     """Return the poses of the line test.
 
-    Parameters
-    ----------
-    centre, size
-        Of the box in the robot's base frame [m], three numbers each.
-    poses_each
-        On each line, 2 or more.
-    rotation
-        Of the flange.
+    Args:
+        centre, size: Of the box in the robot's base frame [m], three numbers each.
+        poses_each: On each line, 2 or more.
+        rotation: Of the flange.
 
-    Raises
-    ------
-    InputError
-        If the box has no size.
+    Raises:
+        InputError: If the box has no size.
     """
     middle, lengths = np.asarray(centre, float), np.asarray(size, float)
     if lengths.shape != (3,) or not (lengths > 0.0).all():

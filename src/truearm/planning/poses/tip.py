@@ -13,32 +13,20 @@ from truearm.modeling.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class TipState:
-    """Where the tip is at some configurations, in the robot's base frame.
+    """Where the tip is at some configurations, in the robot's base frame."""
 
-    Attributes
-    ----------
-    position
-        [m], ``(n, 3)``.
-    rotation
-        ``(n, 3, 3)``.
-    jacobian
-        Linear and then angular velocity by the true joint variables [m, rad per rad or m], ``(n, 6, joints)``.
-    """
-
-    position: Array
-    rotation: Array
+    position: Array  #: [m], ``(n, 3)``.
+    rotation: Array  #: ``(n, 3, 3)``.
+    #: Linear and then angular velocity by the true joint variables [m, rad per rad or m], ``(n, 6, joints)``.
     jacobian: Array
 
 
 class Tip:
     """The flange of a robot, or a target on it.
 
-    Parameters
-    ----------
-    robot
-        With the parameter values and effects that shall hold.
-    target
-        Name of the target; the flange if None.
+    Args:
+        robot: With the parameter values and effects that shall hold.
+        target: Name of the target; the flange if None.
     """
 
     def __init__(self, robot: Robot, target: str | None = None) -> None:

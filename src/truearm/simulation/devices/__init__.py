@@ -43,10 +43,8 @@ DEVICES: Final[tuple[Device, ...]] = (
 def named_device(name: str) -> Device:
     """Return the device of this name.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises:
+        InputError: If there is none.
     """
     known = {device.name: device for device in DEVICES}
     if name in known:

@@ -21,25 +21,16 @@ class Artefact(Device):
     """Cameras at the origin of the world that count what they see of an artefact on the flange.
 
     A target is seen if it looks at the cameras within a cone. What the arm itself hides is not asked.
-
-    Attributes
-    ----------
-    normals
-        Where each target of the artefact looks, in the flange frame, ``(k, 3)``.
-    within
-        Half the opening of a target's cone of sight [rad].
-    at_least
-        How many must be seen.
-    size
-        Typical distance of a target from the middle of the artefact [m]: what turns a deviation of places into one of
-        angles.
     """
 
     no_plan: ClassVar[str] = ""
 
+    #: Where each target of the artefact looks, in the flange frame, ``(k, 3)``.
     normals: tuple[tuple[float, float, float], ...] = ()
-    within: float = np.deg2rad(60.0)
-    at_least: int = 3
+    within: float = np.deg2rad(60.0)  #: Half the opening of a target's cone of sight [rad].
+    at_least: int = 3  #: How many must be seen.
+    #: Typical distance of a target from the middle of the artefact [m]: what turns a deviation of places into one of
+    #: angles.
     size: float = 0.075
 
     @property

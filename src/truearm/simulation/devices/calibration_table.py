@@ -32,17 +32,10 @@ _SINGULAR: Final = 1e-6  # share of the largest singular value below which the a
 
 @dataclass(frozen=True, eq=False)
 class CalibrationTable:
-    """A plate with known points.
+    """A plate with known points."""
 
-    Attributes
-    ----------
-    points
-        In the table's frame [m], ``(n, 3)``. Its z is the normal of the plate.
-    place
-        ``T_world_table``: where the table truly stands in the world of the twins that touch it.
-    """
-
-    points: Array
+    points: Array  #: In the table's frame [m], ``(n, 3)``. Its z is the normal of the plate.
+    #: ``T_world_table``: where the table truly stands in the world of the twins that touch it.
     place: Transform = IDENTITY
 
     def __post_init__(self) -> None:
@@ -64,15 +57,11 @@ class CalibrationTable:
     def tilted(self, roll: float, pitch: float) -> CalibrationTable:
         """Return the table tilted about its own origin: ``T_world_table Rx(roll) Ry(pitch)``.
 
-        Parameters
-        ----------
-        roll, pitch
-            [rad].
+        Args:
+            roll, pitch: [rad].
 
-        Raises
-        ------
-        InputError
-            If the roll is beyond what the table's ball joint turns.
+        Raises:
+            InputError: If the roll is beyond what the table's ball joint turns.
         """
         if not abs(roll) <= ROLL_LIMIT:
             raise InputError(
@@ -99,25 +88,18 @@ class CalibrationTable:
     ) -> Dataset:
         """Return the joint positions at which a twin's tip is on each point, with the known points as positions.
 
-        Parameters
-        ----------
-        twin
-            With one target, its tip.
-        start
-            Joint positions from which the tip is jogged onto every point ``(joints,)`` [rad or m]: they choose the
-            elbow.
-        noise
-            Standard deviation of each coordinate of the tip about the known point [m]: play in the hole, and how well
-            the points are known. Declared in the data unless it is zero.
-        conditions
-            See :class:`~truearm.simulation.twin.Conditions`. If `approach` is left out, joints come from the point
-            before: directions are those of the moves that an arm without hysteresis would make.
+        Args:
+            twin: With one target, its tip.
+            start: Joint positions from which the tip is jogged onto every point ``(joints,)`` [rad or m]: they choose
+                the elbow.
+            noise: Standard deviation of each coordinate of the tip about the known point [m]: play in the hole, and how
+                well the points are known. Declared in the data unless it is zero.
+            conditions: See :class:`~truearm.simulation.twin.Conditions`. If `approach` is left out, joints come from
+                the point before: directions are those of the moves that an arm without hysteresis would make.
 
-        Raises
-        ------
-        InputError
-            Naming the first point that the tip cannot touch, or for which a joint would leave its limits; or if the
-            twin has not just one target.
+        Raises:
+            InputError: Naming the first point that the tip cannot touch, or for which a joint would leave its limits;
+                or if the twin has not just one target.
         """
         robot = twin.robot
         if len(robot.targets) != 1:
@@ -157,10 +139,8 @@ class CalibrationTable:
 def rectangular_grid(columns: int, rows: int, spacing: float) -> Array:
     """Return the points of a grid about the origin of the plane z = 0, row by row along x [m], ``(columns*rows, 3)``.
 
-    Raises
-    ------
-    InputError
-        If there is no point, or no space between them.
+    Raises:
+        InputError: If there is no point, or no space between them.
     """
     if columns < 1 or rows < 1 or not 0.0 < spacing < math.inf:
         raise InputError(

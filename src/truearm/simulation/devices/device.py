@@ -53,33 +53,18 @@ class _InOrder:
 
 @dataclass(frozen=True)
 class Device(ABC):
-    """An instrument.
+    """An instrument."""
 
-    Attributes
-    ----------
-    name
-        As the command line spells it.
-    summary
-        What it is and reads, in words.
-    source
-        Where its figures come from.
-    sigma
-        Standard deviation of a coordinate, distance or height that it reads [m].
-    tool
-        What it needs on the flange; None for whatever targets the robot has.
-    no_plan
-        Why it cannot go through a plan of configurations by itself, reading by reading; empty if it can.
-    """
-
+    #: Why it cannot go through a plan of configurations by itself, reading by reading; empty if it can.
     no_plan: ClassVar[str] = (
         "the arm is jogged to what this device reads, so the joint positions come of measuring and not of a plan"
     )
 
-    name: str
-    summary: str
-    source: str
-    sigma: float
-    tool: Tool | None = None
+    name: str  #: As the command line spells it.
+    summary: str  #: What it is and reads, in words.
+    source: str  #: Where its figures come from.
+    sigma: float  #: Standard deviation of a coordinate, distance or height that it reads [m].
+    tool: Tool | None = None  #: What it needs on the flange; None for whatever targets the robot has.
 
     @property
     def reads_where(self) -> str:
@@ -101,22 +86,15 @@ class Device(ABC):
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return what it reads of an arm.
 
-        Parameters
-        ----------
-        nominal
-            What is known of the arm: the nominal robot where it stands, with the targets of its tool. Postures are
-            chosen by it.
-        arm
-            What is read.
-        count
-            Number of configurations.
-        sigma
-            Standard deviation of a reading [m]; zero reads without noise and declares nothing.
+        Args:
+            nominal: What is known of the arm: the nominal robot where it stands, with the targets of its tool. Postures
+                are chosen by it.
+            arm: What is read.
+            count: Number of configurations.
+            sigma: Standard deviation of a reading [m]; zero reads without noise and declares nothing.
 
-        Raises
-        ------
-        InputError
-            If the arm does not reach, or never shows, what is read.
+        Raises:
+            InputError: If the arm does not reach, or never shows, what is read.
         """
 
 
@@ -125,17 +103,13 @@ def measured_with(
 ) -> Dataset:
     """Return what a device reads of a twin.
 
-    Parameters
-    ----------
-    nominal
-        The robot as it is known; where it stands and what it carries is taken from the twin. A twin may count its base
-        from elsewhere (from axis 2, say), so the nominal robot stands where its flange is nearest to the true one.
-    twin
-        The true robot, given the device's tool if it needs one.
-    count
-        Number of configurations.
-    sigma
-        Standard deviation of a reading [m]; the device's own if None, no noise if zero.
+    Args:
+        nominal: The robot as it is known; where it stands and what it carries is taken from the twin. A twin may count
+            its base from elsewhere (from axis 2, say), so the nominal robot stands where its flange is nearest to the
+            true one.
+        twin: The true robot, given the device's tool if it needs one.
+        count: Number of configurations.
+        sigma: Standard deviation of a reading [m]; the device's own if None, no noise if zero.
     """
     if count < 1 or (sigma is not None and sigma < 0.0):
         raise InputError(
@@ -190,16 +164,12 @@ def recorded(
 ) -> Dataset:
     """Return readings as a dataset, the configurations numbered in the order of measurement.
 
-    Parameters
-    ----------
-    joints
-        Joint positions ``(n, joints)``.
-    configuration, target
-        Of each reading.
-    position, quaternion, distance, height, fixtures, fixture, setup
-        As in :class:`truearm.measurement.dataset.Dataset`.
-    sigma, sigma_rot
-        Standard deviations [m], [rad]; nothing is declared where they are zero.
+    Args:
+        joints: Joint positions ``(n, joints)``.
+        configuration, target: Of each reading.
+        position, quaternion, distance, height, fixtures, fixture, setup: As in
+            :class:`truearm.measurement.dataset.Dataset`.
+        sigma, sigma_rot: Standard deviations [m], [rad]; nothing is declared where they are zero.
     """
     names = tuple(dict.fromkeys(target))
     n = len(joints)
@@ -235,17 +205,13 @@ def shown(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return random configurations that show enough of the tool.
 
-    Parameters
-    ----------
-    visible
-        Tells which targets of a robot are seen at joint positions ``(n, joints)``, ``(n, targets)``; a configuration
-        that shows none of them is passed over.
-    what
-        Who looks, for messages.
+    Args:
+        visible: Tells which targets of a robot are seen at joint positions ``(n, joints)``, ``(n, targets)``; a
+            configuration that shows none of them is passed over.
+        what: Who looks, for messages.
 
-    Returns
-    -------
-    Joint positions ``(count, joints)``, and which targets are seen ``(count, targets)``.
+    Returns:
+        Joint positions ``(count, joints)``, and which targets are seen ``(count, targets)``.
     """
     found, seen = [], []
     for _ in range(_DRAWS):

@@ -36,17 +36,12 @@ def jogged(nominal: Robot, arm: Arm, target: str, joints: Array, gap: Gap) -> Ar
     The nominal robot says how to move; the arm itself says how far it still is. What the two differ by is a few
     thousandths of a move, so that a few moves do.
 
-    Parameters
-    ----------
-    joints
-        Where to begin, ``(n, joints)``.
-    gap
-        For the places of the target in the world ``(n, 3)`` the displacements that it still needs [m], ``(n, 3)``.
+    Args:
+        joints: Where to begin, ``(n, joints)``.
+        gap: For the places of the target in the world ``(n, 3)`` the displacements that it still needs [m], ``(n, 3)``.
 
-    Raises
-    ------
-    InputError
-        If it does not arrive, or only beyond the limits of its joints.
+    Raises:
+        InputError: If it does not arrive, or only beyond the limits of its joints.
     """
     low, high = _limits(nominal)
     joints = joints.copy()
@@ -83,26 +78,18 @@ def postures_at(
 ) -> tuple[NDArray[np.intp], Array]:
     """Return postures of a robot with a target at the first of the places that it reaches, turned by chance.
 
-    Parameters
-    ----------
-    goals
-        Places in the world ``(k, 3)`` [m].
-    count
-        How many of them are needed.
-    what
-        Name of what is there, for messages.
-    facing
-        Directions ``(k, 3)`` in the world along which the flange's z shall point, give or take `within` [rad]; any if
-        None.
+    Args:
+        goals: Places in the world ``(k, 3)`` [m].
+        count: How many of them are needed.
+        what: Name of what is there, for messages.
+        facing: Directions ``(k, 3)`` in the world along which the flange's z shall point, give or take `within` [rad];
+            any if None.
 
-    Returns
-    -------
-    Indices of the places ``(count,)``, and joint positions ``(count, joints)`` within the limits.
+    Returns:
+        Indices of the places ``(count,)``, and joint positions ``(count, joints)`` within the limits.
 
-    Raises
-    ------
-    InputError
-        If too few are within reach.
+    Raises:
+        InputError: If too few are within reach.
     """
     low, high = _limits(nominal)
     room = _MARGIN * np.minimum(1.0, high - low)
@@ -144,16 +131,13 @@ def postures_at(
 def followed(nominal: Robot, target: str, joints: Array, places: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return how the nominal robot leads a target along paths, by the shortest joint moves.
 
-    Parameters
-    ----------
-    joints
-        Where to begin, ``(n, joints)``.
-    places
-        Of the target in the world along each path [m], ``(steps, n, 3)``; few millimetres apart.
+    Args:
+        joints: Where to begin, ``(n, joints)``.
+        places: Of the target in the world along each path [m], ``(steps, n, 3)``; few millimetres apart.
 
-    Returns
-    -------
-    Joint positions ``(steps, n, joints)``, and which of the paths were followed to the end within the limits ``(n,)``.
+    Returns:
+        Joint positions ``(steps, n, joints)``, and which of the paths were followed to the end within the limits
+        ``(n,)``.
     """
     low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in nominal.joints]).T
     q, went, whole = joints, [], np.ones(len(joints), dtype=bool)

@@ -23,16 +23,10 @@ class KnownPoints(Device):
     """A plate with known points that the tip is jogged to by hand, at several places in turn.
 
     Where the plate lies is not known. The tool is turned otherwise each time.
-
-    Attributes
-    ----------
-    points
-        Places on the plate in its own frame [m].
-    plates
-        How the plate lies each time: roll, pitch and yaw against the base, ``Rz Ry Rx`` [rad].
     """
 
-    points: tuple[tuple[float, float, float], ...] = ()
+    points: tuple[tuple[float, float, float], ...] = ()  #: Places on the plate in its own frame [m].
+    #: How the plate lies each time: roll, pitch and yaw against the base, ``Rz Ry Rx`` [rad].
     plates: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:

@@ -26,17 +26,10 @@ class Ballbar(Device):
 
     The robot is jogged along the bar until that reads within its range, and the joints are read there. Where the cups
     stand is not known.
-
-    Attributes
-    ----------
-    length
-        Of the bar at its zero [m].
-    range
-        How far it reads to either side [m].
     """
 
-    length: float = 0.3
-    range: float = 1e-3
+    length: float = 0.3  #: Of the bar at its zero [m].
+    range: float = 1e-3  #: How far it reads to either side [m].
 
     def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
         """Return which lengths differ from the bar's by more than its range."""
@@ -76,20 +69,12 @@ class Ballbar(Device):
 
 @dataclass(frozen=True)
 class Strings(Device):
-    """Four strings from known points to one point of the tool.
-
-    Attributes
-    ----------
-    side
-        Of the square at whose corners the strings leave [m].
-    placed
-        How well these are known [m].
-    """
+    """Four strings from known points to one point of the tool."""
 
     no_plan: ClassVar[str] = "it reads four distances at once, and a plan is gone through by places and poses"
 
-    side: float = 1.5
-    placed: float = 2e-5
+    side: float = 1.5  #: Of the square at whose corners the strings leave [m].
+    placed: float = 2e-5  #: How well these are known [m].
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return four distances at random configurations above the strings."""

@@ -38,24 +38,15 @@ class PencilCircle(Device):
     taken along it to the tip of the unsprung pencil; that its direction is only known to a tenth of a degree costs
     micrometres. Together they say how far that tip is from the middle of the circle, and over the page; where these
     are is not known.
-
-    Attributes
-    ----------
-    radius
-        Of the circles [m].
-    slopes
-        Of the pages against the horizontal [rad], rising away from the robot.
-    circles
-        How many are drawn on each page, each in another posture of the arm.
-    centre
-        Of all circles in the base frame [m]; the middle of the robot's reach if None.
     """
 
     no_plan: ClassVar[str] = "its pages are scanned when all circles are drawn: it reads nothing where the arm stands"
 
-    radius: float = 0.1
+    radius: float = 0.1  #: Of the circles [m].
+    #: Of the pages against the horizontal [rad], rising away from the robot.
     slopes: tuple[float, ...] = (float(np.deg2rad(45.0)), float(np.deg2rad(25.0)), float(np.deg2rad(65.0)))
-    circles: int = 2
+    circles: int = 2  #: How many are drawn on each page, each in another posture of the arm.
+    #: Of all circles in the base frame [m]; the middle of the robot's reach if None.
     centre: tuple[float, float, float] | None = None
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:

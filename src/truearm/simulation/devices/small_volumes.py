@@ -23,21 +23,12 @@ _PLACES: Final = ((0.0, -0.15, -0.1), (0.0, 0.15, -0.1), (0.1, 0.0, 0.1))
 
 @dataclass(frozen=True)
 class SmallVolume(Device):
-    """A device that reads where the centre of a ball is, within a box, in its own frame.
+    """A device that reads where the centre of a ball is, within a box, in its own frame."""
 
-    Attributes
-    ----------
-    range
-        Sides of the box [m].
-    sphere
-        Radius about the middle within which it reads, if that is no box [m]; the box then lies inside.
-    places
-        How many places it is put to.
-    """
-
-    range: tuple[float, float, float] = (0.01, 0.01, 0.01)
+    range: tuple[float, float, float] = (0.01, 0.01, 0.01)  #: Sides of the box [m].
+    #: Radius about the middle within which it reads, if that is no box [m]; the box then lies inside.
     sphere: float | None = None
-    places: int = 3
+    places: int = 3  #: How many places it is put to.
 
     def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
         """Return which places, counted from the middle, are outside the box or sphere."""

@@ -25,17 +25,10 @@ class PlaneProbe(Device):
     """A touch probe on a flat plate, level and leaning to two sides: its tip is in a plane, where nobody knows.
 
     A level plate alone says nothing of lengths across an upright first axis.
-
-    Attributes
-    ----------
-    size
-        Side of the plate [m].
-    leaning
-        By how much it leans [rad].
     """
 
-    size: float = 0.3
-    leaning: float = np.deg2rad(30.0)
+    size: float = 0.3  #: Side of the plate [m].
+    leaning: float = np.deg2rad(30.0)  #: By how much it leans [rad].
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return contacts all over the plate in turns, the probe within 60 deg of its normal."""
@@ -90,21 +83,11 @@ def _with_these(
 
 @dataclass(frozen=True)
 class SphereProbe(Device):
-    """A touch probe on precision spheres: its tip is at a known distance from their centres.
+    """A touch probe on precision spheres: its tip is at a known distance from their centres."""
 
-    Attributes
-    ----------
-    radius
-        Of sphere and tip together [m].
-    apart
-        Distance of two spheres, which is known [m]; None for one alone.
-    known
-        How well [m].
-    """
-
-    radius: float = 0.017
-    apart: float | None = None
-    known: float = 1e-6
+    radius: float = 0.017  #: Of sphere and tip together [m].
+    apart: float | None = None  #: Distance of two spheres, which is known [m]; None for one alone.
+    known: float = 1e-6  #: How well [m].
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return contacts on the upper half of the spheres, in turns."""
@@ -171,20 +154,11 @@ class HeldAtPoint(Device):
 
 @dataclass(frozen=True)
 class TwoSockets(Device):
-    """A ball that is put into two sockets by hand, in ever other postures; joint positions are all that is read.
+    """A ball that is put into two sockets by hand, in ever other postures; joint positions are all that is read."""
 
-    Attributes
-    ----------
-    apart
-        Distance of the sockets' centres [m].
-    known
-        How well [m].
-    within
-        How far the flange's z may lean from straight down: the ball's stem meets the socket beyond [rad].
-    """
-
-    apart: float = 0.2
-    known: float = 2e-5
+    apart: float = 0.2  #: Distance of the sockets' centres [m].
+    known: float = 2e-5  #: How well [m].
+    #: How far the flange's z may lean from straight down: the ball's stem meets the socket beyond [rad].
     within: float = np.deg2rad(75.0)
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:

@@ -17,20 +17,12 @@ from truearm.simulation.devices.device import Arm, Device, recorded, shown
 
 @dataclass(frozen=True)
 class Tracker(Device):
-    """A laser tracker at the origin of the world and reflectors that look outward from the tool.
-
-    Attributes
-    ----------
-    within
-        Half the opening of a reflector's cone of sight [rad].
-    at_least
-        How many reflectors must be seen at a configuration for it to count.
-    """
+    """A laser tracker at the origin of the world and reflectors that look outward from the tool."""
 
     no_plan: ClassVar[str] = ""
 
-    within: float = np.deg2rad(30.0)
-    at_least: int = 1
+    within: float = np.deg2rad(30.0)  #: Half the opening of a reflector's cone of sight [rad].
+    at_least: int = 1  #: How many reflectors must be seen at a configuration for it to count.
 
     @property
     def reads_where(self) -> str:
@@ -57,17 +49,11 @@ class Tracker(Device):
 
 @dataclass(frozen=True)
 class MeasurementArm(Device):
-    """An articulated arm whose stylus is held to the targets; its base is at the origin of the world.
-
-    Attributes
-    ----------
-    reach
-        How far it reaches [m].
-    """
+    """An articulated arm whose stylus is held to the targets; its base is at the origin of the world."""
 
     no_plan: ClassVar[str] = ""
 
-    reach: float = 3.0
+    reach: float = 3.0  #: How far it reaches [m].
 
     @property
     def reads_where(self) -> str:

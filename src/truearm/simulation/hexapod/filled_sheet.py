@@ -21,16 +21,11 @@ from truearm.simulation.twin import Twin
 def locked_cups(fixture: Transform, rng: np.random.Generator, off: float = 0.0, *, fourth: bool = False) -> Array:
     """Return where the cups of a base fixture truly are in the frame of the fixture's place [m], ``(3 or 4, 3)``.
 
-    Parameters
-    ----------
-    fixture
-        Where it was meant to stand.
-    rng
-        For the deviations.
-    off
-        Standard deviation of a coordinate of a cup from its nominal place [m].
-    fourth
-        Whether there is a fourth cup.
+    Args:
+        fixture: Where it was meant to stand.
+        rng: For the deviations.
+        off: Standard deviation of a coordinate of a cup from its nominal place [m].
+        fourth: Whether there is a fourth cup.
     """
     cups = four_cups([DEVICE.base] * 3, [DEVICE.base] * 3) if fourth else triangle([DEVICE.base] * 3, "B")
     cups = cups @ fixture.rotation.T + np.array(fixture.translation)
@@ -46,19 +41,13 @@ def filled_sheet(
 ) -> str:
     """Return a sheet with what the bar reads on a twin; legs and distances beyond its range stay empty.
 
-    Parameters
-    ----------
-    twin
-        Its targets are the three cups of the tool.
-    rows
-        What is measured, in order. With a changer the tool is attached anew wherever the attachment is another than
-        before.
-    base_cups
-        True places of the base cups in the twin's world, by the name of the place [m], each ``(3 or 4, 3)``.
-    bar
-        The ballbar; it is initialised before every pose.
-    changer
-        How well the tool is attached; the same always if None.
+    Args:
+        twin: Its targets are the three cups of the tool.
+        rows: What is measured, in order. With a changer the tool is attached anew wherever the attachment is another
+            than before.
+        base_cups: True places of the base cups in the twin's world, by the name of the place [m], each ``(3 or 4, 3)``.
+        bar: The ballbar; it is initialised before every pose.
+        changer: How well the tool is attached; the same always if None.
     """
     lengths: list[dict[str, float]] = []
     attached, attachment, place = twin, rows[0].attachment, None

@@ -15,23 +15,16 @@ from truearm.simulation.hexapod.simulated import Ballbar
 def with_fourth(fixtures: SetUp, place: Array, bar: Ballbar) -> tuple[tuple[SetUp, Transform], ...]:
     """Measure a fourth cup on a twin's fixture.
 
-    Parameters
-    ----------
-    fixtures
-        The first three cups.
-    place
-        Where the fourth truly is in the twin's world [m], ``(3,)``.
-    bar
-        The ballbar; it is initialised.
+    Args:
+        fixtures: The first three cups.
+        place: Where the fourth truly is in the twin's world [m], ``(3,)``.
+        bar: The ballbar; it is initialised.
 
-    Returns
-    -------
-    For each side the fixture that it is, and its frame in that of the first side by the measured distances.
+    Returns:
+        For each side the fixture that it is, and its frame in that of the first side by the measured distances.
 
-    Raises
-    ------
-    InputError
-        If the fourth cup is beyond the ballbar's range from one of the others.
+    Raises:
+        InputError: If the fourth cup is beyond the ballbar's range from one of the others.
     """
     true = np.vstack([fixtures.base_cups, place])
     bar.initialise()

@@ -22,39 +22,24 @@ from truearm.simulation.twin import Twin
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """Fixtures that stand fast, and what was measured of them.
+    """Fixtures that stand fast, and what was measured of them."""
 
-    Attributes
-    ----------
-    base_cups
-        True places of B1, B2 and B3 in the twin's world [m], ``(3, 3)``.
-    base, tool
-        Measured distances 12, 23 and 31 [m], ``(3,)``.
-    """
-
-    base_cups: Array
-    base: Array
+    base_cups: Array  #: True places of B1, B2 and B3 in the twin's world [m], ``(3, 3)``.
+    base: Array  #: base, tool: measured distances 12, 23 and 31 [m], ``(3,)``.
     tool: Array
 
 
 def set_up(twin: Twin, touches: Array, bar: Ballbar, approach: Array | None = None) -> SetUp:
     """Lock the base cups where the robot brings its first cup, and measure both fixtures.
 
-    Parameters
-    ----------
-    twin
-        Its targets are the three cups of the tool.
-    touches
-        Joint positions at the base cups [rad or m], ``(3, joints)``.
-    bar
-        The ballbar; it is initialised for each fixture.
-    approach
-        Direction of the last move of each joint, ``(3, joints)``; unknown if None.
+    Args:
+        twin: Its targets are the three cups of the tool.
+        touches: Joint positions at the base cups [rad or m], ``(3, joints)``.
+        bar: The ballbar; it is initialised for each fixture.
+        approach: Direction of the last move of each joint, ``(3, joints)``; unknown if None.
 
-    Raises
-    ------
-    InputError
-        If a distance is beyond the ballbar's range.
+    Raises:
+        InputError: If a distance is beyond the ballbar's range.
     """
     directions = np.zeros(touches.shape) if approach is None else approach
     at_cups = [_cups(twin, joints, direction) for joints, direction in zip(touches, directions, strict=True)]
@@ -78,29 +63,19 @@ def measure_poses(
 ) -> Array:
     """Measure one configuration after the other.
 
-    Parameters
-    ----------
-    twin
-        Its targets are the three cups of the tool.
-    fixtures
-        From :func:`set_up`.
-    rows
-        What to measure, in order.
-    joints
-        Joint positions to drive to [rad or m], ``(rows, joints)``; those of the rows, or corrected ones.
-    bar
-        The ballbar.
-    approach
-        Direction of the last move of each joint, ``(rows, joints)``; unknown if None.
-    initialise
-        Whether the bar is put on its calibrator before every pose; else it drifts on.
-    changer
-        If given, the tool is attached anew before every pose.
+    Args:
+        twin: Its targets are the three cups of the tool.
+        fixtures: From :func:`set_up`.
+        rows: What to measure, in order.
+        joints: Joint positions to drive to [rad or m], ``(rows, joints)``; those of the rows, or corrected ones.
+        bar: The ballbar.
+        approach: Direction of the last move of each joint, ``(rows, joints)``; unknown if None.
+        initialise: Whether the bar is put on its calibrator before every pose; else it drifts on.
+        changer: If given, the tool is attached anew before every pose.
 
-    Returns
-    -------
-    cups
-        T1, T2 and T3 in the frame of the base fixture [m], ``(rows, 3, 3)``; NaN where a leg was beyond the range.
+    Returns:
+        cups: T1, T2 and T3 in the frame of the base fixture [m], ``(rows, 3, 3)``; NaN where a leg was beyond the
+            range.
     """
     directions = np.zeros(joints.shape) if approach is None else approach
     found = np.full((len(rows), 3, 3), np.nan)
@@ -135,11 +110,9 @@ def joined(a: Dataset, b: Dataset) -> Dataset:
 
     A configuration of the second that is called as one of the first, ``7``, becomes ``7#2``.
 
-    Raises
-    ------
-    InputError
-        If their targets or joints are others, or only one of them declares deviations or the like, or one holds more
-        than positions.
+    Raises:
+        InputError: If their targets or joints are others, or only one of them declares deviations or the like, or one
+            holds more than positions.
     """
     where = f"{a.source} and {b.source}"
     if (a.targets, a.joint_kinds) != (b.targets, b.joint_kinds):

@@ -12,21 +12,12 @@ from truearm.modeling.chain import Array
 
 @dataclass
 class Ballbar:
-    """A ballbar in use.
+    """A ballbar in use."""
 
-    Attributes
-    ----------
-    device
-        Its range and noise.
-    rng
-        For the noise.
-    drift
-        What each reading adds to the next ones until the bar is initialised again [m]. Nubiola (3.5) saw as much as
-        3 um after many readings.
-    """
-
-    device: Device
-    rng: np.random.Generator
+    device: Device  #: Its range and noise.
+    rng: np.random.Generator  #: For the noise.
+    #: What each reading adds to the next ones until the bar is initialised again [m]. Nubiola (3.5) saw as much as 3 um
+    #: after many readings.
     drift: float = 0.0
     _readings: int = 0
 

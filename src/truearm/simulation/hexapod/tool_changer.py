@@ -23,21 +23,11 @@ TURN: Final = 0.15e-3
 
 @dataclass(frozen=True)
 class ToolChanger:
-    """A tool changer in use.
+    """A tool changer in use."""
 
-    Attributes
-    ----------
-    rng
-        For what it does not repeat.
-    shift
-        Standard deviation of each coordinate of the tool [m].
-    turn
-        Standard deviation of its turn about each axis of the flange [rad].
-    """
-
-    rng: np.random.Generator
-    shift: float = SHIFT
-    turn: float = TURN
+    rng: np.random.Generator  #: For what it does not repeat.
+    shift: float = SHIFT  #: Standard deviation of each coordinate of the tool [m].
+    turn: float = TURN  #: Standard deviation of its turn about each axis of the flange [rad].
 
     def attached(self, twin: Twin) -> Twin:
         """Return the twin with its tool attached anew: its targets moved as one body on the flange.

@@ -44,49 +44,30 @@ _STILL: Final = 1e-9
 
 @dataclass(frozen=True)
 class Drives:
-    """What the drives of an arm do, beside what the truth of the robot says.
+    """What the drives of an arm do, beside what the truth of the robot says."""
 
-    Attributes
-    ----------
-    servo
-        How a joint follows its command.
-    velocity, acceleration
-        Of moves of the joints, at 100 % [rad/s, rad/s^2 or m/s, m/s^2].
-    scatter
-        Standard deviation of where a joint comes to rest, or runs, from cycle to cycle [rad or m].
-    play
-        What a joint goes too far when it came forward, and too little when backward [rad or m], where the truth says
-        nothing of it.
-    pace
-        Standard deviation of the share by which a run of a path is slower or faster than another.
-    """
-
+    #: How a joint follows its command.
     servo: Servo = field(
         default_factory=lambda: Servo(2 * math.pi * 25.0, 0.7, velocity=10.0, acceleration=200.0, feedforward=1.0)
     )
+    #: velocity, acceleration: of moves of the joints, at 100 % [rad/s, rad/s^2 or m/s, m/s^2].
     velocity: float = math.pi
     acceleration: float = 20.0
+    #: Standard deviation of where a joint comes to rest, or runs, from cycle to cycle [rad or m].
     scatter: float = 5e-6
+    #: What a joint goes too far when it came forward, and too little when backward [rad or m], where the truth says
+    #: nothing of it.
     play: float = 1e-5
-    pace: float = 2e-4
+    pace: float = 2e-4  #: Standard deviation of the share by which a run of a path is slower or faster than another.
 
 
 @dataclass(frozen=True)
 class Warming:
-    """How an arm warms up while it works: exponentially.
+    """How an arm warms up while it works: exponentially."""
 
-    Attributes
-    ----------
-    rise
-        How much colder than in the end it is at first [K].
-    time
-        Until 37 % of that are left [s].
-    growth
-        Of the links' lengths, where the truth says nothing of it [1/K]; that of steel, or of cast iron.
-    """
-
-    rise: float = 8.0
-    time: float = 5400.0
+    rise: float = 8.0  #: How much colder than in the end it is at first [K].
+    time: float = 5400.0  #: Until 37 % of that are left [s].
+    #: Of the links' lengths, where the truth says nothing of it [1/K]; that of steel, or of cast iron.
     growth: float = 1.2e-5
 
     def temperature(self, working: Array) -> Array:
@@ -100,34 +81,17 @@ WARMING: Final = Warming()
 
 @dataclass(frozen=True, eq=False)
 class MovingArm:
-    """A true arm with its controller, carrying something.
+    """A true arm with its controller, carrying something."""
 
-    Attributes
-    ----------
-    nominal
-        The robot as the controller knows it; its base frame is that of the commands.
-    target
-        Name of its target that is commanded; None for the flange.
-    twin
-        The truth. Its targets do not matter.
-    tip
-        Where the tip is on the true flange.
-    payload
-        What it carries.
-    drives, warming
-        What the truth does not say.
-    compliance
-        How far each joint gives way to a push [rad/(N m), m/N of a prismatic one], where the truth knows of no
-        compliance at all; empty for a rigid arm. Its own weight and its load do not bend such an arm.
-    """
-
-    nominal: Robot
-    target: str | None
-    twin: Twin
-    tip: Transform
-    payload: Payload
-    drives: Drives = DRIVES
+    nominal: Robot  #: The robot as the controller knows it; its base frame is that of the commands.
+    target: str | None  #: Name of its target that is commanded; None for the flange.
+    twin: Twin  #: The truth. Its targets do not matter.
+    tip: Transform  #: Where the tip is on the true flange.
+    payload: Payload  #: What it carries.
+    drives: Drives = DRIVES  #: drives, warming: what the truth does not say.
     warming: Warming = WARMING
+    #: How far each joint gives way to a push [rad/(N m), m/N of a prismatic one], where the truth knows of no
+    #: compliance at all; empty for a rigid arm. Its own weight and its load do not bend such an arm.
     compliance: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -168,17 +132,12 @@ class MovingArm:
     def joints_for(self, frames: Array, near: Array) -> Array:
         """Return joint positions with which the nominal robot brings its tip to poses in its base frame.
 
-        Parameters
-        ----------
-        frames
-            ``(n, 4, 4)`` [m].
-        near
-            Joint positions to be near to, ``(joints,)`` or ``(n, joints)``.
+        Args:
+            frames: ``(n, 4, 4)`` [m].
+            near: Joint positions to be near to, ``(joints,)`` or ``(n, joints)``.
 
-        Raises
-        ------
-        InputError
-            If a pose is out of reach.
+        Raises:
+            InputError: If a pose is out of reach.
         """
         found = inverse(self.nominal, frames[:, :3, 3], frames[:, :3, :3], target=self.target, seed=near)
         lost = [row for row, status in enumerate(found.status) if not status.usable]
@@ -195,16 +154,11 @@ class MovingArm:
     def at_rest(self, joints: Array, approach: Array, working: Array, force: Array | None = None) -> Array:
         """Return where the tip stands in the world, ``(n, 4, 4)`` [m].
 
-        Parameters
-        ----------
-        joints
-            Where the joints have come to rest, ``(n, joints)``.
-        approach
-            Direction of the last move of each joint, +1, -1 or 0, ``(n, joints)``.
-        working
-            How long the arm has been working [s], ``(n,)``; infinite for an arm that is warm.
-        force
-            With which the tip is pushed, in the axes of the twin's base frame [N], ``(n, 3)``.
+        Args:
+            joints: Where the joints have come to rest, ``(n, joints)``.
+            approach: Direction of the last move of each joint, +1, -1 or 0, ``(n, joints)``.
+            working: How long the arm has been working [s], ``(n,)``; infinite for an arm that is warm.
+            force: With which the tip is pushed, in the axes of the twin's base frame [N], ``(n, 3)``.
         """
         # Of hundredths of a kelvin links are made once: that is less than 0.1 um.
         warm = np.round(self.warming.temperature(working), 2)
@@ -231,14 +185,11 @@ class MovingArm:
     def in_motion(self, command: Array, step: float, time: Array, working: float) -> Motion:
         """Return where the tip is while the joints follow commands from rest.
 
-        Parameters
-        ----------
-        command
-            Joint positions ``(n, joints)``, `step` [s] apart; behind the last one the joints are commanded to stay.
-        time
-            When to look, evenly, from the first command [s], ``(m,)``; before it the joints stand still.
-        working
-            How long the arm has been working [s].
+        Args:
+            command: Joint positions ``(n, joints)``, `step` [s] apart; behind the last one the joints are commanded to
+                stay.
+            time: When to look, evenly, from the first command [s], ``(m,)``; before it the joints stand still.
+            working: How long the arm has been working [s].
         """
         ahead = max(0, math.ceil(-float(time[0]) / step)) + 2
         left = max(0, math.ceil(float(time[-1]) / step) + 2 - len(command))
@@ -285,22 +236,12 @@ class MovingArm:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Where the tip was, in the world.
+    """Where the tip was, in the world."""
 
-    Attributes
-    ----------
-    time
-        From the first command [s], ``(n,)``.
-    position, quaternion
-        ``(n, 3)`` [m] and ``(n, 4)``, scalar first.
-    by_joints
-        How position and orientation follow small offsets of the joints, ``(n, 6, joints)``.
-    """
-
-    time: Array
-    position: Array
+    time: Array  #: From the first command [s], ``(n,)``.
+    position: Array  #: position, quaternion: ``(n, 3)`` [m] and ``(n, 4)``, scalar first.
     quaternion: Array
-    by_joints: Array
+    by_joints: Array  #: How position and orientation follow small offsets of the joints, ``(n, 6, joints)``.
 
     def with_offset(self, joints: Array) -> tuple[Array, Array]:
         """Return position ``(n, 3)`` and turn ``(n, 3)`` [rad] with joints a little elsewhere, ``(joints,)``."""

@@ -25,21 +25,12 @@ _STRAIGHT: Final = 1e-12
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast a controller runs a path.
+    """How fast a controller runs a path."""
 
-    Attributes
-    ----------
-    velocity, acceleration
-        Of the tip along the path, the latter also across it [m/s], [m/s^2].
-    zone
-        Radius about a corner within which the path is left [m]; 0 to stop there.
-    turning, turning_acceleration
-        Largest angular velocity and acceleration [rad/s], [rad/s^2].
-    """
-
-    velocity: float
+    velocity: float  #: velocity, acceleration: of the tip along the path, the latter also across it [m/s], [m/s^2].
     acceleration: float = 10.0
-    zone: float = 0.0
+    zone: float = 0.0  #: Radius about a corner within which the path is left [m]; 0 to stop there.
+    #: turning, turning_acceleration: largest angular velocity and acceleration [rad/s], [rad/s^2].
     turning: float = 2.0 * math.pi
     turning_acceleration: float = 50.0
 
@@ -55,42 +46,23 @@ class Pace:
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """Where the tip is commanded to be.
+    """Where the tip is commanded to be."""
 
-    Attributes
-    ----------
-    time
-        From 0, evenly spaced; the last is the first one at which the tip is commanded to stand [s], ``(n,)``.
-    position, rotation
-        ``(n, 3)`` [m] and ``(n, 3, 3)``.
-    """
-
+    #: From 0, evenly spaced; the last is the first one at which the tip is commanded to stand [s], ``(n,)``.
     time: Array
-    position: Array
+    position: Array  #: position, rotation: ``(n, 3)`` [m] and ``(n, 3, 3)``.
     rotation: Array
 
 
 @dataclass(frozen=True)
 class Ramp:
-    """The motion along a length, with speed in a trapezoid.
+    """The motion along a length, with speed in a trapezoid."""
 
-    Attributes
-    ----------
-    length
-        [m], or 1 for a share.
-    before, behind
-        Speeds at its ends.
-    peak
-        Speed between the ramps.
-    acceleration
-        Of both ramps.
-    """
-
-    length: float
-    before: float
+    length: float  #: [m], or 1 for a share.
+    before: float  #: before, behind: speeds at its ends.
     behind: float
-    peak: float
-    acceleration: float
+    peak: float  #: Speed between the ramps.
+    acceleration: float  #: Of both ramps.
 
     @classmethod
     def over(cls, length: float, before: float, behind: float, velocity: float, acceleration: float) -> Ramp:
@@ -125,19 +97,13 @@ class Ramp:
 def along_lines(points: Array, rotations: Array, pace: Pace, step: float) -> Commands:
     """Return the commands along straight lines from point to point, from rest to rest.
 
-    Parameters
-    ----------
-    points, rotations
-        ``(k, 3)`` [m] and ``(k, 3, 3)``; between two the orientation turns evenly with the distance.
-    pace
-        How fast; corners are blended within its zone, or within half of a shorter line.
-    step
-        Time between two commands [s].
+    Args:
+        points, rotations: ``(k, 3)`` [m] and ``(k, 3, 3)``; between two the orientation turns evenly with the distance.
+        pace: How fast; corners are blended within its zone, or within half of a shorter line.
+        step: Time between two commands [s].
 
-    Raises
-    ------
-    InputError
-        If two neighbouring points are the same.
+    Raises:
+        InputError: If two neighbouring points are the same.
     """
     steps = np.diff(points, axis=0)
     length = np.linalg.norm(steps, axis=1)
@@ -222,14 +188,10 @@ def along_circle(centre: Array, start: Array, normal: Array, rotation: Array, pa
 def joint_move(start: Array, end: Array, velocity: float, acceleration: float, step: float) -> Array:
     """Return joint positions over time from one place to another, all joints on the way for the same time, ``(n, j)``.
 
-    Parameters
-    ----------
-    start, end
-        ``(j,)`` [rad or m].
-    velocity, acceleration
-        That no joint exceeds [rad/s, rad/s^2 or m/s, m/s^2].
-    step
-        Between two commands [s].
+    Args:
+        start, end: ``(j,)`` [rad or m].
+        velocity, acceleration: That no joint exceeds [rad/s, rad/s^2 or m/s, m/s^2].
+        step: Between two commands [s].
     """
     way = np.asarray(end) - np.asarray(start)
     longest = float(np.abs(way).max(initial=0.0))

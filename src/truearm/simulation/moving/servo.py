@@ -25,24 +25,13 @@ _CRITICAL: Final = 1e-8
 
 @dataclass(frozen=True)
 class Servo:
-    """The position loop of the joints.
+    """The position loop of the joints."""
 
-    Attributes
-    ----------
-    frequency
-        Natural frequency without damping [rad/s].
-    damping
-        Ratio; below 1 the joint overshoots.
-    velocity, acceleration
-        What a joint cannot exceed [rad/s, rad/s^2 or m/s, m/s^2].
-    feedforward
-        Share of the command's speed that is fed forward: 1 follows a steady motion without lag.
-    """
-
-    frequency: float
-    damping: float
-    velocity: float = math.inf
+    frequency: float  #: Natural frequency without damping [rad/s].
+    damping: float  #: Ratio; below 1 the joint overshoots.
+    velocity: float = math.inf  #: velocity, acceleration: what a joint cannot exceed [rad/s, rad/s^2 or m/s, m/s^2].
     acceleration: float = math.inf
+    #: Share of the command's speed that is fed forward: 1 follows a steady motion without lag.
     feedforward: float = 0.0
 
     def __post_init__(self) -> None:
@@ -55,18 +44,13 @@ class Servo:
     def follow(self, command: Array, step: float, start: Array | None = None) -> tuple[Array, Array]:
         """Return positions and velocities of joints that follow a command from rest.
 
-        Parameters
-        ----------
-        command
-            ``(n, joints)`` [rad or m], `step` [s] apart.
-        start
-            Where the joints stand at first, ``(joints,)``; None for the first command.
+        Args:
+            command: ``(n, joints)`` [rad or m], `step` [s] apart.
+            start: Where the joints stand at first, ``(joints,)``; None for the first command.
 
-        Returns
-        -------
-        position, velocity
-            ``(n, joints)`` each, at the times of the commands. Where a limit is met, the acceleration of that step is
-            constant: the one that keeps to the limit.
+        Returns:
+            position, velocity: ``(n, joints)`` each, at the times of the commands. Where a limit is met, the
+                acceleration of that step is constant: the one that keeps to the limit.
         """
         command = np.asarray(command, float)
         first = command[0] if start is None else np.asarray(start, float)

@@ -23,14 +23,10 @@ _SPREAD: Final = 0.4
 def drawn_compliance(robot: Robot, force: float, lever: float, rng: np.random.Generator) -> tuple[float, ...]:
     """Return the compliance of each joint [rad/(N m), m/N of a prismatic one].
 
-    Parameters
-    ----------
-    force
-        Weight of the rated load [N].
-    lever
-        Of the tip from the base [m].
-    rng
-        For what is drawn.
+    Args:
+        force: Weight of the rated load [N].
+        lever: Of the tip from the base [m].
+        rng: For what is drawn.
     """
     first = len(robot.joints) - _WRIST
     drawn = np.exp(_SPREAD * rng.standard_normal(len(robot.joints)))

@@ -21,10 +21,8 @@ _NEAR: Final = "#b3261e"
 def poses_figure(groups: Sequence[tuple[str, str, Sequence[HexapodPose]]]) -> Figure:
     """Draw the tool of poses over the base fixture, from each flange to its three cups.
 
-    Parameters
-    ----------
-    groups
-        Name, colour and poses of what is drawn alike.
+    Args:
+        groups: Name, colour and poses of what is drawn alike.
     """
     traces = [_triangles("base fixture", _BASE, [triangle([DEVICE.base] * 3, "B")], 6)]
     for name, colour, found in groups:

@@ -42,67 +42,39 @@ _BEFORE: Final = {"irb120": 0.30, "lrmate200ic": 0.40}
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One seed.
+    """One seed."""
 
-    Attributes
-    ----------
-    monte_carlo
-        Deviations of the cups by solution, in standard deviations of a length.
-    flange
-        Deviation of the flange's place [m] and turn [rad].
-    steady, each_pose, never
-        Errors of the cups over a session [m], ``(rows, 3)``: of a bar that does not drift, of one that drifts and is
-        put on its calibrator before each pose, and of one that never is.
-    changer
-        The same of a steady bar and a tool that is attached anew for every pose.
-    attachments
-        Cups after the tool was attached anew [m], ``(times, 3, 3)``.
-    repeated
-        Cups of poses measured again and again [m], ``(poses, times, 3, 3)``.
-    gain
-        How many times as many configurations each robot reaches with a fourth cup, by its library id.
-    """
-
+    #: Deviations of the cups by solution, in standard deviations of a length.
     monte_carlo: Mapping[int, tuple[float, float, float]]
-    flange: tuple[float, float]
+    flange: tuple[float, float]  #: Deviation of the flange's place [m] and turn [rad].
+    #: steady, each_pose, never: errors of the cups over a session [m], ``(rows, 3)``: of a bar that does not drift, of
+    #: one that drifts and is put on its calibrator before each pose, and of one that never is.
     steady: Array
     each_pose: Array
     never: Array
-    changer: Array
-    attachments: Array
-    repeated: Array
+    changer: Array  #: The same of a steady bar and a tool that is attached anew for every pose.
+    attachments: Array  #: Cups after the tool was attached anew [m], ``(times, 3, 3)``.
+    repeated: Array  #: Cups of poses measured again and again [m], ``(poses, times, 3, 3)``.
+    #: How many times as many configurations each robot reaches with a fourth cup, by its library id.
     gain: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The whole study.
+    """The whole study."""
 
-    Attributes
-    ----------
-    outcomes
-        Of the seeds.
-    plan
-        What the robot of the sessions reaches.
-    """
-
-    outcomes: tuple[Outcome, ...]
-    plan: Reachable
+    outcomes: tuple[Outcome, ...]  #: Of the seeds.
+    plan: Reachable  #: What the robot of the sessions reaches.
 
 
 def run(seeds: int, progress: Progress, trials: int, *, places: bool) -> Run:
     """Measure with the device, once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How many: of the bar's noise, of the tool changer, and of places of a fixture with four cups.
-    progress
-        Called with a few words at each step.
-    trials
-        Of each Monte Carlo.
-    places
-        Whether robots are asked what they reach with a fourth cup.
+    Args:
+        seeds: How many: of the bar's noise, of the tool changer, and of places of a fixture with four cups.
+        progress: Called with a few words at each step.
+        trials: Of each Monte Carlo.
+        places: Whether robots are asked what they reach with a fourth cup.
     """
     robot, cups = with_cups(load_robot("irb120"))
     plan = reachable(robot, PLACE, poses(cups), branches=("front-up",))

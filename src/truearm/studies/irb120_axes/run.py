@@ -50,80 +50,45 @@ Turns = Mapping[int, Turn]
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one seed's noise makes of the turns.
+    """What one seed's noise makes of the turns."""
 
-    Attributes
-    ----------
-    compliance
-        Of a twin with the compliances of Table 2.7 alone.
-    gears
-        Of one whose gears run out and lag behind as well.
-    """
-
-    compliance: Turns
-    gears: Turns
+    compliance: Turns  #: Of a twin with the compliances of Table 2.7 alone.
+    gears: Turns  #: Of one whose gears run out and lag behind as well.
 
 
 @dataclass(frozen=True)
 class Share:
-    """What the compliance of one joint alone makes of another one's turn.
+    """What the compliance of one joint alone makes of another one's turn."""
 
-    Attributes
-    ----------
-    turning, yielding
-        Numbers of the joint that turns and of the one that gives way.
-    angular
-        Range of the angular error [deg].
-    """
-
-    turning: int
+    turning: int  #: turning, yielding: numbers of the joint that turns and of the one that gives way.
     yielding: int
-    angular: float
+    angular: float  #: Range of the angular error [deg].
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The whole study.
+    """The whole study."""
 
-    Attributes
-    ----------
-    tests
-        How each joint was turned, and what the document found, by its number.
-    outcomes
-        Of the seeds.
-    run_out
-        What was chosen for each joint, by its number: the smallest with the compliances of Table 2.7.
-    nearest
-        Compliances that bring the test nearest to Table 2.3, each between the lowest and the highest of the document's
-        three set-ups, by the joint's number [rad/(N m)].
-    allowed
-        The smallest run-out of each joint by the compliances it is beside, in words.
-    noiseless
-        Without noise, one for each of the document's compliances.
-    shares
-        Whose compliance it is when joints 2 and 3 turn.
-    """
-
-    tests: Mapping[int, AxisTest]
-    outcomes: tuple[Outcome, ...]
+    tests: Mapping[int, AxisTest]  #: How each joint was turned, and what the document found, by its number.
+    outcomes: tuple[Outcome, ...]  #: Of the seeds.
+    #: What was chosen for each joint, by its number: the smallest with the compliances of Table 2.7.
     run_out: Mapping[int, RunOut]
+    #: Compliances that bring the test nearest to Table 2.3, each between the lowest and the highest of the document's
+    #: three set-ups, by the joint's number [rad/(N m)].
     nearest: Mapping[int, float]
+    #: The smallest run-out of each joint by the compliances it is beside, in words.
     allowed: Mapping[str, Mapping[int, RunOut]]
-    noiseless: tuple[Turns, ...]
-    shares: tuple[Share, ...]
+    noiseless: tuple[Turns, ...]  #: Without noise, one for each of the document's compliances.
+    shares: tuple[Share, ...]  #: Whose compliance it is when joints 2 and 3 turn.
 
 
 def run(seeds: int, progress: Progress, coarser: int) -> Run:
     """Turn every joint, once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How many: of the tracker's noise.
-    progress
-        Called with a few words at each step.
-    coarser
-        Factor on the increments.
+    Args:
+        seeds: How many: of the tracker's noise.
+        progress: Called with a few words at each step.
+        coarser: Factor on the increments.
     """
     tests = {number: replace(test, step=test.step * coarser) for number, test in TESTS.items()}
     places = {}

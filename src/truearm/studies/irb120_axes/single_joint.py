@@ -27,28 +27,15 @@ class AxisTest:
 
 @dataclass(frozen=True)
 class Turn:
-    """What circle fitting makes of one joint's run, forward and back, in the document's units.
+    """What circle fitting makes of one joint's run, forward and back, in the document's units."""
 
-    Attributes
-    ----------
-    angle
-        Commanded [deg], ``(n,)``: forward, then backward.
-    error
-        Angle about the fitted axis beyond the commanded one, zero where the joint is at zero [deg], ``(n,)``.
-    radius
-        [mm].
-    angular, tangential
-        Range of the angular error [deg] and of the tangential one [mm].
-    backlash
-        How far the joint lags behind, backward minus forward [deg].
-    """
-
-    angle: Array
+    angle: Array  #: Commanded [deg], ``(n,)``: forward, then backward.
+    #: Angle about the fitted axis beyond the commanded one, zero where the joint is at zero [deg], ``(n,)``.
     error: Array
-    radius: float
-    angular: float
+    radius: float  #: [mm].
+    angular: float  #: angular, tangential: range of the angular error [deg] and of the tangential one [mm].
     tangential: float
-    backlash: float
+    backlash: float  #: How far the joint lags behind, backward minus forward [deg].
 
 
 def _angles(test: AxisTest) -> Array:
@@ -83,27 +70,17 @@ def turn_of(places: Array, test: AxisTest) -> Turn:
 
 @dataclass(frozen=True)
 class RunOut:
-    """A sine a turn by which a gear runs out.
+    """A sine a turn by which a gear runs out."""
 
-    Attributes
-    ----------
-    amplitude
-        [deg].
-    phase
-        [rad].
-    """
-
-    amplitude: float
-    phase: float
+    amplitude: float  #: [deg].
+    phase: float  #: [rad].
 
 
 def run_out(turn: Turn, test: AxisTest) -> RunOut:
     """Return the smallest sine a turn that leaves the printed range and backlash; none if no sine does.
 
-    Parameters
-    ----------
-    turn
-        What compliance and noise do.
+    Args:
+        turn: What compliance and noise do.
     """
     at = np.radians(turn.angle)
     lagging = turn.error + np.repeat([-0.5, 0.5], len(at) // 2) * test.backlash

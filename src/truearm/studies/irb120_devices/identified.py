@@ -35,10 +35,8 @@ UNITS: Final[Mapping[str, str]] = {
 def deviations(robot: Robot) -> dict[str, float]:
     """Return how far an identified robot is from the nominal one, in the document's units.
 
-    Parameters
-    ----------
-    robot
-        As identified, in the frame of an instrument that sees the robot at :data:`STATION`.
+    Args:
+        robot: As identified, in the frame of an instrument that sees the robot at :data:`STATION`.
     """
     return _deviations(robot.values, robot.base, STATION)
 

@@ -31,38 +31,21 @@ _ON_AXIS_6 = frozenset({"alpha_6", "a_6", "compliance_6"})
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """What an instrument makes of the robot.
+    """What an instrument makes of the robot."""
 
-    Attributes
-    ----------
-    device
-        The instrument.
-    configurations
-        How many it measured.
-    anchored
-        Whether it says where the robot stands. Where it does not, errors are those left by the best rigid motion.
-    before, after
-        Position errors of its own targets at unseen configurations [m], of the nominal robot in the frames that the
-        same readings give it, and of the identified one.
-    sized
-        Of the identified robot, a change of size taken out as well.
-    gauges
-        What nobody measured: ``base``, ``size``.
-    unobservable
-        What its readings leave open of the arm itself, beside what no instrument sees, as combinations.
-    numbers
-        How many numbers it read.
-    """
-
-    device: Device
-    configurations: int
+    device: Device  #: The instrument.
+    configurations: int  #: How many it measured.
+    #: Whether it says where the robot stands. Where it does not, errors are those left by the best rigid motion.
     anchored: bool
+    #: before, after: position errors of its own targets at unseen configurations [m], of the nominal robot in the
+    #: frames that the same readings give it, and of the identified one.
     before: Array
     after: Array
-    sized: Array
-    gauges: tuple[str, ...]
+    sized: Array  #: Of the identified robot, a change of size taken out as well.
+    gauges: tuple[str, ...]  #: What nobody measured: ``base``, ``size``.
+    #: What its readings leave open of the arm itself, beside what no instrument sees, as combinations.
     unobservable: tuple[str, ...]
-    numbers: int
+    numbers: int  #: How many numbers it read.
 
 
 def accuracy(
@@ -70,12 +53,9 @@ def accuracy(
 ) -> Accuracy:
     """Calibrate a twin with an instrument and judge the robot at configurations that it has not seen.
 
-    Parameters
-    ----------
-    nominal
-        With the payload of the twin.
-    count
-        Number of configurations.
+    Args:
+        nominal: With the payload of the twin.
+        count: Number of configurations.
     """
     data = measured_with(device, nominal, twin, count, rng)
     fit = identify(nominal, data, ELASTIC)
@@ -101,14 +81,9 @@ def accuracy(
 
 @dataclass(frozen=True)
 class ToolErrors:
-    """How far off a tool centre point is that was found by touching one point, by the number of touches [m].
+    """How far off a tool centre point is that was found by touching one point, by the number of touches [m]."""
 
-    Attributes
-    ----------
-    nominal, calibrated, true
-        Found on the nominal robot, on one that a tracker calibrated, and on the true one.
-    """
-
+    #: nominal, calibrated, true: found on the nominal robot, on one that a tracker calibrated, and on the true one.
     nominal: Mapping[int, float]
     calibrated: Mapping[int, float]
     true: Mapping[int, float]

@@ -27,16 +27,11 @@ TABLE_2_5: Final[Mapping[tuple[str, str], tuple[str, str, str, str]]] = {
 def nest_errors(setup: Setup, sigma: float, size: float | None, rng: np.random.Generator) -> Array:
     """Return how far the nests 1 to 4 are from where the measuring machine has them [m], ``(4,)``.
 
-    Parameters
-    ----------
-    setup
-        Gives the nests on the artefact.
-    sigma
-        Standard deviation of a coordinate that is read [m].
-    size
-        What turns it into one of the artefact's turns [m]; None where each nest is read for itself.
-    rng
-        Of the readings.
+    Args:
+        setup: Gives the nests on the artefact.
+        sigma: Standard deviation of a coordinate that is read [m].
+        size: What turns it into one of the artefact's turns [m]; None where each nest is read for itself.
+        rng: Of the readings.
     """
     true = np.concatenate([np.array([*setup.nests.values()]) + _ARTEFACT, _GRANITE])
     if size is None:

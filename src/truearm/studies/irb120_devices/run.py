@@ -73,76 +73,37 @@ SPHERES: Final = (
 
 @dataclass(frozen=True)
 class Settings:
-    """How large the study is.
+    """How large the study is."""
 
-    Attributes
-    ----------
-    unseen
-        Configurations to judge by, and the most points of a ballbar test.
-    candidates
-        Visible configurations to choose those of a calibration from.
-    few
-        At how many seeds at most ballbar, instruments, tool and zones are looked at.
-    devices
-        The instruments that are compared.
-    training
-        Configurations that zones share, few and many.
-    zoned
-        Models that are cut into zones.
-    divisions
-        Numbers of zones along x, y and z of the base.
-    """
-
-    unseen: int
-    candidates: int
-    few: int
-    devices: tuple[Device, ...]
-    training: tuple[int, int]
-    zoned: tuple[str, ...]
-    divisions: tuple[tuple[int, int, int], ...]
+    unseen: int  #: Configurations to judge by, and the most points of a ballbar test.
+    candidates: int  #: Visible configurations to choose those of a calibration from.
+    few: int  #: At how many seeds at most ballbar, instruments, tool and zones are looked at.
+    devices: tuple[Device, ...]  #: The instruments that are compared.
+    training: tuple[int, int]  #: Configurations that zones share, few and many.
+    zoned: tuple[str, ...]  #: Models that are cut into zones.
+    divisions: tuple[tuple[int, int, int], ...]  #: Numbers of zones along x, y and z of the base.
 
 
 @dataclass(frozen=True, eq=False)
 class SetupOutcome:
-    """A set-up. Errors are position errors of the nests at unseen configurations [m].
+    """A set-up. Errors are position errors of the nests at unseen configurations [m]."""
 
-    Attributes
-    ----------
-    before
-        Of the nominal robot.
-    after, by_chance
-        Of the document's model from configurations chosen by O1, and drawn by chance.
-    least
-        The same from configurations chosen by O1, of a twin whose gears run out no more than the test of single joints
-        allows.
-    rigid
-        Of a model without compliance, where it is tried.
-    all_reflectors
-        With every reflector read at every configuration; the tracker alone.
-    number_tool_known, number_tool_free
-        How many configurations O1 asks for: nests measured on the tool beforehand, or found with the robot.
-    shares
-        What the instrument sees.
-    errors
-        All errors that `after` sums up [mm].
-    places
-        Where the robot says nest 1 was measured [m], ``(n, 3)``.
-    identified
-        Deviations from nominal, by the document's names and in its units.
-    """
-
-    before: Spread
-    after: Spread
+    before: Spread  #: Of the nominal robot.
+    after: Spread  #: after, by_chance: of the document's model from configurations chosen by O1, and drawn by chance.
     by_chance: Spread
+    #: The same from configurations chosen by O1, of a twin whose gears run out no more than the test of single joints
+    #: allows.
     least: Spread
-    rigid: Spread | None
-    all_reflectors: Spread | None
+    rigid: Spread | None  #: Of a model without compliance, where it is tried.
+    all_reflectors: Spread | None  #: With every reflector read at every configuration; the tracker alone.
+    #: number_tool_known, number_tool_free: how many configurations O1 asks for: nests measured on the tool beforehand,
+    #: or found with the robot.
     number_tool_known: int
     number_tool_free: int
-    shares: Shares
-    errors: Array
-    places: Array
-    identified: Mapping[str, float]
+    shares: Shares  #: What the instrument sees.
+    errors: Array  #: All errors that `after` sums up [mm].
+    places: Array  #: Where the robot says nest 1 was measured [m], ``(n, 3)``.
+    identified: Mapping[str, float]  #: Deviations from nominal, by the document's names and in its units.
 
 
 @dataclass(frozen=True)
@@ -156,65 +117,34 @@ class Missed:
 
 @dataclass(frozen=True)
 class Cut:
-    """A model from a number of configurations, for each zone of the workspace or for the whole of it.
+    """A model from a number of configurations, for each zone of the workspace or for the whole of it."""
 
-    Attributes
-    ----------
-    model
-        Its name.
-    configurations
-        How many the zones share.
-    divisions
-        Numbers of zones along x, y and z of the base; None for one model of the whole.
-    """
-
-    model: str
-    configurations: int
+    model: str  #: Its name.
+    configurations: int  #: How many the zones share.
+    #: Numbers of zones along x, y and z of the base; None for one model of the whole.
     divisions: tuple[int, int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Further:
-    """What takes long and is looked at for few seeds.
+    """What takes long and is looked at for few seeds."""
 
-    Attributes
-    ----------
-    spheres
-        The ballbar tests.
-    instruments
-        What every instrument makes of the robot, in the same order for all seeds.
-    tool
-        A tool calibrated alone.
-    zones
-        Errors of the models for zones [m].
-    """
-
-    spheres: Mapping[Sphere, Missed]
-    instruments: tuple[Accuracy, ...]
-    tool: ToolErrors
-    zones: Mapping[Cut, Spread]
+    spheres: Mapping[Sphere, Missed]  #: The ballbar tests.
+    instruments: tuple[Accuracy, ...]  #: What every instrument makes of the robot, in the same order for all seeds.
+    tool: ToolErrors  #: A tool calibrated alone.
+    zones: Mapping[Cut, Spread]  #: Errors of the models for zones [m].
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One seed.
+    """One seed."""
 
-    Attributes
-    ----------
-    setups
-        The document's set-ups, by name.
-    crossed
-        Errors of one set-up's calibration where another one sees, by both names [m].
-    nests
-        Errors of the nests against a measuring machine [m], by artefact and instrument, ``(4,)`` each.
-    further
-        What is looked at for few seeds only.
-    """
-
-    setups: Mapping[str, SetupOutcome]
+    setups: Mapping[str, SetupOutcome]  #: The document's set-ups, by name.
+    #: Errors of one set-up's calibration where another one sees, by both names [m].
     crossed: Mapping[tuple[str, str], Spread]
+    #: Errors of the nests against a measuring machine [m], by artefact and instrument, ``(4,)`` each.
     nests: Mapping[tuple[str, str], Array]
-    further: Further | None
+    further: Further | None  #: What is looked at for few seeds only.
 
 
 def run(seeds: int, progress: Progress, settings: Settings) -> tuple[Outcome, ...]:

@@ -41,31 +41,16 @@ _ROUNDS: Final = 6
 
 @dataclass(frozen=True)
 class Setup:
-    """What the document did with one instrument.
+    """What the document did with one instrument."""
 
-    Attributes
-    ----------
-    name
-        In our words.
-    device
-        The instrument.
-    truth
-        Which of the robot file's truths it came to.
-    payload, nests
-        What hung on the flange, and where positions were judged, in the flange frame [m].
-    configurations
-        How many it calibrated with (sections 2.5.3 to 2.5.5).
-    before, after
-        Mean position error that it prints [mm], section 2.6.2.
-    """
-
-    name: str
-    device: Tracker | Artefact
-    truth: str
+    name: str  #: In our words.
+    device: Tracker | Artefact  #: The instrument.
+    truth: str  #: Which of the robot file's truths it came to.
+    #: payload, nests: what hung on the flange, and where positions were judged, in the flange frame [m].
     payload: Payload
     nests: dict[str, Point]
-    configurations: int
-    before: str
+    configurations: int  #: How many it calibrated with (sections 2.5.3 to 2.5.5).
+    before: str  #: before, after: mean position error that it prints [mm], section 2.6.2.
     after: str
 
 
@@ -105,21 +90,11 @@ SETUPS: Final = (
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """A robot that was calibrated in a set-up.
+    """A robot that was calibrated in a set-up."""
 
-    Attributes
-    ----------
-    setup
-        The set-up.
-    robot
-        As identified; its targets are those of the instrument.
-    joints
-        At which it was measured, ``(n, joints)``.
-    """
-
-    setup: Setup
-    robot: Robot
-    joints: Array
+    setup: Setup  #: The set-up.
+    robot: Robot  #: As identified; its targets are those of the instrument.
+    joints: Array  #: At which it was measured, ``(n, joints)``.
 
     def places(self, joints: Array, nest: str) -> Array:
         """Return where it says a nest is in the world [m], ``(n, 3)``."""
@@ -132,21 +107,11 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class Shares:
-    """What an instrument sees [percent].
+    """What an instrument sees [percent]."""
 
-    Attributes
-    ----------
-    seen
-        Of all configurations.
-    several
-        Two reflectors or more, of those that are seen; None for an instrument without reflectors.
-    back
-        The side of a plate that is seen less often, of those that are seen; None without a plate.
-    """
-
-    seen: float
-    several: float | None
-    back: float | None
+    seen: float  #: Of all configurations.
+    several: float | None  #: Two reflectors or more, of those that are seen; None for an instrument without reflectors.
+    back: float | None  #: The side of a plate that is seen less often, of those that are seen; None without a plate.
 
 
 def twin_of(setup: Setup, truth: str, *, least: bool = False) -> Twin:
@@ -205,10 +170,9 @@ def calibrate(
 def number_by_o1(setup: Setup, candidates: int, rng: np.random.Generator, *, tool_known: bool) -> int:
     """Return how many configurations make O1 largest.
 
-    Parameters
-    ----------
-    tool_known
-        Whether the nests were measured on the tool beforehand, as in the document, or are found with the robot.
+    Args:
+        tool_known: Whether the nests were measured on the tool beforehand, as in the document, or are found with the
+            robot.
     """
     joints, seen = visible_configurations(setup, candidates, rng)
     return len(most_informative_number(*_rows(setup, joints, seen, tool_known=tool_known)))

@@ -27,18 +27,10 @@ _BETWEEN: Final = {2: 37e-6, 3: 112e-6, 4: 462e-6, 5: 301e-6, 6: 243e-6}
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Where a twin truly is at configurations that no calibration has seen.
+    """Where a twin truly is at configurations that no calibration has seen."""
 
-    Attributes
-    ----------
-    joints
-        ``(n, joints)``.
-    flange
-        ``T_world_flange``, ``(n, 4, 4)``.
-    """
-
-    joints: Array
-    flange: Array
+    joints: Array  #: ``(n, joints)``.
+    flange: Array  #: ``T_world_flange``, ``(n, 4, 4)``.
 
     @classmethod
     def of(cls, twin: Twin, joints: Array) -> Truth:

@@ -30,44 +30,24 @@ class Cause(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """What is left over at every configuration by a robot that has not seen it [mm].
+    """What is left over at every configuration by a robot that has not seen it [mm]."""
 
-    Attributes
-    ----------
-    mean
-        Mean length.
-    whole
-        Root mean square of the length, as are the next three.
-    common
-        Of the part that all reflectors share.
-    turning
-        Of the part by which the reflectors turn together as a rigid tool.
-    rest
-        Of what no motion of the tool explains.
-    follows
-        Correlation of the common part with that of the configuration measured before.
-    without
-        Mean length if one more cause, fitted to what the training part leaves over, is taken out too.
-    """
-
-    mean: float
-    whole: float
-    common: float
-    turning: float
-    rest: float
-    follows: float
+    mean: float  #: Mean length.
+    whole: float  #: Root mean square of the length, as are the next three.
+    common: float  #: Of the part that all reflectors share.
+    turning: float  #: Of the part by which the reflectors turn together as a rigid tool.
+    rest: float  #: Of what no motion of the tool explains.
+    follows: float  #: Correlation of the common part with that of the configuration measured before.
+    #: Mean length if one more cause, fitted to what the training part leaves over, is taken out too.
     without: Mapping[Cause, float]
 
 
 def left_over(robot: Robot, data: Dataset, model: Model, seed: int) -> Remainder:
     """Return what a model leaves over, each of five parts predicted by a fit to the others.
 
-    Parameters
-    ----------
-    data
-        With every target read at every configuration, in the order of measurement.
-    seed
-        Of the parts.
+    Args:
+        data: With every target read at every configuration, in the order of measurement.
+        seed: Of the parts.
     """
     n, count = data.configurations, len(data.targets)
     residual = np.zeros((n, count, 3))

@@ -38,20 +38,11 @@ _REMAINDERS: Final = 2
 
 @dataclass(frozen=True)
 class Case:
-    """What is fitted: a model, and what the nominal robot is given.
+    """What is fitted: a model, and what the nominal robot is given."""
 
-    Attributes
-    ----------
-    name
-        As tables print it.
-    model
-        The model.
-    payload, beta
-        Whether the nominal robot has the payload, and Hayati's beta between axes 2 and 3.
-    """
-
-    name: str
-    model: Model
+    name: str  #: As tables print it.
+    model: Model  #: The model.
+    #: payload, beta: whether the nominal robot has the payload, and Hayati's beta between axes 2 and 3.
     payload: bool = True
     beta: bool = True
 
@@ -82,10 +73,8 @@ def with_several(effects: Sequence[str]) -> Case:
 def cases(together: Sequence[str]) -> tuple[Case, ...]:
     """Return what is fitted to every split.
 
-    Parameters
-    ----------
-    together
-        Effects that are added to the elastic model on top of each other: the first two of them are.
+    Args:
+        together: Effects that are added to the elastic model on top of each other: the first two of them are.
     """
     return (
         NOMINAL,
@@ -115,50 +104,27 @@ class Chosen:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Errors on held-out configurations of one split [mm].
+    """Errors on held-out configurations of one split [mm]."""
 
-    Attributes
-    ----------
-    document, few, many
-        From as many training configurations as the document has, from few and from many.
-    table_motion_left_in
-        Of the elastic model, from many, if the table's motion is not taken out.
-    chosen
-        Of the models that `auto` chose, if it was asked.
-    """
-
+    #: document, few, many: from as many training configurations as the document has, from few and from many.
     document: Mapping[Case, Spread]
     few: Mapping[Case, Spread]
     many: Mapping[Case, Spread]
-    table_motion_left_in: Spread
-    chosen: tuple[Chosen, ...]
+    table_motion_left_in: Spread  #: Of the elastic model, from many, if the table's motion is not taken out.
+    chosen: tuple[Chosen, ...]  #: Of the models that `auto` chose, if it was asked.
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The whole study.
+    """The whole study."""
 
-    Attributes
-    ----------
-    outcomes
-        Of the seeds.
-    raw
-        The data with the table's motion.
-    many
-        Training configurations where there are plenty.
-    effects
-        Those that were added to the elastic model one by one.
-    together
-        Those that were added on top of each other.
-    elastic, cold, warm
-        What is left over by the elastic model, by it and all of `together` but warm-up, and by it and all of them.
-    """
-
-    outcomes: tuple[Outcome, ...]
-    raw: Dataset
-    many: int
-    effects: tuple[str, ...]
-    together: tuple[str, ...]
+    outcomes: tuple[Outcome, ...]  #: Of the seeds.
+    raw: Dataset  #: The data with the table's motion.
+    many: int  #: Training configurations where there are plenty.
+    effects: tuple[str, ...]  #: Those that were added to the elastic model one by one.
+    together: tuple[str, ...]  #: Those that were added on top of each other.
+    #: elastic, cold, warm: what is left over by the elastic model, by it and all of `together` but warm-up, and by it
+    #: and all of them.
     elastic: tuple[Remainder, ...]
     cold: tuple[Remainder, ...]
     warm: tuple[Remainder, ...]
@@ -175,20 +141,13 @@ def run(
 ) -> Run:
     """Fit every model to every split.
 
-    Parameters
-    ----------
-    seeds
-        How many splits into training and held-out configurations.
-    progress
-        Called with a few words at each step.
-    folder
-        Of the measured data.
-    many
-        Training configurations where there are plenty.
-    searches
-        At how many seeds at most ``auto`` chooses a model, from few and from `many` configurations.
-    effects, together
-        Effects that are added to the elastic model one by one, and on top of each other.
+    Args:
+        seeds: How many splits into training and held-out configurations.
+        progress: Called with a few words at each step.
+        folder: Of the measured data.
+        many: Training configurations where there are plenty.
+        searches: At how many seeds at most ``auto`` chooses a model, from few and from `many` configurations.
+        effects, together: Effects that are added to the elastic model one by one, and on top of each other.
     """
     raw = _measured(folder)
     if raw.configurations <= many:

@@ -50,69 +50,39 @@ _JOINT: Final = 6e-6
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One seed.
+    """One seed."""
 
-    Attributes
-    ----------
-    tracker
-        Errors on unseen configurations after the calibration by tracker [m].
-    session, unturned
-        Errors of the poses that the device measures, with the turned tool and without.
-    legs
-        Lengths minus nominal, with the turned tool [m], ``(rows, 6)``.
-    arm
-        Errors of poses that look up, read by a measurement arm.
-    either_side, one_side
-        Repeatability of T1, T2, T3 and the flange [m] when joints come from either side, and from one.
-    spheres
-        The ballbar on a sphere.
-    ways
-        Calibrations with the device.
-    """
-
-    tracker: Spread
+    tracker: Spread  #: Errors on unseen configurations after the calibration by tracker [m].
+    #: session, unturned: errors of the poses that the device measures, with the turned tool and without.
     session: PoseErrors
     unturned: PoseErrors
-    legs: Array
-    arm: PoseErrors
+    legs: Array  #: Lengths minus nominal, with the turned tool [m], ``(rows, 6)``.
+    arm: PoseErrors  #: Errors of poses that look up, read by a measurement arm.
+    #: either_side, one_side: repeatability of T1, T2, T3 and the flange [m] when joints come from either side, and from
+    #: one.
     either_side: tuple[float, ...]
     one_side: tuple[float, ...]
-    spheres: Spheres
-    ways: Ways
+    spheres: Spheres  #: The ballbar on a sphere.
+    ways: Ways  #: Calibrations with the device.
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The whole study.
+    """The whole study."""
 
-    Attributes
-    ----------
-    outcomes
-        Of the seeds.
-    designed
-        The device's poses for the nominal tool.
-    plan
-        What the nominal robot reaches of them.
-    """
-
-    outcomes: tuple[Outcome, ...]
-    designed: tuple[HexapodPose, ...]
-    plan: Reachable
+    outcomes: tuple[Outcome, ...]  #: Of the seeds.
+    designed: tuple[HexapodPose, ...]  #: The device's poses for the nominal tool.
+    plan: Reachable  #: What the nominal robot reaches of them.
 
 
 def run(seeds: int, progress: Progress, unseen: int, coarser: int) -> Run:
     """Calibrate and judge the robot, once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How many: of configurations, noise, gears and lag.
-    progress
-        Called with a few words at each step.
-    unseen
-        Configurations to judge calibrations by.
-    coarser
-        Only every so many-th of the readings on the sphere, and of those of the sessions that are compared.
+    Args:
+        seeds: How many: of configurations, noise, gears and lag.
+        progress: Called with a few words at each step.
+        unseen: Configurations to judge calibrations by.
+        coarser: Only every so many-th of the readings on the sphere, and of those of the sessions that are compared.
     """
     nominal, cups = with_cups(load_robot("irb120"))
     designed = poses(cups)

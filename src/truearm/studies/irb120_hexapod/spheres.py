@@ -51,34 +51,22 @@ _SPATIAL_LOAD: Final = Payload(2.6, (-0.023, 0.0, 0.100))
 
 @dataclass(frozen=True, eq=False)
 class Spheres:
-    """Sphere tests of one seed.
+    """Sphere tests of one seed."""
 
-    Attributes
-    ----------
-    taught, found
-        By nest and model: about the taught centre, and about the centre that fits best.
-    nominal
-        Share of readings that the nominal robot leaves within the range of the ballbar.
-    """
-
+    #: taught, found: by nest and model: about the taught centre, and about the centre that fits best.
     taught: Mapping[tuple[str, str], SphereTest]
     found: Mapping[tuple[str, str], SphereTest]
-    nominal: float
+    nominal: float  #: Share of readings that the nominal robot leaves within the range of the ballbar.
 
 
 def spheres(twin: Twin, tracker: Robot, rng: np.random.Generator, coarser: int = 1) -> Spheres:
     """Make all tests.
 
-    Parameters
-    ----------
-    twin
-        The true robot with the triangular artefact.
-    tracker
-        The document's model, calibrated by a tracker.
-    rng
-        For configurations and noise.
-    coarser
-        Only every so many-th reading.
+    Args:
+        twin: The true robot with the triangular artefact.
+        tracker: The document's model, calibrated by a tracker.
+        rng: For configurations and noise.
+        coarser: Only every so many-th reading.
     """
     nominal = without_beta(load_robot("irb120").with_payload(twin.robot.payload))
     spatial = _with_spatial(rng)

@@ -45,59 +45,28 @@ _NEAR: Final = 0.200
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A calibration of one seed.
+    """A calibration of one seed."""
 
-    Attributes
-    ----------
-    configurations
-        How many it was made from.
-    everywhere, near
-        Error of each cup over unseen configurations, and of those near the fixture [m].
-    """
-
-    configurations: int
+    configurations: int  #: How many it was made from.
+    #: everywhere, near: error of each cup over unseen configurations, and of those near the fixture [m].
     everywhere: Array
     near: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """All calibrations of one seed.
+    """All calibrations of one seed."""
 
-    Attributes
-    ----------
-    tracker
-        By the readings of a tracker.
-    few
-        With the device at the place of section 3.5.
-    one_place
-        At a flat fixture before the robot.
-    three_places
-        At three, frames of the places and model found in turn.
-    by_touches
-        The same, each place by the joint positions at its cups and the model from the first place.
-    by_touches_in_turn
-        The same again and again, each time with the model found before.
-    four_cups
-        At all sides of a fixture with a fourth cup.
-    drifting
-        At one place, with a bar that is never put on its calibrator.
-    attached_anew
-        At one place, the tool attached anew for every pose.
-    either_side
-        At one place, joints come from either side.
-    """
-
-    tracker: Way
-    few: Way
-    one_place: Way
-    three_places: Way
-    by_touches: Way
-    by_touches_in_turn: Way
-    four_cups: Way
-    drifting: Way
-    attached_anew: Way
-    either_side: Way
+    tracker: Way  #: By the readings of a tracker.
+    few: Way  #: With the device at the place of section 3.5.
+    one_place: Way  #: At a flat fixture before the robot.
+    three_places: Way  #: At three, frames of the places and model found in turn.
+    by_touches: Way  #: The same, each place by the joint positions at its cups and the model from the first place.
+    by_touches_in_turn: Way  #: The same again and again, each time with the model found before.
+    four_cups: Way  #: At all sides of a fixture with a fourth cup.
+    drifting: Way  #: At one place, with a bar that is never put on its calibrator.
+    attached_anew: Way  #: At one place, the tool attached anew for every pose.
+    either_side: Way  #: At one place, joints come from either side.
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,26 +122,16 @@ def ways(
 ) -> Ways:
     """Calibrate in all ways.
 
-    Parameters
-    ----------
-    twin
-        The true robot.
-    nominal
-        The nominal robot, with its load.
-    drive
-        The robot as its controller has it, calibrated well enough for the range of the ballbar.
-    wanted
-        The device's poses for this tool.
-    few_rows
-        What is measured at the place of section 3.5.
-    tracker
-        What a tracker read to calibrate from.
-    unseen
-        True positions to judge by, in the twin's world.
-    rng
-        For noise, lag and the tool changer.
-    coarser
-        Only every so many-th configuration that the robot reaches.
+    Args:
+        twin: The true robot.
+        nominal: The nominal robot, with its load.
+        drive: The robot as its controller has it, calibrated well enough for the range of the ballbar.
+        wanted: The device's poses for this tool.
+        few_rows: What is measured at the place of section 3.5.
+        tracker: What a tracker read to calibrate from.
+        unseen: True positions to judge by, in the twin's world.
+        rng: For noise, lag and the tool changer.
+        coarser: Only every so many-th configuration that the robot reaches.
     """
     bench = _Bench(twin, nominal, drive, wanted, rng, coarser)
     sessions = [(*bench.at(place), bench.plan(place)) for place in _PLACES]

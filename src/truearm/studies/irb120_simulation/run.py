@@ -34,60 +34,30 @@ _DRAWN: Final = {"m": 0.20e-3, "rad": math.radians(0.07)}
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Position errors on unseen configurations [m], of one seed.
+    """Position errors on unseen configurations [m], of one seed."""
 
-    Attributes
-    ----------
-    before, exact
-        Of the nominal robot and of the identified one, errors of Tables 2.6 and 2.7.
-    payload_as_printed
-        With the payload as it is in the true flange frame.
-    drawn_before, drawn_exact
-        As the first two, errors drawn anew.
-    no_beta
-        The drawn errors, and a model without beta.
-    d_3_held
-        Drawn errors without beta, a model without beta that holds d 3.
-    noisy
-        With the noise of the document, and masses 10 % off.
-    noisy_readings
-        The same against readings with noise.
-    masses_known
-        With noise, and the true masses.
-    no_noise
-        With masses 10 % off alone.
-    one_reflector
-        With one reading a configuration.
-    noise_as_length
-        With noise whose length, not a coordinate, is 0.070 mm.
-    errors_before, errors_noisy
-        All errors that `before` and `noisy` sum up [mm].
-    """
-
-    before: Spread
+    before: Spread  #: before, exact: of the nominal robot and of the identified one, errors of Tables 2.6 and 2.7.
     exact: Spread
-    payload_as_printed: Spread
-    drawn_before: Spread
+    payload_as_printed: Spread  #: With the payload as it is in the true flange frame.
+    drawn_before: Spread  #: drawn_before, drawn_exact: as the first two, errors drawn anew.
     drawn_exact: Spread
-    no_beta: Spread
-    d_3_held: Spread
-    noisy: Spread
-    noisy_readings: Spread
-    masses_known: Spread
-    no_noise: Spread
-    one_reflector: Spread
-    noise_as_length: Spread
-    errors_before: Array
+    no_beta: Spread  #: The drawn errors, and a model without beta.
+    d_3_held: Spread  #: Drawn errors without beta, a model without beta that holds d 3.
+    noisy: Spread  #: With the noise of the document, and masses 10 % off.
+    noisy_readings: Spread  #: The same against readings with noise.
+    masses_known: Spread  #: With noise, and the true masses.
+    no_noise: Spread  #: With masses 10 % off alone.
+    one_reflector: Spread  #: With one reading a configuration.
+    noise_as_length: Spread  #: With noise whose length, not a coordinate, is 0.070 mm.
+    errors_before: Array  #: errors_before, errors_noisy: all errors that `before` and `noisy` sum up [mm].
     errors_noisy: Array
 
 
 def calibrations(seed: Seed, unseen: int) -> Outcome:
     """Calibrate the robot of one seed in all ways.
 
-    Parameters
-    ----------
-    unseen
-        Configurations to judge by.
+    Args:
+        unseen: Configurations to judge by.
     """
     rng = seed.generator()
     nominal = load_robot("irb120")

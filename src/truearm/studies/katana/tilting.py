@@ -64,10 +64,8 @@ def tilting_from_inclinometers(
 ) -> TiltingFit:
     """Identify how a twin's joints tilt: the first stage, with pairs of postures planned for the nominal robot.
 
-    Parameters
-    ----------
-    pairs
-        How many for inclinometers, and how many for poses.
+    Args:
+        pairs: How many for inclinometers, and how many for poses.
     """
     plan = plan_tilting(
         nominal,

@@ -29,25 +29,15 @@ Corrector = Literal["markers", "low-cost"]
 
 @dataclass(frozen=True, eq=False)
 class OnPage:
-    """The circle of section 5.5.1 as the twin went round it.
+    """The circle of section 5.5.1 as the twin went round it."""
 
-    Attributes
-    ----------
-    along
-        Angle round the circle [deg], ``(n,)``.
-    outward, height
-        What the page shows beside a circle of the right size about the line's own middle, in its own plane [mm].
-    distance
-        How far the tip truly was from where it should be at that moment [mm].
-    moved
-        Likewise after the best rigid motion.
-    """
-
-    along: Array
+    along: Array  #: Angle round the circle [deg], ``(n,)``.
+    #: outward, height: what the page shows beside a circle of the right size about the line's own middle, in its own
+    #: plane [mm].
     outward: Array
     height: Array
-    distance: Array
-    moved: Array
+    distance: Array  #: How far the tip truly was from where it should be at that moment [mm].
+    moved: Array  #: Likewise after the best rigid motion.
 
     @property
     def shown(self) -> float:
@@ -57,17 +47,10 @@ class OnPage:
 
 @dataclass(frozen=True, eq=False)
 class Pages:
-    """The circle before and after correction.
+    """The circle before and after correction."""
 
-    Attributes
-    ----------
-    before
-        Commanded by the nominal robot.
-    after
-        By the instrument that the robot was calibrated with, and by start.
-    """
-
-    before: OnPage
+    before: OnPage  #: Commanded by the nominal robot.
+    #: By the instrument that the robot was calibrated with, and by start.
     after: Mapping[tuple[Corrector, Start], OnPage]
 
 

@@ -60,85 +60,45 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """What a calibration with one instrument reaches.
+    """What a calibration with one instrument reaches."""
 
-    Attributes
-    ----------
-    configurations
-        How many were measured.
-    own
-        On unseen configurations in the instrument's own frame; NaN where it has none.
-    moved
-        Likewise after the best rigid motion of all predictions.
-    size
-        By how much predicted lengths are too long [1].
-    gauge
-        What nobody measured: the base, the size.
-    unobservable
-        Parameters that predictions need and the instrument does not determine.
-    """
-
-    configurations: int
-    own: Errors
-    moved: Errors
-    size: float
-    gauge: tuple[str, ...]
-    unobservable: tuple[str, ...]
+    configurations: int  #: How many were measured.
+    own: Errors  #: On unseen configurations in the instrument's own frame; NaN where it has none.
+    moved: Errors  #: Likewise after the best rigid motion of all predictions.
+    size: float  #: By how much predicted lengths are too long [1].
+    gauge: tuple[str, ...]  #: What nobody measured: the base, the size.
+    unobservable: tuple[str, ...]  #: Parameters that predictions need and the instrument does not determine.
 
 
 @dataclass(frozen=True, eq=False)
 class OfDocument:
-    """One of the document's instruments.
+    """One of the document's instruments."""
 
-    Attributes
-    ----------
-    from_nominal
-        Distances between what it measured and the nominal robot where it stands.
-    reached
-        By start.
-    """
-
-    from_nominal: Errors
-    reached: Mapping[Start, Reached]
+    from_nominal: Errors  #: Distances between what it measured and the nominal robot where it stands.
+    reached: Mapping[Start, Reached]  #: By start.
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one seed gives.
+    """What one seed gives."""
 
-    Attributes
-    ----------
-    before_optotrak, before_markers
-        The nominal robot with base and tool fitted to the document's markers, and to the registry's on the pencil.
-    document
-        The document's instruments.
-    reached
-        By name of the instrument, and by start.
-    views
-        Share of random configurations that an instrument sees [%].
-    pages
-        The circle on the page.
-    """
-
+    #: before_optotrak, before_markers: the nominal robot with base and tool fitted to the document's markers, and to
+    #: the registry's on the pencil.
     before_optotrak: Reached
     before_markers: Reached
-    document: Mapping[DocumentInstrument, OfDocument]
-    reached: Mapping[tuple[str, Start], Reached]
-    views: Mapping[View, float]
-    pages: Pages
+    document: Mapping[DocumentInstrument, OfDocument]  #: The document's instruments.
+    reached: Mapping[tuple[str, Start], Reached]  #: By name of the instrument, and by start.
+    views: Mapping[View, float]  #: Share of random configurations that an instrument sees [%].
+    pages: Pages  #: The circle on the page.
 
 
 def run(seeds: int, progress: Progress, counts: Counts) -> tuple[Outcome, ...]:
     """Calibrate a twin with every instrument, compare it elsewhere and on the circle, once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How many: of the configurations, of the noise, and of the posture in which the circle is drawn.
-    progress
-        Called with a few words at each step.
-    counts
-        How much is measured and judged.
+    Args:
+        seeds: How many: of the configurations, of the noise, and of the posture in which the circle is drawn.
+        progress: Called with a few words at each step.
+        counts: How much is measured and judged.
     """
     return over_seeds(seeds, progress, partial(_one, counts=counts))
 

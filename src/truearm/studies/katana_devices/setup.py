@@ -63,22 +63,12 @@ STARTS: Final[tuple[Start, ...]] = ("geometry alone", "tilting first")
 
 @dataclass(frozen=True)
 class Counts:
-    """How much is measured and judged.
+    """How much is measured and judged."""
 
-    Attributes
-    ----------
-    registry
-        Configurations of each device of the registry but the two of the low-cost set-up.
-    touched, drawn
-        Contacts of the touch-up, and points of the drawn circles.
-    unseen
-        Configurations to judge by.
-    """
-
-    registry: int = 48
-    touched: int = 24
+    registry: int = 48  #: Configurations of each device of the registry but the two of the low-cost set-up.
+    touched: int = 24  #: touched, drawn: contacts of the touch-up, and points of the drawn circles.
     drawn: int = 72
-    unseen: int = 100
+    unseen: int = 100  #: Configurations to judge by.
 
     def of(self, device: Device) -> int:
         """Return how many configurations a device of the registry gets."""

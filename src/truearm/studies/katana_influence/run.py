@@ -57,81 +57,44 @@ _ANGLES: Final[Mapping[AngleUnit, float]] = {"rad": 1.0, "deg": math.radians(1.0
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """What a method leaves of the errors of one robot.
+    """What a method leaves of the errors of one robot."""
 
-    Attributes
-    ----------
-    poses
-        Mean absolute errors at the poses that were used [mm, deg].
-    unseen
-        Mean position error at unseen configurations [mm].
-    """
-
-    poses: Mapping[Quantity, float]
-    unseen: float
+    poses: Mapping[Quantity, float]  #: Mean absolute errors at the poses that were used [mm, deg].
+    unseen: float  #: Mean position error at unseen configurations [mm].
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one seed gives.
+    """What one seed gives."""
 
-    Attributes
-    ----------
-    influence, chapter_5
-        Over the poses, and over poses in the cube of chapter 5.
-    left
-        By robot and method.
-    combined
-        Mean position error at unseen configurations [mm] on the robot of Table 3.2, by method and combination.
-    apart
-        Mean distance between the predictions of Tables 3.2 and 3.3 [mm].
-    lengths
-        Largest change of a length by minimum norm [mm], by the unit of angles.
-    identified
-        Deviations from nominal that a method finds of a robot of Table 3.2 or 3.3, by the document's names [deg, mm].
-    """
-
-    influence: Influence
+    influence: Influence  #: influence, chapter_5: over the poses, and over poses in the cube of chapter 5.
     chapter_5: Influence
-    left: Mapping[tuple[Truth, Method], Left]
+    left: Mapping[tuple[Truth, Method], Left]  #: By robot and method.
+    #: Mean position error at unseen configurations [mm] on the robot of Table 3.2, by method and combination.
     combined: Mapping[tuple[OnePoseMethod, Combination], float]
-    apart: float
-    lengths: Mapping[AngleUnit, float]
+    apart: float  #: Mean distance between the predictions of Tables 3.2 and 3.3 [mm].
+    lengths: Mapping[AngleUnit, float]  #: Largest change of a length by minimum norm [mm], by the unit of angles.
+    #: Deviations from nominal that a method finds of a robot of Table 3.2 or 3.3, by the document's names [deg, mm].
     identified: Mapping[tuple[Truth, Method], Mapping[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The whole study.
+    """The whole study."""
 
-    Attributes
-    ----------
-    cube
-        Where the poses are.
-    bent
-        Influence at theta 4 = 80 deg and all others 0.
-    outcomes
-        Of the seeds.
-    """
-
-    cube: Cube
-    bent: Influence
-    outcomes: tuple[Outcome, ...]
+    cube: Cube  #: Where the poses are.
+    bent: Influence  #: Influence at theta 4 = 80 deg and all others 0.
+    outcomes: tuple[Outcome, ...]  #: Of the seeds.
 
 
 def run(seeds: int, progress: Progress, count: int, unseen: int) -> Run:
     """Calibrate three twins by every method, once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How many: of the orientations at the poses, of the unseen configurations and of the noise.
-    progress
-        Called with a few words at each step.
-    count
-        Poses to calibrate with.
-    unseen
-        Configurations to judge by.
+    Args:
+        seeds: How many: of the orientations at the poses, of the unseen configurations and of the noise.
+        progress: Called with a few words at each step.
+        count: Poses to calibrate with.
+        unseen: Configurations to judge by.
     """
     progress("looking for the largest cube")
     cube = workspace_cube()

@@ -44,15 +44,9 @@ METHODS: Final[tuple[Method, ...]] = (
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """What a method leaves: absolute errors [mm, deg], ``(n,)`` each.
+    """What a method leaves: absolute errors [mm, deg], ``(n,)`` each."""
 
-    Attributes
-    ----------
-    poses, unseen
-        At the poses that were used, and at unseen configurations.
-    """
-
-    poses: Mapping[Quantity, Array]
+    poses: Mapping[Quantity, Array]  #: poses, unseen: at the poses that were used, and at unseen configurations.
     unseen: Mapping[Quantity, Array]
 
     @property
@@ -63,21 +57,11 @@ class Left:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one seed gives.
+    """What one seed gives."""
 
-    Attributes
-    ----------
-    plan
-        The poses.
-    tilting
-        What the first stage found.
-    left
-        By method.
-    """
-
-    plan: PosePlan
-    tilting: TiltingFit
-    left: Mapping[Method, Left]
+    plan: PosePlan  #: The poses.
+    tilting: TiltingFit  #: What the first stage found.
+    left: Mapping[Method, Left]  #: By method.
 
     def ratio(self, method: Method) -> float:
         """Return what a method leaves on unseen poses, of what the conventional calibration leaves [%]."""
@@ -86,34 +70,21 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The whole study.
+    """The whole study."""
 
-    Attributes
-    ----------
-    cube
-        Where the poses are.
-    outcomes
-        Of the seeds.
-    """
-
-    cube: Cube
-    outcomes: tuple[Outcome, ...]
+    cube: Cube  #: Where the poses are.
+    outcomes: tuple[Outcome, ...]  #: Of the seeds.
 
 
 def run(seeds: int, progress: Progress, count: int, unseen: int) -> Run:
     """Calibrate a twin by every method, once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How many: of the orientations at the poses, of the postures for the inclinometers, of the unseen
-        configurations and of the noise.
-    progress
-        Called with a few words at each step.
-    count
-        Poses to calibrate with.
-    unseen
-        Configurations to judge by.
+    Args:
+        seeds: How many: of the orientations at the poses, of the postures for the inclinometers, of the unseen
+            configurations and of the noise.
+        progress: Called with a few words at each step.
+        count: Poses to calibrate with.
+        unseen: Configurations to judge by.
     """
     progress("looking for the largest cube")
     cube = workspace_cube()

@@ -54,21 +54,11 @@ SOURCES: Final[tuple[Source, ...]] = ("circle", "poses")
 
 @dataclass(frozen=True, eq=False)
 class Corrected:
-    """What the correction by one identified model is worth.
+    """What the correction by one identified model is worth."""
 
-    Attributes
-    ----------
-    circle
-        How far the twin that follows it is from the circle [mm], ``(n,)``.
-    line
-        Its mean distance from the line [mm].
-    at_poses
-        Mean error of the model at the poses [mm].
-    """
-
-    circle: Array
-    line: float
-    at_poses: float
+    circle: Array  #: How far the twin that follows it is from the circle [mm], ``(n,)``.
+    line: float  #: Its mean distance from the line [mm].
+    at_poses: float  #: Mean error of the model at the poses [mm].
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,63 +66,33 @@ class Outcome:
     """One posture of the arm along the circle, and what came of it.
 
     Distances from the circle are ``(n,)``.
-
-    Attributes
-    ----------
-    motion
-        What the nominal robot would have to do.
-    distance
-        Along the circle [mm], ``(n,)``.
-    loads
-        Force [N] and moment [N m] of the load at every joint, ``(joints, 6, n)``.
-    loads_at_rest
-        Likewise, without what motion adds.
-    predicted
-        Predicted distance from the circle by cause [mm].
-    moving
-        How far motion takes the tip from where it would be at rest, largest [mm], by cause and speed [m/s].
-    before
-        How far the twin was from the circle without correction [mm].
-    before_at_poses
-        Mean error of the nominal robot at the poses [mm].
-    perfect_geometry
-        Likewise a twin that has no errors but tilting [mm].
-    corrected
-        By what the model knows, and what its geometry was identified from.
-    exact
-        How far the twin was from the circle when corrected by its own geometry and tilting [mm].
-    exact_seated
-        Likewise a twin whose joint 1 has no backlash [mm].
     """
 
-    motion: JointMotion
-    distance: Array
-    loads: Array
-    loads_at_rest: Array
-    predicted: Mapping[Cause, Array]
+    motion: JointMotion  #: What the nominal robot would have to do.
+    distance: Array  #: Along the circle [mm], ``(n,)``.
+    loads: Array  #: Force [N] and moment [N m] of the load at every joint, ``(joints, 6, n)``.
+    loads_at_rest: Array  #: Likewise, without what motion adds.
+    predicted: Mapping[Cause, Array]  #: Predicted distance from the circle by cause [mm].
+    #: How far motion takes the tip from where it would be at rest, largest [mm], by cause and speed [m/s].
     moving: Mapping[tuple[Cause, float], float]
-    before: Array
-    before_at_poses: float
-    perfect_geometry: Array
+    before: Array  #: How far the twin was from the circle without correction [mm].
+    before_at_poses: float  #: Mean error of the nominal robot at the poses [mm].
+    perfect_geometry: Array  #: Likewise a twin that has no errors but tilting [mm].
+    #: By what the model knows, and what its geometry was identified from.
     corrected: Mapping[tuple[Model, Source], Corrected]
-    exact: Array
-    exact_seated: Array
+    exact: Array  #: How far the twin was from the circle when corrected by its own geometry and tilting [mm].
+    exact_seated: Array  #: Likewise a twin whose joint 1 has no backlash [mm].
 
 
 def run(seeds: int, progress: Progress, step: float, poses: int) -> tuple[Outcome, ...]:
     """Draw a posture, plan the circle in it, calibrate a twin in three ways, correct, and let the twin follow.
 
-    Parameters
-    ----------
-    seeds
-        How many: of the posture in which the arm follows the circle, of the noise, and of the postures for the
-        inclinometers.
-    progress
-        Called with a few words at each step.
-    step
-        Time between samples [s].
-    poses
-        How many geometry is identified from, besides the samples of the circle.
+    Args:
+        seeds: How many: of the posture in which the arm follows the circle, of the noise, and of the postures for the
+            inclinometers.
+        progress: Called with a few words at each step.
+        step: Time between samples [s].
+        poses: How many geometry is identified from, besides the samples of the circle.
     """
     return over_seeds(seeds, progress, partial(_one, step=step, poses=poses))
 

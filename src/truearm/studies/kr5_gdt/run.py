@@ -58,62 +58,36 @@ LARGER: Final = 50
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one seed gives.
+    """What one seed gives."""
 
-    Attributes
-    ----------
-    fit
-        The joint errors found.
-    before, after
-        The lines without compensation, and with it.
-    model
-        How far the model is from the twin on the lines [m], ``(poses,)``.
-    """
-
-    fit: AxisFit
-    before: LineErrors
+    fit: AxisFit  #: The joint errors found.
+    before: LineErrors  #: before, after: the lines without compensation, and with it.
     after: LineErrors
-    model: Array
+    model: Array  #: How far the model is from the twin on the lines [m], ``(poses,)``.
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The whole study.
+    """The whole study."""
 
-    Attributes
-    ----------
-    exact
-        The joint errors found without noise.
-    from_poses, from_positions
-        How many of the errors the flange's poses determine, and its positions.
-    outcomes
-        Of the seeds.
-    inside
-        In how many repetitions each error found lies within its interval [%], ``(errors,)``.
-    circles
-        Where the reflector is while joint 2 turns [m], ``(n, 3)`` each: by the nominal robot, and by the twin with
-        errors :data:`LARGER` times as large.
-    """
-
-    exact: AxisFit
+    exact: AxisFit  #: The joint errors found without noise.
+    #: from_poses, from_positions: how many of the errors the flange's poses determine, and its positions.
     from_poses: int
     from_positions: int
-    outcomes: tuple[Outcome, ...]
-    inside: Array
+    outcomes: tuple[Outcome, ...]  #: Of the seeds.
+    inside: Array  #: In how many repetitions each error found lies within its interval [%], ``(errors,)``.
+    #: Where the reflector is while joint 2 turns [m], ``(n, 3)`` each: by the nominal robot, and by the twin with
+    #: errors :data:`LARGER` times as large.
     circles: tuple[Array, Array]
 
 
 def run(seeds: int, progress: Progress, repetitions: int) -> Run:
     """Turn joints, find their errors, drive the lines, once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How many: of the noise.
-    progress
-        Called with a few words at each step.
-    repetitions
-        How often circles are measured anew to count what lies in its interval.
+    Args:
+        seeds: How many: of the noise.
+        progress: Called with a few words at each step.
+        repetitions: How often circles are measured anew to count what lies in its interval.
     """
     nominal = converted(load_robot("kr5"), "joint-errors")
     twin = Twin(nominal.with_values(true_errors()).with_frames(IDENTITY, {"reflector": _REFLECTOR}))

@@ -68,50 +68,26 @@ ALONE: Final[tuple[Alone, ...]] = ("placed", "identified")
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """Mean distance between true tip and prediction at unseen points [mm].
+    """Mean distance between true tip and prediction at unseen points [mm]."""
 
-    Attributes
-    ----------
-    before
-        Of the nominal arm.
-    after
-        By what was fitted to and how.
-    """
-
-    before: float
-    after: Mapping[tuple[Surface, Method], float]
+    before: float  #: Of the nominal arm.
+    after: Mapping[tuple[Surface, Method], float]  #: By what was fitted to and how.
 
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """How far the twin's tip was from where one model sent it [mm].
+    """How far the twin's tip was from where one model sent it [mm]."""
 
-    Attributes
-    ----------
-    points
-        At the verification points, ``(6,)``.
-    path
-        Along the other trajectory, ``(n,)``.
-    """
-
-    points: Array
-    path: Array
+    points: Array  #: At the verification points, ``(6,)``.
+    path: Array  #: Along the other trajectory, ``(n,)``.
 
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """The twin sent to the verification points and along the other trajectory.
+    """The twin sent to the verification points and along the other trajectory."""
 
-    Attributes
-    ----------
-    before
-        By the nominal arm.
-    after
-        By the document's fit to each table.
-    """
-
-    before: Followed
-    after: Mapping[Surface, Followed]
+    before: Followed  #: By the nominal arm.
+    after: Mapping[Surface, Followed]  #: By the document's fit to each table.
 
     def gain_at_points(self, surface: Surface) -> float:
         """Return by how much the fit reduces the mean error at the points [%]."""
@@ -124,74 +100,41 @@ class Following:
 
 @dataclass(frozen=True)
 class WithoutCamera:
-    """What the known points of one table alone are worth.
+    """What the known points of one table alone are worth."""
 
-    Attributes
-    ----------
-    table, around
-        Mean error at other points of the table, and about it, in its own frame [mm].
-    normal
-        Error of the table's normal in the robot's base [deg].
-    """
-
-    table: float
+    table: float  #: table, around: mean error at other points of the table, and about it, in its own frame [mm].
     around: float
-    normal: float
+    normal: float  #: Error of the table's normal in the robot's base [deg].
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one seed gives.
+    """What one seed gives."""
 
-    Attributes
-    ----------
-    play, no_play
-        What fits leave, joints having play or none.
-    mistaken
-        Mean error at unseen points after fits to the rolled table, three of its holes mistaken, no play [mm].
-    following
-        With play.
-    beyond
-        Without play, parameters off by more than the bounds.
-    at_bounds
-        How many DH parameters the document's fit leaves at a bound, with play.
-    sums
-        Equation 4 per hole of the level table [mm]: by measure, and by the measure that was fitted by.
-    without_camera
-        By table, and by what was found.
-    paths
-        Where the nominal arm should go and where the twin goes [m], ``(n, 3)`` each: through the verification points,
-        and along the other trajectory; with play.
-    touched
-        Readings of each table, and of all, joints having no play.
-    unseen
-        Where the tip truly is at the unseen points then.
-    """
-
-    play: Left
+    play: Left  #: play, no_play: what fits leave, joints having play or none.
     no_play: Left
+    #: Mean error at unseen points after fits to the rolled table, three of its holes mistaken, no play [mm].
     mistaken: Mapping[Method, float]
-    following: Following
-    beyond: Following
-    at_bounds: Mapping[Tilt, int]
+    following: Following  #: With play.
+    beyond: Following  #: Without play, parameters off by more than the bounds.
+    at_bounds: Mapping[Tilt, int]  #: How many DH parameters the document's fit leaves at a bound, with play.
+    #: Equation 4 per hole of the level table [mm]: by measure, and by the measure that was fitted by.
     sums: Mapping[tuple[Measure, Measure], float]
-    without_camera: Mapping[tuple[Tilt, Alone], WithoutCamera]
+    without_camera: Mapping[tuple[Tilt, Alone], WithoutCamera]  #: By table, and by what was found.
+    #: Where the nominal arm should go and where the twin goes [m], ``(n, 3)`` each: through the verification points,
+    #: and along the other trajectory; with play.
     paths: tuple[tuple[Array, Array], tuple[Array, Array]]
-    touched: Mapping[Surface, Dataset]
-    unseen: Dataset
+    touched: Mapping[Surface, Dataset]  #: Readings of each table, and of all, joints having no play.
+    unseen: Dataset  #: Where the tip truly is at the unseen points then.
 
 
 def run(seeds: int, progress: Progress, unseen: int) -> tuple[Outcome, ...]:
     """Calibrate the twin of each seed on every table, and judge it.
 
-    Parameters
-    ----------
-    seeds
-        How many: of true parameters, play, noise and unseen points.
-    progress
-        Called with a few words at each step.
-    unseen
-        Points about the table to judge by.
+    Args:
+        seeds: How many: of true parameters, play, noise and unseen points.
+        progress: Called with a few words at each step.
+        unseen: Points about the table to judge by.
     """
     return over_seeds(seeds, progress, partial(_one, unseen=unseen))
 

@@ -24,10 +24,8 @@ frames:
 def session_files(first: Outcome) -> dict[str, str]:
     """Return robot, known frames, bounds, readings of each table and unseen points, by the names of the files.
 
-    Parameters
-    ----------
-    first
-        Of the first seed; joints have no play.
+    Args:
+        first: Of the first seed; joints have no play.
     """
     limits = ", ".join(f"{name}: {size:g}" for name, size in BOUNDS.within.items())
     robot = replace(believed(arm()), name="li3-table", targets=(), known={})

@@ -35,21 +35,11 @@ NAMES: Final = (
 
 @dataclass(frozen=True, eq=False)
 class Cups:
-    """The base fixture as robot and ballbar know it.
+    """The base fixture as robot and ballbar know it."""
 
-    Attributes
-    ----------
-    touches
-        Joints at its cups [rad], ``(3, joints)``.
-    sides
-        Measured distances 12, 23, 31 [m], ``(3,)``.
-    corrected
-        Whether the distances count, or only the points (section 4.2).
-    """
-
-    touches: Array
-    sides: Array
-    corrected: bool = True
+    touches: Array  #: Joints at its cups [rad], ``(3, joints)``.
+    sides: Array  #: Measured distances 12, 23, 31 [m], ``(3,)``.
+    corrected: bool = True  #: Whether the distances count, or only the points (section 4.2).
 
     def frame_by(self, robot: Robot) -> WorldFrame:
         """Return the fixture's frame in the world of a model."""
@@ -77,16 +67,11 @@ def identified_holding(robot: Robot, by: Robot, data: Dataset, cups: Cups) -> Ro
     The base stands where the model `by` finds the cups of the fixture; afterwards it stands where the identified model
     finds them. Cups of the tool are not identified.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot, where the parameters start.
-    by
-        The model that is current before.
-    data
-        Cups of the tool in the fixture's frame.
-    cups
-        Of the base fixture.
+    Args:
+        robot: The nominal robot, where the parameters start.
+        by: The model that is current before.
+        data: Cups of the tool in the fixture's frame.
+        cups: Of the base fixture.
     """
     elastic = robot.with_effects(("compliance",))
     base = cups.placed(by)
@@ -100,14 +85,10 @@ def identified_holding(robot: Robot, by: Robot, data: Dataset, cups: Cups) -> Ro
 def identified_following(robot: Robot, data: Dataset, cups: Cups) -> Robot:
     """Return the same with a base that stands, at every step, where the model of that step finds the cups.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot, where the parameters start.
-    data
-        Cups of the tool in the fixture's frame.
-    cups
-        Of the base fixture.
+    Args:
+        robot: The nominal robot, where the parameters start.
+        data: Cups of the tool in the fixture's frame.
+        cups: Of the base fixture.
     """
     start = robot.with_effects(("compliance",))
     for _ in range(2):
@@ -126,24 +107,12 @@ def _solved(robot: Robot, problem: Problem | Following) -> Robot:
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """Positions in the fixture's frame, which follows the parameters: a problem for the solver.
+    """Positions in the fixture's frame, which follows the parameters: a problem for the solver."""
 
-    Attributes
-    ----------
-    robot
-        Where the parameters start; its own values load the joints.
-    data
-        Cups of the tool in the fixture's frame.
-    cups
-        Of the base fixture.
-    priors
-        None: the document has none.
-    """
-
-    robot: Robot
-    data: Dataset
-    cups: Cups
-    priors: bool = False
+    robot: Robot  #: Where the parameters start; its own values load the joints.
+    data: Dataset  #: Cups of the tool in the fixture's frame.
+    cups: Cups  #: Of the base fixture.
+    priors: bool = False  #: None: the document has none.
 
     @cached_property
     def free(self) -> FreeParameters:
@@ -188,18 +157,10 @@ class Following:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """Such a problem at one vector of its parameters.
+    """Such a problem at one vector of its parameters."""
 
-    Attributes
-    ----------
-    problem
-        What is evaluated.
-    vector
-        ``(parameters,)``.
-    """
-
-    problem: Following
-    vector: Array
+    problem: Following  #: What is evaluated.
+    vector: Array  #: ``(parameters,)``.
 
     @cached_property
     def residual(self) -> Array:

@@ -26,27 +26,13 @@ _ALLOWED: Final = Constraints.model_validate(
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Where a twin is at configurations that no calibration saw, in its own world.
+    """Where a twin is at configurations that no calibration saw, in its own world."""
 
-    Attributes
-    ----------
-    joints
-        ``(n, joints)`` [rad].
-    cup
-        Which cup of the tool is looked at, a third of the configurations each, ``(n,)``.
-    position
-        Of that cup [m], ``(n, 3)``.
-    rotation
-        Of the flange, ``(n, 3, 3)``.
-    front_up
-        Whether the nominal arm is front/up there, ``(n,)``.
-    """
-
-    joints: Array
-    cup: NDArray[np.intp]
-    position: Array
-    rotation: Array
-    front_up: NDArray[np.bool_]
+    joints: Array  #: ``(n, joints)`` [rad].
+    cup: NDArray[np.intp]  #: Which cup of the tool is looked at, a third of the configurations each, ``(n,)``.
+    position: Array  #: Of that cup [m], ``(n, 3)``.
+    rotation: Array  #: Of the flange, ``(n, 3, 3)``.
+    front_up: NDArray[np.bool_]  #: Whether the nominal arm is front/up there, ``(n,)``.
 
     def seen_from(self, frame: Transform) -> HeldOut:
         """Return the same in another frame, which is given in the world."""
@@ -88,20 +74,11 @@ def held_out(robot: Robot, twin: Twin, joints: Array) -> HeldOut:
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """Errors of a model at unseen configurations.
+    """Errors of a model at unseen configurations."""
 
-    Attributes
-    ----------
-    position
-        [m], ``(n,)``.
-    orientation
-        [rad], ``(n,)``.
-    pairs, pairs_front_up
-        Of distances between any two, predicted minus true, and where both are front/up.
-    """
-
-    position: Array
-    orientation: Array
+    position: Array  #: [m], ``(n,)``.
+    orientation: Array  #: [rad], ``(n,)``.
+    #: pairs, pairs_front_up: of distances between any two, predicted minus true, and where both are front/up.
     pairs: PairDistances
     pairs_front_up: PairDistances
 

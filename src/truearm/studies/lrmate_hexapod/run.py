@@ -92,36 +92,17 @@ class FrameError:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One campaign: its steps, every model judged, and how the world frame came out.
+    """One campaign: its steps, every model judged, and how the world frame came out."""
 
-    Attributes
-    ----------
-    campaign
-        With the device.
-    front
-        Which of the measured rows are front/up.
-    judgements
-        Of every model.
-    away
-        Distance of each held-out configuration from the reference point [m], ``(n,)``.
-    front_up
-        Which of them are front/up, ``(n,)``.
-    uncorrected
-        Mean error of the final models, held and following, without the correction of the frame by distances [m].
-    repeated
-        Mean error of the final model, held, after ten more rounds of touching and identifying [m].
-    frames
-        Error of the fixture's frame by models.
-    """
-
-    campaign: Campaign
-    front: tuple[bool, ...]
-    judgements: Mapping[Model, Judgement]
-    away: Array
-    front_up: NDArray[np.bool_]
+    campaign: Campaign  #: With the device.
+    front: tuple[bool, ...]  #: Which of the measured rows are front/up.
+    judgements: Mapping[Model, Judgement]  #: Of every model.
+    away: Array  #: Distance of each held-out configuration from the reference point [m], ``(n,)``.
+    front_up: NDArray[np.bool_]  #: Which of them are front/up, ``(n,)``.
+    #: Mean error of the final models, held and following, without the correction of the frame by distances [m].
     uncorrected: Mapping[FinalByCups, float]
-    repeated: float
-    frames: Mapping[FrameModel, FrameError]
+    repeated: float  #: Mean error of the final model, held, after ten more rounds of touching and identifying [m].
+    frames: Mapping[FrameModel, FrameError]  #: Error of the fixture's frame by models.
 
     def mean_away(self, model: Model) -> float:
         """Return the mean position error beyond 400 mm from the reference point [m]."""
@@ -134,37 +115,22 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The whole study.
+    """The whole study."""
 
-    Attributes
-    ----------
-    station
-        What is the same for every robot.
-    outcomes
-        Of the robot file's truth, one a seed.
-    others
-        Of other robots, one a seed.
-    """
-
-    station: Station
-    outcomes: tuple[Outcome, ...]
-    others: tuple[Outcome, ...]
+    station: Station  #: What is the same for every robot.
+    outcomes: tuple[Outcome, ...]  #: Of the robot file's truth, one a seed.
+    others: tuple[Outcome, ...]  #: Of other robots, one a seed.
 
 
 def run(seeds: int, progress: Progress, configurations: int, others: int) -> Run:
     """Plan, measure and calibrate the robot file's truth and other robots, once a seed.
 
-    Parameters
-    ----------
-    seeds
-        How many: of the ballbar's and the tracker's noise and of the choice between flip and noflip; and as many other
-        robots.
-    progress
-        Called with a few words at each step.
-    configurations
-        To judge the robot of the robot file by.
-    others
-        To judge each of the other robots by.
+    Args:
+        seeds: How many: of the ballbar's and the tracker's noise and of the choice between flip and noflip; and as many
+            other robots.
+        progress: Called with a few words at each step.
+        configurations: To judge the robot of the robot file by.
+        others: To judge each of the other robots by.
     """
     progress("planning")
     station = _station()

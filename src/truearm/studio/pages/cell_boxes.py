@@ -33,12 +33,9 @@ class _Row:
 class CellBoxes:
     """A part of the page Cell.
 
-    Parameters
-    ----------
-    draw
-        Called with the boxes to draw.
-    length
-        Returns the length of the arm [m].
+    Args:
+        draw: Called with the boxes to draw.
+        length: Returns the length of the arm [m].
     """
 
     def __init__(self, window: Window, draw: Callable[[CellRules | None], None], length: Callable[[], float]) -> None:

@@ -241,10 +241,8 @@ class CheckPage:
 def choose_measurements(window: Window, name: str | None) -> None:
     """Choose measurements; what was excluded from other ones is no longer, for it is said of readings by their names.
 
-    Parameters
-    ----------
-    name
-        Of their file; None for none.
+    Args:
+        name: Of their file; None for none.
     """
     settings = window.project.settings
     if settings.data in (None, name) or settings.exclude is None:
@@ -273,10 +271,8 @@ def _excludes(window: Window, name: str) -> bool:
 def data_of(window: Window) -> str:
     """Return the name of the measurements that are chosen.
 
-    Raises
-    ------
-    InputError
-        If none are.
+    Raises:
+        InputError: If none are.
     """
     if window.project.settings.data is None:
         raise InputError("no measurements are chosen", parameter="data", cure="Choose a CSV file on the page Check.")

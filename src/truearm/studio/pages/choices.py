@@ -12,10 +12,8 @@ NONE: Final = "(none)"
 def offer(element: Any, names: Iterable[str], value: str | None, none: str | None = NONE) -> None:
     """Let a list offer names and show the chosen one, which is offered even where it is no longer there.
 
-    Parameters
-    ----------
-    none
-        What stands for nothing chosen; None where something always is.
+    Args:
+        none: What stands for nothing chosen; None where something always is.
     """
     offered = dict.fromkeys([*([] if none is None else [none]), *names, *([] if value is None else [value])])
     if element.options != tuple(offered):

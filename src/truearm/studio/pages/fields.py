@@ -14,12 +14,9 @@ from truearm.units import as_number
 class Fields:
     """Fields, each of one setting by its name.
 
-    Parameters
-    ----------
-    shown
-        Returns the settings as they are now.
-    change
-        Changes one setting, by its name.
+    Args:
+        shown: Returns the settings as they are now.
+        change: Changes one setting, by its name.
     """
 
     def __init__(

@@ -345,14 +345,11 @@ class JogPage:
     def play_file(self, name: str, speed: float, *, from_its_start: bool = False) -> Array:
         """Play the configurations of a file, from where the arm is or from the first of them.
 
-        Parameters
-        ----------
-        speed
-            Of the fastest joint [deg/s, or mm/s for prismatic joints].
+        Args:
+            speed: Of the fastest joint [deg/s, or mm/s for prismatic joints].
 
-        Returns
-        -------
-        Configurations on the way, ``(n, joints)`` [rad or m].
+        Returns:
+            Configurations on the way, ``(n, joints)`` [rad or m].
         """
         arm, file = self._jogged(), self._window.project.path(name)
         if not exists(file):
@@ -367,10 +364,8 @@ class JogPage:
     def play(self, motion: Motion) -> None:
         """Play a motion.
 
-        Raises
-        ------
-        InputError
-            If it leads beyond the limits of a joint.
+        Raises:
+            InputError: If it leads beyond the limits of a joint.
         """
         tried = Jogging(self._jogged().robot)
         for joints in motion.joints:

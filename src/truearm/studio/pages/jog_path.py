@@ -40,14 +40,10 @@ _LINE: Final = (70, 130, 180)
 class JogPath:
     """Makes a path file point by point, draws the path, and plays it as :func:`truearm.path` follows it.
 
-    Parameters
-    ----------
-    arm
-        Returns the arm that is jogged, after ending what is played.
-    play
-        Plays a motion.
-    stop
-        Ends it.
+    Args:
+        arm: Returns the arm that is jogged, after ending what is played.
+        play: Plays a motion.
+        stop: Ends it.
     """
 
     def __init__(

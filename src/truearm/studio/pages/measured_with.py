@@ -32,10 +32,8 @@ _AIR_LABELS: Final = {
 class MeasuredWith:
     """A part of the page Measure.
 
-    Parameters
-    ----------
-    fields
-        Of the page, for the name of the file.
+    Args:
+        fields: Of the page, for the name of the file.
     """
 
     def __init__(self, window: Window, fields: Fields) -> None:

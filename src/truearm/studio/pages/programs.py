@@ -225,18 +225,10 @@ class ProgramsPage:
 
 @dataclass(frozen=True)
 class _Of:
-    """Of which settings and files something is shown: those it was made from, as they were when it was begun.
+    """Of which settings and files something is shown: those it was made from, as they were when it was begun."""
 
-    Attributes
-    ----------
-    named
-        The settings that count.
-    state
-        What they say, and the files that they name; None where nothing is shown.
-    """
-
-    named: tuple[str, ...] = ()
-    state: tuple[Any, ...] | None = None
+    named: tuple[str, ...] = ()  #: The settings that count.
+    state: tuple[Any, ...] | None = None  #: What they say, and the files that they name; None where nothing is shown.
 
     @classmethod
     def now(cls, window: Window, named: tuple[str, ...]) -> _Of:

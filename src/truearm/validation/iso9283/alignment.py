@@ -45,27 +45,14 @@ _LINE: Final = 1e-3
 
 @dataclass(frozen=True)
 class Alignment:
-    """How the instrument was tied to the robot's base.
+    """How the instrument was tied to the robot's base."""
 
-    Attributes
-    ----------
-    kind
-        Of what.
-    T_base_instrument
-        The instrument's frame in the robot's base frame.
-    sigma
-        Standard deviation of each coordinate at `about` [m].
-    sigma_rot
-        Of each angle [rad].
-    about
-        The point of the base frame that the tie is known best at: the origin of the base, the middle of the poses for a
-        best fit [m].
-    """
-
-    kind: Kind
-    T_base_instrument: Transform
-    sigma: float
-    sigma_rot: float
+    kind: Kind  #: Of what.
+    T_base_instrument: Transform  #: The instrument's frame in the robot's base frame.
+    sigma: float  #: Standard deviation of each coordinate at `about` [m].
+    sigma_rot: float  #: Of each angle [rad].
+    #: The point of the base frame that the tie is known best at: the origin of the base, the middle of the poses for a
+    #: best fit [m].
     about: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
@@ -117,11 +104,9 @@ class _AlignmentFile(BaseModel):
 def read_alignment(path: Path) -> Alignment:
     """Read a file of the schema above.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be used: an entry that is missing or not known, a quaternion that does not have length 1, or
-        a standard deviation that is not above zero.
+    Raises:
+        InputError: If the file cannot be used: an entry that is missing or not known, a quaternion that does not have
+            length 1, or a standard deviation that is not above zero.
     """
     content = read_yaml(path, _AlignmentFile)
     units = content.units
@@ -147,20 +132,14 @@ def read_alignment(path: Path) -> Alignment:
 def refuse_implausible(tie: Alignment, cube: Cube, measured: Array, where: str) -> None:
     """Refuse a tie with which what was measured does not lie near the cube of the tests.
 
-    Parameters
-    ----------
-    cube
-        In which all poses and paths lie.
-    measured
-        Positions in the instrument's frame [m], ``(n, 3)``.
-    where
-        The file of the tie.
+    Args:
+        cube: In which all poses and paths lie.
+        measured: Positions in the instrument's frame [m], ``(n, 3)``.
+        where: The file of the tie.
 
-    Raises
-    ------
-    InputError
-        If half of the positions lie farther from the cube's centre than its side. The message says which mistake would
-        explain it: another unit, or the pose of the base in the instrument's frame.
+    Raises:
+        InputError: If half of the positions lie farther from the cube's centre than its side. The message says which
+            mistake would explain it: another unit, or the pose of the base in the instrument's frame.
     """
     middle = np.median(measured, axis=0)
 
@@ -196,17 +175,12 @@ def best_fit(attained: Array, commanded: Array) -> Alignment:
 
     Its standard deviations are those that the distances which remain leave open.
 
-    Parameters
-    ----------
-    attained
-        Barycentres in the instrument's frame [m], ``(k, 3)``.
-    commanded
-        In the base frame [m], ``(k, 3)``.
+    Args:
+        attained: Barycentres in the instrument's frame [m], ``(k, 3)``.
+        commanded: In the base frame [m], ``(k, 3)``.
 
-    Raises
-    ------
-    InputError
-        For fewer than three poses, or poses on a line.
+    Raises:
+        InputError: For fewer than three poses, or poses on a line.
     """
     k = len(attained)
     middle = commanded.mean(axis=0)

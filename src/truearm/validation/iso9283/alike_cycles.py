@@ -20,23 +20,13 @@ _LEAST_CYCLES: Final = 10
 
 @dataclass(frozen=True)
 class AlikeCycles:
-    """A test whose cycles are like those before them.
+    """A test whose cycles are like those before them."""
 
-    Attributes
-    ----------
-    test, velocity, load
-        Which, and under what.
-    correlation
-        Between each cycle and the next, of positions about their mean; of independent cycles 0.
-    usual
-        Its standard deviation where cycles are independent.
-    """
-
-    test: str
+    test: str  #: test, velocity, load: which, and under what.
     velocity: float
     load: float
-    correlation: float
-    usual: float
+    correlation: float  #: Between each cycle and the next, of positions about their mean; of independent cycles 0.
+    usual: float  #: Its standard deviation where cycles are independent.
 
 
 def alike_cycles(cycles: Sequence[Cycles]) -> tuple[AlikeCycles, ...]:

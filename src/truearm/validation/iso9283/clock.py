@@ -32,24 +32,13 @@ _LEAST: Final = 10
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """When the samples of a record were taken.
+    """When the samples of a record were taken."""
 
-    Attributes
-    ----------
-    time
-        [s], ``(n,)``: on an even clock where rounded times allow for one, otherwise as they were written.
-    resolution
-        To which they were rounded [s]; 0 where that is nothing beside the time between two samples.
-    even
-        Whether they are those of an even clock.
-    pace
-        Standard deviation of how much faster or slower that clock is, as a share.
-    """
-
-    time: Array
+    time: Array  #: [s], ``(n,)``: on an even clock where rounded times allow for one, otherwise as they were written.
+    #: To which they were rounded [s]; 0 where that is nothing beside the time between two samples.
     resolution: float = 0.0
-    even: bool = False
-    pace: float = 0.0
+    even: bool = False  #: Whether they are those of an even clock.
+    pace: float = 0.0  #: Standard deviation of how much faster or slower that clock is, as a share.
 
     @property
     def sigma(self) -> float:
@@ -65,10 +54,8 @@ class Clock:
 def clock_of(time: Array) -> Clock:
     """Return the clock of a record.
 
-    Parameters
-    ----------
-    time
-        As written [s], not decreasing, ``(n,)``.
+    Args:
+        time: As written [s], not decreasing, ``(n,)``.
     """
     if len(time) < _LEAST:
         return Clock(time)

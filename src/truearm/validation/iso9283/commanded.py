@@ -19,14 +19,9 @@ class CommandedPath:
     """A planned path by its arc length, going on before its begin and behind its end, and the feet of points on it.
 
     A weave is taken along the line in its middle.
-
-    Attributes
-    ----------
-    way
-        The path by the distance travelled.
     """
 
-    way: Way
+    way: Way  #: The path by the distance travelled.
 
     @classmethod
     def of(cls, path: PlannedPath, *, reoriented: bool = False) -> Self:
@@ -97,12 +92,9 @@ class CommandedPath:
     def feet(self, points: Array, near: Array, within: float) -> Array:
         """Return the arc length of the foot of each point ``(n, 3)`` on the path, ``(n,)`` [m].
 
-        Parameters
-        ----------
-        near
-            About where the foot is [m], ``(n,)``: what tells apart the begin and the end of a closed path.
-        within
-            So far from there at most [m].
+        Args:
+            near: About where the foot is [m], ``(n,)``: what tells apart the begin and the end of a closed path.
+            within: So far from there at most [m].
         """
         if self.radius:
             out, onward = (self.vertices[0] - self.centre) / self.radius, self.way.direction(np.zeros(1))[0]

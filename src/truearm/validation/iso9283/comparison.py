@@ -25,26 +25,16 @@ Verdict = Literal["smaller", "larger", "not told apart", "no interval"]
 
 @dataclass(frozen=True)
 class Compared:
-    """A value and the same of another result, in the units of the files.
+    """A value and the same of another result, in the units of the files."""
 
-    Attributes
-    ----------
-    id, component, where, under, unit
-        Which; under what, as the files have it.
-    value, other
-        This result's, and the other's.
-    verdict
-        Whether this one's is smaller or larger by more than both intervals leave open.
-    """
-
-    id: str
+    id: str  #: id, component, where, under, unit: which; under what, as the files have it.
     component: str
     where: str
     under: str
     unit: str
-    value: float
+    value: float  #: value, other: this result's, and the other's.
     other: float
-    verdict: Verdict
+    verdict: Verdict  #: Whether this one's is smaller or larger by more than both intervals leave open.
 
     @property
     def change(self) -> str:
@@ -54,14 +44,9 @@ class Compared:
 
 @dataclass(frozen=True)
 class Course:
-    """How far the other result is from its command along a path.
+    """How far the other result is from its command along a path."""
 
-    Attributes
-    ----------
-    along, distance
-        Arc length and distance of the barycentre [mm]; NaN where there is none.
-    """
-
+    #: along, distance: arc length and distance of the barycentre [mm]; NaN where there is none.
     along: tuple[float, ...]
     distance: tuple[float, ...]
 
@@ -77,30 +62,17 @@ def key_of(id_: str, where: str, conditions: Mapping[str, float | str]) -> Key:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A result beside another one.
+    """A result beside another one."""
 
-    Attributes
-    ----------
-    other
-        The file of the other one.
-    rows
-        All values that both have.
-    left_out
-        Ids of criteria that were not compared, because the two were tied to the base in different ways.
-    unlike
-        Ids of criteria of which values were not compared, by why they were planned or read otherwise.
-    unknown_plan
-        Whether the other one does not say what was planned, as those of older versions.
-    curves, offsets
-        What is drawn of the other one: deviations along paths, and how far barycentres are from their commands [mm].
-        Empty where it was written by an older version, or is tied in another way.
-    """
-
-    other: str
-    rows: tuple[Compared, ...]
+    other: str  #: The file of the other one.
+    rows: tuple[Compared, ...]  #: All values that both have.
+    #: Ids of criteria that were not compared, because the two were tied to the base in different ways.
     left_out: tuple[str, ...] = ()
+    #: Ids of criteria of which values were not compared, by why they were planned or read otherwise.
     unlike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    unknown_plan: bool = False
+    unknown_plan: bool = False  #: Whether the other one does not say what was planned, as those of older versions.
+    #: curves, offsets: what is drawn of the other one: deviations along paths, and how far barycentres are from their
+    #: commands [mm]. Empty where it was written by an older version, or is tied in another way.
     curves: Mapping[Key, Course] = field(default_factory=dict)
     offsets: Mapping[Key, tuple[float, ...]] = field(default_factory=dict)
 
@@ -138,17 +110,13 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
     The difference of two values is larger than what is not known of it where it exceeds the root sum of squares of the
     two intervals' sides that face each other.
 
-    Parameters
-    ----------
-    summary
-        This result, as JSON holds it.
-    other
-        The file of the other one.
+    Args:
+        summary: This result, as JSON holds it.
+        other: The file of the other one.
 
-    Raises
-    ------
-    InputError
-        If the file is no such result, or one of another robot or another tip, or both have no value of the same kind.
+    Raises:
+        InputError: If the file is no such result, or one of another robot or another tip, or both have no value of the
+            same kind.
     """
     second = read_result(other)
     first = ResultFile.model_validate_json(json.dumps(summary))

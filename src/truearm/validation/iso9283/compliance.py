@@ -34,31 +34,15 @@ _AGAINST: Final = 6.0
 
 @dataclass(frozen=True, eq=False)
 class PushLine:
-    """Displacements of one direction in one cycle, and the line through them.
+    """Displacements of one direction in one cycle, and the line through them."""
 
-    Attributes
-    ----------
-    direction, cycle
-        Which.
-    force
-        [N], ``(n,)``.
-    displacement
-        Along the force, from where the line is without force [m], ``(n,)``.
-    slope
-        Along the force [m/N].
-    slopes
-        Of all three coordinates in the base frame, ``(3,)`` [m/N].
-    line
-        Of each push in the file, ``(n,)``.
-    """
-
-    direction: str
+    direction: str  #: direction, cycle: which.
     cycle: int
-    force: Array
-    displacement: Array
-    slope: float
-    slopes: Array
-    line: NDArray[np.intp]
+    force: Array  #: [N], ``(n,)``.
+    displacement: Array  #: Along the force, from where the line is without force [m], ``(n,)``.
+    slope: float  #: Along the force [m/N].
+    slopes: Array  #: Of all three coordinates in the base frame, ``(3,)`` [m/N].
+    line: NDArray[np.intp]  #: Of each push in the file, ``(n,)``.
 
 
 def evaluate_pushes(
@@ -68,11 +52,9 @@ def evaluate_pushes(
 
     There is no interval: three cycles say too little of their own scatter.
 
-    Raises
-    ------
-    InputError
-        For forces above the weight of the rated load, a direction that the plan does not have, a test that it does not
-        have, a cycle whose forces are all the same, and a tip that moves against the force.
+    Raises:
+        InputError: For forces above the weight of the rated load, a direction that the plan does not have, a test that
+            it does not have, a cycle whose forces are all the same, and a tip that moves against the force.
     """
     test = plan.test("compliance")
     if test is None:

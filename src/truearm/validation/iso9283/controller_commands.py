@@ -31,21 +31,14 @@ def path_commands(path: PlannedPath, pace: Pace, step: float, *, reoriented: boo
     A weave runs in straight lines from side to side, its first and last stretch from and to the middle. Its velocity is
     that of the advance along the line in the middle, so that its frequency is the velocity over the wavelength.
 
-    Parameters
-    ----------
-    path
-        In the robot's base frame.
-    pace
-        How fast.
-    step
-        Between two commands [s].
-    reoriented
-        Whether the orientation alternates: from one to the other and back, as :class:`.way.Way` has it.
+    Args:
+        path: In the robot's base frame.
+        pace: How fast.
+        step: Between two commands [s].
+        reoriented: Whether the orientation alternates: from one to the other and back, as :class:`.way.Way` has it.
 
-    Raises
-    ------
-    InputError
-        If the orientation shall alternate and the path has one alone.
+    Raises:
+        InputError: If the orientation shall alternate and the path has one alone.
     """
     if path.kind == "circle":
         return along_circle(path.points[0], path.points[1], path.normal, path.rotation, pace, step)

@@ -28,34 +28,20 @@ _BLOCK: Final = 10
 
 @dataclass(frozen=True)
 class CopiedBlock:
-    """Samples of a cycle that are those of another one to the last digit.
+    """Samples of a cycle that are those of another one to the last digit."""
 
-    Attributes
-    ----------
-    test, place
-        Where.
-    cycles
-        The first one and the one that is like it; 0 in a stream.
-    lines
-        Of the first samples of both.
-    count
-        How many samples.
-    """
-
-    test: str
+    test: str  #: test, place: where.
     place: str
-    cycles: tuple[int, int]
-    lines: tuple[int, int]
-    count: int
+    cycles: tuple[int, int]  #: The first one and the one that is like it; 0 in a stream.
+    lines: tuple[int, int]  #: Of the first samples of both.
+    count: int  #: How many samples.
 
 
 def refuse_copied_poses(readings: AttainedPoses) -> None:
     """Refuse two cycles of a pose with one and the same position, where rounding cannot explain it.
 
-    Raises
-    ------
-    InputError
-        If there are such rows, naming the first two.
+    Raises:
+        InputError: If there are such rows, naming the first two.
     """
     columns = [readings.criterion.code, readings.pose.code, readings.robot.code, readings.approach.code]
     shares = [np.unique(share, return_inverse=True)[1].reshape(-1) for share in (readings.velocity, readings.load)]

@@ -41,48 +41,27 @@ _SMOOTHED = 0.2
 
 @dataclass(frozen=True, eq=False)
 class CornerCurves:
-    """The way round a corner, for pictures.
+    """The way round a corner, for pictures."""
 
-    Attributes
-    ----------
-    where
-        Path and corner, ``rectangle E2``.
-    run
-        What it comes from.
-    corner, before, after
-        The corner in the base frame [m], and unit vectors of the sides before and after it, ``(3,)``.
-    attained
-        Of each cycle: positions near the corner [m], ``(k, 3)``.
-    along
-        Of each cycle: arc length from the corner [m], ``(k,)``.
-    rounding, overshoot, stabilisation
-        CR, CO, and the length of path after the corner from which on the tip stays within the limit band of the line
-        that it then keeps [m], ``(cycles,)``.
-    aside
-        From the commanded corner to that of the two lines that the tip keeps before and behind it [m],
-        ``(cycles, 3)``.
-    own
-        Least distance from that corner [m], ``(cycles,)``.
-    sparse
-        Whether samples are too far apart for CR, and for CO.
-    noise
-        How far beyond the second side noise alone would seem to go, the most of the cycles [m].
-    """
-
-    where: str
-    run: Run
+    where: str  #: Path and corner, ``rectangle E2``.
+    run: Run  #: What it comes from.
+    #: corner, before, after: the corner in the base frame [m], and unit vectors of the sides before and after it,
+    #: ``(3,)``.
     corner: Array
     before: Array
     after: Array
-    attained: tuple[Array, ...]
-    along: tuple[Array, ...]
+    attained: tuple[Array, ...]  #: Of each cycle: positions near the corner [m], ``(k, 3)``.
+    along: tuple[Array, ...]  #: Of each cycle: arc length from the corner [m], ``(k,)``.
+    #: rounding, overshoot, stabilisation: cR, CO, and the length of path after the corner from which on the tip stays
+    #: within the limit band of the line that it then keeps [m], ``(cycles,)``.
     rounding: Array
     overshoot: Array
     stabilisation: Array
+    #: From the commanded corner to that of the two lines that the tip keeps before and behind it [m], ``(cycles, 3)``.
     aside: Array
-    own: Array
-    sparse: tuple[bool, bool]
-    noise: float
+    own: Array  #: Least distance from that corner [m], ``(cycles,)``.
+    sparse: tuple[bool, bool]  #: Whether samples are too far apart for CR, and for CO.
+    noise: float  #: How far beyond the second side noise alone would seem to go, the most of the cycles [m].
 
     @property
     def offset(self) -> float:
@@ -92,17 +71,7 @@ class CornerCurves:
 
 @dataclass(frozen=True, eq=False)
 class _Turn:
-    """A cycle near a corner: see :class:`CornerCurves`.
-
-    Attributes
-    ----------
-    spacing
-        Between the samples at the corner [m].
-    outside
-        So many samples in a row are beyond the side about the one that is furthest.
-    noise
-        How far beyond the side noise alone would seem to go [m].
-    """
+    """A cycle near a corner: see :class:`CornerCurves`."""
 
     attained: Array
     along: Array
@@ -111,9 +80,9 @@ class _Turn:
     stabilisation: float
     aside: Array
     own: float
-    spacing: float
-    outside: int
-    noise: float
+    spacing: float  #: Between the samples at the corner [m].
+    outside: int  #: So many samples in a row are beyond the side about the one that is furthest.
+    noise: float  #: How far beyond the side noise alone would seem to go [m].
 
 
 def corner_values(

@@ -30,27 +30,15 @@ _TIES: Final = 4000
 
 @dataclass(frozen=True, eq=False)
 class DriftCourse:
-    """AP and RP over time at one pose under one condition.
+    """AP and RP over time at one pose under one condition."""
 
-    Attributes
-    ----------
-    robot, pose, velocity, load
-        Which.
-    time
-        Mean time of each group [s], ``(k,)``; NaN where no times are given.
-    cycles
-        Of each group, ``(k,)``.
-    ap, rp
-        [m], ``(k,)``; RP of a single cycle is NaN.
-    """
-
-    robot: str
+    robot: str  #: robot, pose, velocity, load: which.
     pose: str
     velocity: float
     load: float
-    time: Array
-    cycles: tuple[int, ...]
-    ap: Array
+    time: Array  #: Mean time of each group [s], ``(k,)``; NaN where no times are given.
+    cycles: tuple[int, ...]  #: Of each group, ``(k,)``.
+    ap: Array  #: ap, rp: [m], ``(k,)``; RP of a single cycle is NaN.
     rp: Array
 
 

@@ -18,10 +18,9 @@ _FELL: Final = 3600.0
 def drift_order(readings: AttainedPoses, rows: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the order of the rows of one pose and condition: that of time, that of the file where none has a time.
 
-    Raises
-    ------
-    InputError
-        If some rows have no time, a clock began anew within the file, or the numbers of cycles contradict the times.
+    Raises:
+        InputError: If some rows have no time, a clock began anew within the file, or the numbers of cycles contradict
+            the times.
     """
     time = readings.time[rows]
     given = np.isfinite(time)

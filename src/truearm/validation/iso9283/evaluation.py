@@ -45,15 +45,9 @@ _QUANTITIES: dict[str, Quantity] = {
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """The files of a plan that were measured; None for one that was not.
+    """The files of a plan that were measured; None for one that was not."""
 
-    Attributes
-    ----------
-    poses, paths, settling, forces
-        As read.
-    """
-
-    poses: AttainedPoses | None = None
+    poses: AttainedPoses | None = None  #: poses, paths, settling, forces: as read.
     paths: Samples | None = None
     settling: Samples | None = None
     forces: Pushes | None = None
@@ -66,30 +60,11 @@ class Measurements:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The values of all criteria, and what they come from.
+    """The values of all criteria, and what they come from."""
 
-    Attributes
-    ----------
-    values
-        In the order of :data:`truearm.planning.iso9283.criteria.CRITERIA`.
-    alignment
-        How the instrument was tied to the robot's base.
-    clouds, drift, deviations, corners, velocities, weaves, settling, pushes
-        For pictures.
-    unusual
-        Rows of poses far from the others, and poses with two places of rest.
-    wild_pushes
-        Pushes far from the line of the others.
-    missing
-        Places that have no value in tests that were measured, in words.
-    readings
-        The instrument as its readings stand in each file: by the names of :class:`Measurements`.
-    simulated
-        Whether a virtual instrument read any of them.
-    """
-
-    values: tuple[Value, ...]
-    alignment: Alignment
+    values: tuple[Value, ...]  #: In the order of :data:`truearm.planning.iso9283.criteria.CRITERIA`.
+    alignment: Alignment  #: How the instrument was tied to the robot's base.
+    #: clouds, drift, deviations, corners, velocities, weaves, settling, pushes: for pictures.
     clouds: tuple[PoseCloud, ...] = ()
     drift: tuple[DriftCourse, ...] = ()
     deviations: tuple[PathDeviations, ...] = ()
@@ -98,11 +73,13 @@ class Evaluation:
     weaves: tuple[WeaveCurves, ...] = ()
     settling: tuple[SettlingCurve, ...] = ()
     pushes: tuple[PushLine, ...] = ()
+    #: Rows of poses far from the others, and poses with two places of rest.
     unusual: UnusualRows = field(default_factory=UnusualRows)
-    wild_pushes: tuple[WildPush, ...] = ()
-    missing: tuple[str, ...] = ()
+    wild_pushes: tuple[WildPush, ...] = ()  #: Pushes far from the line of the others.
+    missing: tuple[str, ...] = ()  #: Places that have no value in tests that were measured, in words.
+    #: The instrument as its readings stand in each file: by the names of :class:`Measurements`.
     readings: Mapping[str, Instrument] = field(default_factory=dict)
-    simulated: bool = False
+    simulated: bool = False  #: Whether a virtual instrument read any of them.
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:
@@ -119,18 +96,14 @@ def evaluated(
 ) -> Evaluation:
     """Evaluate all criteria of a plan.
 
-    Parameters
-    ----------
-    alignment
-        How the instrument was tied to the robot's base; None for the best fit of the attained poses to the commanded.
-    progress
-        Called with a few words at each step.
+    Args:
+        alignment: How the instrument was tied to the robot's base; None for the best fit of the attained poses to the
+            commanded.
+        progress: Called with a few words at each step.
 
-    Raises
-    ------
-    InputError
-        If nothing was measured, the tie is not known and there are no poses for a best fit, or rows do not fit the
-        plan.
+    Raises:
+        InputError: If nothing was measured, the tie is not known and there are no poses for a best fit, or rows do not
+            fit the plan.
     """
     poses, paths = measured.poses, measured.paths
     if poses is None and paths is None and measured.settling is None and measured.forces is None:

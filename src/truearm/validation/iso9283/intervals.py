@@ -54,17 +54,12 @@ def mean_interval(values: Array, known_variance: float = 0.0) -> Interval | None
     Student's t; where the mean is also off by something common to all cycles, whose variance is known, the degrees of
     freedom are those of Welch and Satterthwaite.
 
-    Parameters
-    ----------
-    values
-        ``(n,)``.
-    known_variance
-        Of what all have in common.
+    Args:
+        values: ``(n,)``.
+        known_variance: Of what all have in common.
 
-    Returns
-    -------
-    tuple or None
-        None for fewer than :data:`LEAST_CYCLES` values.
+    Returns:
+        tuple or None: None for fewer than :data:`LEAST_CYCLES` values.
     """
     from scipy.special import stdtrit
 
@@ -99,15 +94,11 @@ def repeatability(points: Array) -> Array:
 
     The formula is that of Nubiola (section 2.6) for ISO 9283; the standard's text was not at hand.
 
-    Parameters
-    ----------
-    points
-        ``(..., n, 3)``.
+    Args:
+        points: ``(..., n, 3)``.
 
-    Returns
-    -------
-    Array
-        ``(...,)``.
+    Returns:
+        Array: ``(...,)``.
     """
     distance = np.linalg.norm(points - points.mean(axis=-2, keepdims=True), axis=-1)
     return np.asarray(distance.mean(axis=-1) + 3.0 * distance.std(axis=-1, ddof=1))
@@ -135,12 +126,9 @@ def repeatability_interval(points: Array) -> Interval | None:
 def repeatability_scatter(points: Array, cycles: int) -> Array:
     """Return RP of simulated groups of cycles over the true one, for a Gaussian with the covariance of points.
 
-    Parameters
-    ----------
-    points
-        About their barycentre, ``(n, 3)``.
-    cycles
-        Of a group, 2 or more.
+    Args:
+        points: About their barycentre, ``(n, 3)``.
+        cycles: Of a group, 2 or more.
     """
     true, found, _ = _gaussian_campaigns(points, cycles)
     return np.asarray(np.exp(found - true))

@@ -36,21 +36,14 @@ def norm_interval(mean: Array, covariance: Array, cycles: int, known: Array) -> 
     Under each value to be tested the true mean is the place of that norm that is likeliest, the nearest to the mean in
     the metric of its scatter, as in a profile likelihood; about it the mean is simulated.
 
-    Parameters
-    ----------
-    mean
-        ``(d,)``.
-    covariance
-        Of the cycles with n - 1, ``(d, d)``.
-    cycles
-        Two or more.
-    known
-        Covariance of what all cycles share, ``(d, d)``.
+    Args:
+        mean: ``(d,)``.
+        covariance: Of the cycles with n - 1, ``(d, d)``.
+        cycles: Two or more.
+        known: Covariance of what all cycles share, ``(d, d)``.
 
-    Returns
-    -------
-    tuple or None
-        From zero where zero cannot be ruled out. None if nothing scatters.
+    Returns:
+        tuple or None: From zero where zero cannot be ruled out. None if nothing scatters.
     """
     variances, axes = np.linalg.eigh(covariance / cycles + known)
     if not variances[-1] > 0:
@@ -105,19 +98,13 @@ def largest_interval(statistic: Statistic, found: Array, noise: Array, other: Ar
     For each value to be tested the true places differ by as much, with a shape that is drawn from what the measured
     places leave open; they scatter, and the statistic of the scattered ones is compared with that of the measured.
 
-    Parameters
-    ----------
-    statistic
-        Of places ``(m, ...)``, ``(m,)``: never negative, and k times as large for places k times as large.
-    found
-        The measured places, ``(...)``.
-    noise, other
-        Two drawings of how the places scatter, ``(m, ...)``.
+    Args:
+        statistic: Of places ``(m, ...)``, ``(m,)``: never negative, and k times as large for places k times as large.
+        found: The measured places, ``(...)``.
+        noise, other: Two drawings of how the places scatter, ``(m, ...)``.
 
-    Returns
-    -------
-    tuple or None
-        From zero where zero cannot be ruled out. None if nothing scatters.
+    Returns:
+        tuple or None: From zero where zero cannot be ruled out. None if nothing scatters.
     """
     value = float(statistic(found[None])[0])
     scale = float(statistic(noise).max())
@@ -150,21 +137,14 @@ def _where(falling: Callable[[float], float], level: float, low: float, high: fl
 def barycentre_scatter(covariance: Array, cycles: int, known: Array | None, stream: int) -> Array:
     """Return how a barycentre may lie beside the true mean, drawn: multivariate t, and what all cycles share.
 
-    Parameters
-    ----------
-    covariance
-        Of the cycles with n - 1, ``(d, d)`` with d up to 3.
-    cycles
-        Two or more.
-    known
-        Covariance of what all cycles share, ``(d, d)``; None for nothing.
-    stream
-        Which drawing: one number for each barycentre, and each use.
+    Args:
+        covariance: Of the cycles with n - 1, ``(d, d)`` with d up to 3.
+        cycles: Two or more.
+        known: Covariance of what all cycles share, ``(d, d)``; None for nothing.
+        stream: Which drawing: one number for each barycentre, and each use.
 
-    Returns
-    -------
-    Array
-        ``(m, d)``.
+    Returns:
+        Array: ``(m, d)``.
     """
     d = len(covariance)
     drawn, _ = _drawn(stream)
@@ -200,17 +180,12 @@ def _root(covariance: Array) -> Array:
 def largest_difference(places: Sequence[Array], pairs: Sequence[tuple[int, int]]) -> tuple[float, Interval | None]:
     """Return the largest distance between barycentres, and its interval.
 
-    Parameters
-    ----------
-    places
-        The cycles at each place, ``(n, d)``.
-    pairs
-        Between which places, one pair or more.
+    Args:
+        places: The cycles at each place, ``(n, d)``.
+        pairs: Between which places, one pair or more.
 
-    Returns
-    -------
-    tuple
-        The interval is None where a place has fewer than :data:`LEAST_CYCLES` cycles, or nothing scatters.
+    Returns:
+        tuple: The interval is None where a place has fewer than :data:`LEAST_CYCLES` cycles, or nothing scatters.
     """
     one, other = np.array(pairs, dtype=np.intp).T
     found = np.array([place.mean(axis=0) for place in places])

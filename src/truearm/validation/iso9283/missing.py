@@ -55,22 +55,12 @@ def _at(absent: Sequence[tuple[float, float]], all_: Sequence[tuple[float, float
 
 @dataclass(frozen=True)
 class MissingPlace:
-    """A place of a test under a condition that has no value, while others of the test have one.
+    """A place of a test under a condition that has no value, while others of the test have one."""
 
-    Attributes
-    ----------
-    test, where
-        Which, the place as values have it.
-    conditions
-        As values have them.
-    words
-        ``AT: line``, ``AT: line at 50 %``.
-    """
-
-    test: str
+    test: str  #: test, where: which, the place as values have it.
     where: str
-    conditions: Conditions
-    words: str
+    conditions: Conditions  #: As values have them.
+    words: str  #: ``AT: line``, ``AT: line at 50 %``.
 
 
 def missing_places(plan: PerformancePlan, values: Sequence[Value]) -> tuple[MissingPlace, ...]:

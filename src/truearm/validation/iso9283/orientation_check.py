@@ -32,25 +32,17 @@ def refuse_far_orientations(
 ) -> None:
     """Refuse orientations that are further from their command than a limit.
 
-    Parameters
-    ----------
-    attained
-        In the base frame, ``(n, 3, 3)``.
-    commanded
-        ``(n, 3, 3)``, or one for all, ``(3, 3)``.
-    turn
-        Rotation of the instrument's frame in the base frame, ``(3, 3)``: the attained are this one times what was read.
-    line
-        Of each in the file, ``(n,)``.
-    source
-        The file.
-    limit
-        [rad].
+    Args:
+        attained: In the base frame, ``(n, 3, 3)``.
+        commanded: ``(n, 3, 3)``, or one for all, ``(3, 3)``.
+        turn: Rotation of the instrument's frame in the base frame, ``(3, 3)``: the attained are this one times what was
+            read.
+        line: Of each in the file, ``(n,)``.
+        source: The file.
+        limit: [rad].
 
-    Raises
-    ------
-    InputError
-        That names the first row, how many there are, and what was probably written instead, if that fits.
+    Raises:
+        InputError: That names the first row, how many there are, and what was probably written instead, if that fits.
     """
     commanded = np.broadcast_to(commanded, attained.shape)
     off = _angle(attained, commanded)

@@ -20,32 +20,19 @@ _LEFT: Final = 0.2
 
 @dataclass(frozen=True)
 class OtherCube:
-    """How a cube lies that explains where the poses of a test are.
+    """How a cube lies that explains where the poses of a test are."""
 
-    Attributes
-    ----------
-    test
-        Its id.
-    scale
-        So many times as large as the planned one.
-    aside
-        How far its middle is from where the planned one has it [m].
-    """
-
-    test: str
-    scale: float
-    aside: float
+    test: str  #: Its id.
+    scale: float  #: So many times as large as the planned one.
+    aside: float  #: How far its middle is from where the planned one has it [m].
 
 
 def other_cube(clouds: tuple[PoseCloud, ...], side: float) -> OtherCube | None:
     """Return the cube that explains errors of poses which no robot has; None where there is none.
 
-    Parameters
-    ----------
-    clouds
-        Attained poses.
-    side
-        Of the planned cube [m].
+    Args:
+        clouds: Attained poses.
+        side: Of the planned cube [m].
     """
     groups: dict[tuple[object, ...], list[PoseCloud]] = {}
     for cloud in clouds:

@@ -39,41 +39,23 @@ _ANGLES: tuple[Component, ...] = ("a", "b", "c")
 
 @dataclass(frozen=True, eq=False)
 class PathDeviations:
-    """How far a path is from its command, station by station, for pictures.
+    """How far a path is from its command, station by station, for pictures."""
 
-    Attributes
-    ----------
-    path
-        Its name.
-    run
-        What it comes from.
-    along
-        Arc length of the stations [m], ``(m,)``.
-    deviation
-        Of each cycle from the command, in the plane at right angles to the path, in the base frame [m],
-        ``(cycles, m, 3)``.
-    mean
-        Of the cycles [m], ``(m, 3)``.
-    distance, half_width
-        Of the barycentre from the command, and of its 95 % interval at each station for itself [m], ``(m,)``.
-    spread
-        Mean distance to the barycentre plus three standard deviations [m], ``(m,)``.
-    angles
-        Rotation vectors from the commanded to the attained orientation [rad], ``(cycles, m, 3)``; None without.
-    pooled
-        So many samples make up an intersection, in the middle of all.
-    """
-
-    path: str
-    run: Run
-    along: Array
+    path: str  #: Its name.
+    run: Run  #: What it comes from.
+    along: Array  #: Arc length of the stations [m], ``(m,)``.
+    #: Of each cycle from the command, in the plane at right angles to the path, in the base frame [m], ``(cycles, m,
+    #: 3)``.
     deviation: Array
-    mean: Array
+    mean: Array  #: Of the cycles [m], ``(m, 3)``.
+    #: distance, half_width: of the barycentre from the command, and of its 95 % interval at each station for itself
+    #: [m], ``(m,)``.
     distance: Array
     half_width: Array
-    spread: Array
+    spread: Array  #: Mean distance to the barycentre plus three standard deviations [m], ``(m,)``.
+    #: Rotation vectors from the commanded to the attained orientation [rad], ``(cycles, m, 3)``; None without.
     angles: Array | None
-    pooled: float
+    pooled: float  #: So many samples make up an intersection, in the middle of all.
 
     @property
     def sparse(self) -> bool:
@@ -101,24 +83,16 @@ def path_values(
     which say how much (parametric bootstrap of a basic kind, its spread corrected for the few cycles). Fewer than five
     cycles have none.
 
-    Parameters
-    ----------
-    transform
-        The instrument's frame in the robot's base, ``(4, 4)``.
-    test
-        ``AT`` or ``AT-reorientation``.
-    tie
-        Standard deviation with which that frame is known at each path's place, of each base axis [m], ``(3,)``; None
-        if it is exact.
-    tie_rot
-        Standard deviation with which each angle of that frame is known [rad].
-    seed
-        Of the simulated campaigns.
+    Args:
+        transform: The instrument's frame in the robot's base, ``(4, 4)``.
+        test: ``AT`` or ``AT-reorientation``.
+        tie: Standard deviation with which that frame is known at each path's place, of each base axis [m], ``(3,)``;
+            None if it is exact.
+        tie_rot: Standard deviation with which each angle of that frame is known [rad].
+        seed: Of the simulated campaigns.
 
-    Raises
-    ------
-    InputError
-        If there are no orientations and the orientation alternates.
+    Raises:
+        InputError: If there are no orientations and the orientation alternates.
     """
     values: list[Value] = []
     found: list[PathDeviations] = []
@@ -350,10 +324,8 @@ def _repeatability_interval(
     Campaigns are drawn with the covariance of the cycles along the path; the ratio of what they give to what very many
     cycles of that covariance give is taken to be that of the estimate to the truth.
 
-    Parameters
-    ----------
-    factor
-        Times the standard deviation is the spread, of an angle; None for the mean plus three of the distance.
+    Args:
+        factor: Times the standard deviation is the spread, of an angle; None for the mean plus three of the distance.
     """
     n, m, d = deviation.shape
     residual = (deviation - deviation.mean(axis=0)).reshape(n, m * d) / np.sqrt(n - 1)

@@ -36,39 +36,23 @@ _FILES: Final = {"paths": "paths", "settling": "poses over time", "forces": "pus
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """The cycles of one pose under one condition, in the order of their numbers, those of drift in the order of time.
+    """The cycles of one pose under one condition, in the order of their numbers; those of drift by time."""
 
-    Attributes
-    ----------
-    test, robot, pose, approach, velocity, load
-        What they have in common; the approach is empty but in ``vAP``.
-    cycle
-        ``(n,)``.
-    time
-        [s], ``(n,)``; NaN where it is not given.
-    points
-        In the base frame [m], ``(n, 3)``.
-    angles
-        a, b, c: rotation vectors from the commanded to the attained orientation, about the base's axes [rad], ``(n,
-        3)``; None where no orientation was read.
-    command
-        [m], ``(3,)``.
-    line
-        In the file, ``(n,)``.
-    """
-
+    #: test, robot, pose, approach, velocity, load: what they have in common; the approach is empty but in ``vAP``.
     test: str
     robot: str
     pose: str
     approach: str
     velocity: float
     load: float
-    cycle: NDArray[np.intp]
-    time: Array
-    points: Array
+    cycle: NDArray[np.intp]  #: ``(n,)``.
+    time: Array  #: [s], ``(n,)``; NaN where it is not given.
+    points: Array  #: In the base frame [m], ``(n, 3)``.
+    #: a, b, c: rotation vectors from the commanded to the attained orientation, about the base's axes [rad], ``(n,
+    #: 3)``; None where no orientation was read.
     angles: Array | None
-    command: Array
-    line: NDArray[np.intp]
+    command: Array  #: [m], ``(3,)``.
+    line: NDArray[np.intp]  #: In the file, ``(n,)``.
 
     @property
     def barycentre(self) -> Array:
@@ -93,10 +77,8 @@ class Cycles:
 def best_fit_of(plan: PerformancePlan, readings: AttainedPoses) -> Alignment:
     """Return the tie that brings the barycentres of the test AP nearest to the commanded poses.
 
-    Raises
-    ------
-    InputError
-        If rows do not fit the plan, or there are too few poses.
+    Raises:
+        InputError: If rows do not fit the plan, or there are too few poses.
     """
     _check_names(plan, readings)
     rows = readings.criterion.are("AP")
@@ -115,13 +97,11 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
 
     The order of the rows does not matter, but for drift without times.
 
-    Raises
-    ------
-    InputError
-        For a test, a pose, an approach, a velocity or a load that the plan does not have, a robot without a name where
-        robots are compared, a robot that has a few rows alone, poses outside the cube or at another pose of the plan
-        than they are called, a row that is another one's copy, orientations that no robot attains, and a cycle that
-        appears twice.
+    Raises:
+        InputError: For a test, a pose, an approach, a velocity or a load that the plan does not have, a robot without a
+            name where robots are compared, a robot that has a few rows alone, poses outside the cube or at another pose
+            of the plan than they are called, a row that is another one's copy, orientations that no robot attains, and
+            a cycle that appears twice.
     """
     _check_names(plan, readings)
     position = alignment.in_base(readings.position)

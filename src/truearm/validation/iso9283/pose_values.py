@@ -30,16 +30,11 @@ def valued(
 ) -> Value:
     """Return a value with its status.
 
-    Parameters
-    ----------
-    value
-        NaN if it was not measured.
-    planned
-        How many cycles there should be.
-    unknown
-        What instrument and tie do not know of a reading, a standard deviation.
-    enough
-        Whether there is as much of everything but cycles as planned: approaches, robots.
+    Args:
+        value: NaN if it was not measured.
+        planned: How many cycles there should be.
+        unknown: What instrument and tie do not know of a reading, a standard deviation.
+        enough: Whether there is as much of everything but cycles as planned: approaches, robots.
     """
     status: Status
     if math.isnan(value):

@@ -45,55 +45,30 @@ _LENGTHS: Final[tuple[Component, ...]] = ("position", *AXES)
 
 @dataclass(frozen=True, eq=False)
 class PoseCloud:
-    """Attained poses of one test at one pose under one condition, for a picture.
+    """Attained poses of one test at one pose under one condition, for a picture."""
 
-    Attributes
-    ----------
-    test, robot, pose, approach, velocity, load
-        Which.
-    command, barycentre
-        [m], ``(3,)``, in the base frame.
-    points
-        [m], ``(n, 3)``.
-    rp
-        RP, the radius of the sphere about the barycentre [m]; NaN for one cycle.
-    """
-
-    test: str
+    test: str  #: test, robot, pose, approach, velocity, load: which.
     robot: str
     pose: str
     approach: str
     velocity: float
     load: float
-    command: Array
-    points: Array
+    command: Array  #: command, barycentre: [m], ``(3,)``, in the base frame.
+    points: Array  #: [m], ``(n, 3)``.
     barycentre: Array
-    rp: float
+    rp: float  #: RP, the radius of the sphere about the barycentre [m]; NaN for one cycle.
 
 
 @dataclass(frozen=True, eq=False)
 class PoseEvaluation:
-    """What comes out of a file of attained poses.
+    """What comes out of a file of attained poses."""
 
-    Attributes
-    ----------
-    values
-        Of every planned criterion of poses, in the order of the plan; those that were not measured too.
-    clouds
-        Of all tests but drift.
-    drift
-        AP and RP over time.
-    unusual
-        Rows far from the others, and poses with two places of rest.
-    missing
-        Places of tests that were measured, and have no row themselves.
-    """
-
+    #: Of every planned criterion of poses, in the order of the plan; those that were not measured too.
     values: tuple[Value, ...]
-    clouds: tuple[PoseCloud, ...]
-    drift: tuple[DriftCourse, ...]
-    unusual: UnusualRows
-    missing: tuple[str, ...]
+    clouds: tuple[PoseCloud, ...]  #: Of all tests but drift.
+    drift: tuple[DriftCourse, ...]  #: AP and RP over time.
+    unusual: UnusualRows  #: Rows far from the others, and poses with two places of rest.
+    missing: tuple[str, ...]  #: Places of tests that were measured, and have no row themselves.
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,10 +95,8 @@ def evaluate(
 ) -> PoseEvaluation:
     """Evaluate the criteria of poses.
 
-    Raises
-    ------
-    InputError
-        If rows do not fit the plan: see :func:`truearm.validation.iso9283.pose_rows.cycles_of`.
+    Raises:
+        InputError: If rows do not fit the plan: see :func:`truearm.validation.iso9283.pose_rows.cycles_of`.
     """
     cycles = cycles_of(plan, readings, alignment)
     judge = _Judge(alignment, instrument)

@@ -26,10 +26,8 @@ _END: Final = 5
 def refuse_other_rests(plan: PerformancePlan, curves: Sequence[SettlingCurve], source: str) -> None:
     """Refuse records whose tip rests at another place than their pose, or made another way than the planned one.
 
-    Raises
-    ------
-    InputError
-        Naming the lines of the record.
+    Raises:
+        InputError: Naming the lines of the record.
     """
     for curve in curves:
         planned = plan.test(curve.test)
@@ -69,15 +67,11 @@ def refuse_other_rests(plan: PerformancePlan, curves: Sequence[SettlingCurve], s
 def refuse_other_push_place(plan: PerformancePlan, pushes: Pushes, position: Array) -> None:
     """Refuse pushes whose tip is not at the pose of the test where the force is least.
 
-    Parameters
-    ----------
-    position
-        Of the pushes in the base frame [m], ``(n, 3)``.
+    Args:
+        position: Of the pushes in the base frame [m], ``(n, 3)``.
 
-    Raises
-    ------
-    InputError
-        Naming the line.
+    Raises:
+        InputError: Naming the line.
     """
     test = plan.test("compliance")
     if test is None:

@@ -107,10 +107,8 @@ class ResultFile(BaseModel):
 def read_result(path: Path) -> ResultFile:
     """Read the result of an evaluation.
 
-    Raises
-    ------
-    InputError
-        If the file is none.
+    Raises:
+        InputError: If the file is none.
     """
     text = read_text(path)
     try:

@@ -28,33 +28,15 @@ LEAST_SAMPLES = 20
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """All cycles of a path under one condition.
+    """All cycles of a path under one condition."""
 
-    Attributes
-    ----------
-    test
-        Id of the test.
-    path
-        What was commanded.
-    velocity
-        Commanded along the path [m/s].
-    conditions
-        As shares.
-    cycles
-        In their order.
-    planned
-        How many there should be.
-    found
-        What was found in the stream from which they are; None where the file numbers them.
-    """
-
-    test: str
-    path: CommandedPath
-    velocity: float
-    conditions: Conditions
-    cycles: tuple[Cycle, ...]
-    planned: int
-    found: FoundStream | None
+    test: str  #: Id of the test.
+    path: CommandedPath  #: What was commanded.
+    velocity: float  #: Commanded along the path [m/s].
+    conditions: Conditions  #: As shares.
+    cycles: tuple[Cycle, ...]  #: In their order.
+    planned: int  #: How many there should be.
+    found: FoundStream | None  #: What was found in the stream from which they are; None where the file numbers them.
 
     def status(self, *, coarse: bool) -> Status:
         """Return whether a value of it can be relied on."""
@@ -65,24 +47,12 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Rows of one place under one condition.
+    """Rows of one place under one condition."""
 
-    Attributes
-    ----------
-    place
-        Name of the path or of the pose.
-    conditions
-        As shares.
-    rows
-        Indices in the order of the file.
-    cycle
-        Of each of these rows.
-    """
-
-    place: str
-    conditions: Conditions
-    rows: NDArray[np.intp]
-    cycle: NDArray[np.intp]
+    place: str  #: Name of the path or of the pose.
+    conditions: Conditions  #: As shares.
+    rows: NDArray[np.intp]  #: Indices in the order of the file.
+    cycle: NDArray[np.intp]  #: Of each of these rows.
 
     def cycles(self) -> Iterator[tuple[int, NDArray[np.intp]]]:
         """Yield the number and the rows of each cycle, in their order."""
@@ -95,15 +65,11 @@ class Part:
 def parts_of(samples: Samples, test: str, known: tuple[str, ...]) -> Iterator[Part]:
     """Yield the rows of each place and condition of a test.
 
-    Parameters
-    ----------
-    known
-        Places that the plan has.
+    Args:
+        known: Places that the plan has.
 
-    Raises
-    ------
-    InputError
-        If a place is not in the plan.
+    Raises:
+        InputError: If a place is not in the plan.
     """
     rows = np.flatnonzero(samples.criterion.are(test))
     if not len(rows):
@@ -139,17 +105,12 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
 
     A cycle that the file numbers is taken from the last dwell before it to the first behind it, where it has such.
 
-    Parameters
-    ----------
-    transform
-        The instrument's frame in the robot's base, ``(4, 4)``.
-    test
-        Its id.
+    Args:
+        transform: The instrument's frame in the robot's base, ``(4, 4)``.
+        test: Its id.
 
-    Raises
-    ------
-    InputError
-        If the path is not planned, samples are too few or not near it, or no cycle is in a stream.
+    Raises:
+        InputError: If the path is not planned, samples are too few or not near it, or no cycle is in a stream.
     """
     planned = plan.test(test)
     known = () if planned is None else planned.places

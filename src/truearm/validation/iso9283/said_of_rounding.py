@@ -19,10 +19,8 @@ _NAMED = 4
 def said_of_rounding(found: Evaluation, instrument: Instrument) -> tuple[Notice, ...]:
     """Return what is to be said of rounding.
 
-    Parameters
-    ----------
-    instrument
-        As stated, without what rounding adds.
+    Args:
+        instrument: As stated, without what rounding adds.
     """
     notices = (_readings(found, instrument), _times(found, instrument))
     return tuple(notice for notice in notices if notice is not None)

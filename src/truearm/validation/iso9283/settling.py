@@ -46,53 +46,26 @@ _FASTEST, _SLOWEST, _FAR = 20.0, 2e-3, 1e-3
 
 @dataclass(frozen=True, eq=False)
 class SettlingCurve:
-    """How the tip comes to rest in one cycle, for pictures.
+    """How the tip comes to rest in one cycle, for pictures."""
 
-    Attributes
-    ----------
-    test, where, conditions, cycle
-        Whose it is.
-    time
-        Since the first sample [s], ``(n,)``.
-    distance
-        From the final attained pose [m], ``(n,)``.
-    band
-        The limit band [m].
-    start, entry, stay
-        When the motion begins, the band is first entered, and it is entered for good [s].
-    overshoot
-        [m].
-    travelled
-        From the first to the final pose [m].
-    coarse
-        Whether the instrument does not show the time, and the overshoot.
-    sparse
-        Whether that is because samples are too far apart.
-    position
-        In the base frame [m], ``(n, 3)``.
-    lines
-        Of the samples in the file, ``(n,)``.
-    clock
-        That of the record.
-    """
-
-    test: str
+    test: str  #: test, where, conditions, cycle: whose it is.
     where: str
     conditions: Conditions
     cycle: int
-    time: Array
-    distance: Array
-    band: float
+    time: Array  #: Since the first sample [s], ``(n,)``.
+    distance: Array  #: From the final attained pose [m], ``(n,)``.
+    band: float  #: The limit band [m].
+    #: start, entry, stay: when the motion begins, the band is first entered, and it is entered for good [s].
     start: float
     entry: float
     stay: float
-    overshoot: float
-    travelled: float
-    coarse: tuple[bool, bool]
-    sparse: tuple[bool, bool]
-    position: Array
-    lines: NDArray[np.intp]
-    clock: Clock
+    overshoot: float  #: [m].
+    travelled: float  #: From the first to the final pose [m].
+    coarse: tuple[bool, bool]  #: Whether the instrument does not show the time, and the overshoot.
+    sparse: tuple[bool, bool]  #: Whether that is because samples are too far apart.
+    position: Array  #: In the base frame [m], ``(n, 3)``.
+    lines: NDArray[np.intp]  #: Of the samples in the file, ``(n,)``.
+    clock: Clock  #: That of the record.
 
 
 def settling_values(
@@ -102,10 +75,8 @@ def settling_values(
 
     Three cycles give no interval: each value has the least and the largest of the cycles.
 
-    Parameters
-    ----------
-    transform
-        The instrument's frame in the robot's base, ``(4, 4)``. Only distances count here.
+    Args:
+        transform: The instrument's frame in the robot's base, ``(4, 4)``. Only distances count here.
     """
     values: list[Value] = []
     curves: list[SettlingCurve] = []

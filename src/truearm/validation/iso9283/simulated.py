@@ -46,30 +46,19 @@ def simulated_campaign(
 ) -> SimulatedCampaign:
     """Run every test of a plan on twins.
 
-    Parameters
-    ----------
-    plan
-        What is commanded.
-    robots
-        The robot under test; where the exchange of robots is tested, all that are exchanged.
-    base
-        The robot's base frame in the instrument's, ``(4, 4)`` [m]: pushes are along its axes.
-    tracker
-        What reads the tip.
-    rng
-        For what is drawn.
-    corrected
-        Joint positions to command in place of the nominal robot's.
-    drives, warming
-        What the truths do not say.
-    progress
-        Called with a few words at each test.
+    Args:
+        plan: What is commanded.
+        robots: The robot under test; where the exchange of robots is tested, all that are exchanged.
+        base: The robot's base frame in the instrument's, ``(4, 4)`` [m]: pushes are along its axes.
+        tracker: What reads the tip.
+        rng: For what is drawn.
+        corrected: Joint positions to command in place of the nominal robot's.
+        drives, warming: What the truths do not say.
+        progress: Called with a few words at each test.
 
-    Raises
-    ------
-    InputError
-        If a truth has other joints than the plan's robot, a pose or path cannot be commanded, or there would be too
-        many samples.
+    Raises:
+        InputError: If a truth has other joints than the plan's robot, a pose or path cannot be commanded, or there
+            would be too many samples.
     """
     cell = Cell(plan, robots, base, tracker, rng, corrected, drives, warming)
     drift = plan.test("dAP")

@@ -41,30 +41,19 @@ Corrected = Callable[[float, Array, Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class TrueRobot:
-    """A robot as it is.
+    """A robot as it is."""
 
-    Attributes
-    ----------
-    twin
-        Its truth, where it stands in the instrument's frame.
-    tip
-        Where the tip is on its flange.
-    compliance
-        As :class:`truearm.simulation.moving.arm.MovingArm` has it.
-    """
-
-    twin: Twin
-    tip: Transform
-    compliance: tuple[float, ...] = ()
+    twin: Twin  #: Its truth, where it stands in the instrument's frame.
+    tip: Transform  #: Where the tip is on its flange.
+    compliance: tuple[float, ...] = ()  #: As :class:`truearm.simulation.moving.arm.MovingArm` has it.
 
 
 class Cell:
     """The robots, their controller, the instrument and the clock.
 
-    Parameters
-    ----------
-    plan, robots, base, tracker, rng, corrected, drives, warming
-        As for :func:`truearm.validation.iso9283.simulated.simulated_campaign`.
+    Args:
+        plan, robots, base, tracker, rng, corrected, drives, warming: As for
+            :func:`truearm.validation.iso9283.simulated.simulated_campaign`.
     """
 
     def __init__(

@@ -14,40 +14,22 @@ from truearm.modeling.transform import rotation_from_quaternion, rotation_from_v
 
 @dataclass(frozen=True)
 class Tracker:
-    """What reads the tip.
+    """What reads the tip."""
 
-    Attributes
-    ----------
-    sigma
-        Standard deviation of each coordinate [m].
-    sigma_rot
-        Of each angle [rad].
-    rate
-        Readings in a second [Hz].
-    """
-
-    sigma: float
-    sigma_rot: float
-    rate: float
+    sigma: float  #: Standard deviation of each coordinate [m].
+    sigma_rot: float  #: Of each angle [rad].
+    rate: float  #: Readings in a second [Hz].
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedCampaign:
-    """What was read; None of what no test needs.
+    """What was read; None of what no test needs."""
 
-    Attributes
-    ----------
-    poses, paths, settling, forces
-        In the instrument's frame.
-    duration
-        How long the campaign would take in the cell [s].
-    """
-
-    poses: AttainedPoses | None
+    poses: AttainedPoses | None  #: poses, paths, settling, forces: in the instrument's frame.
     paths: Samples | None
     settling: Samples | None
     forces: Pushes | None
-    duration: float
+    duration: float  #: How long the campaign would take in the cell [s].
 
 
 @dataclass(frozen=True, eq=False)

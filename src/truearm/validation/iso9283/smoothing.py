@@ -18,23 +18,16 @@ def local_lines(at: Array, values: Array, places: Array, half: float) -> tuple[A
     with an angular frequency w it returns the share ``3 (sin x - x cos x) / x^3`` with ``x = w half`` of the rate's
     swing (Savitzky and Golay 1964, first derivative, many samples).
 
-    Parameters
-    ----------
-    at
-        Where the samples are: times or arc lengths, not decreasing, ``(n,)``.
-    values
-        ``(n, d)``.
-    places
-        Where lines are wanted, not decreasing, ``(m,)``.
-    half
-        Half the window.
+    Args:
+        at: Where the samples are: times or arc lengths, not decreasing, ``(n,)``.
+        values: ``(n, d)``.
+        places: Where lines are wanted, not decreasing, ``(m,)``.
+        half: Half the window.
 
-    Returns
-    -------
-    value, rate, count
-        ``(m, d)``, ``(m, d)`` and how many samples each window has, ``(m,)``. Where the samples of a window would not
-        tell the value better than one of them alone, both are those of the straight line between the samples before and
-        after the place.
+    Returns:
+        value, rate, count: ``(m, d)``, ``(m, d)`` and how many samples each window has, ``(m,)``. Where the samples of
+            a window would not tell the value better than one of them alone, both are those of the straight line between
+            the samples before and after the place.
     """
     value, rate = np.empty((len(places), values.shape[1])), np.empty((len(places), values.shape[1]))
     low = np.searchsorted(at, places - half, side="left")

@@ -36,26 +36,14 @@ Span = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class FoundStream:
-    """What was found in a stream.
+    """What was found in a stream."""
 
-    Attributes
-    ----------
-    test, path
-        Whose stream it is.
-    time, speed
-        [s], [m/s], ``(n,)``; the speed is that of a straight line through a short window.
-    threshold
-        Faster is motion [m/s].
-    dwells, motions, cycles
-        Indices of the first and of the last sample of each.
-    """
-
-    test: str
+    test: str  #: test, path: whose stream it is.
     path: str
-    time: Array
+    time: Array  #: time, speed: [s], [m/s], ``(n,)``; the speed is that of a straight line through a short window.
     speed: Array
-    threshold: float
-    dwells: tuple[Span, ...]
+    threshold: float  #: Faster is motion [m/s].
+    dwells: tuple[Span, ...]  #: dwells, motions, cycles: indices of the first and of the last sample of each.
     motions: tuple[Span, ...]
     cycles: tuple[Span, ...]
 
@@ -93,10 +81,8 @@ def motion(time: Array, position: Array, velocity: float) -> tuple[Array, float,
 
     It begins to move where it gets faster than the threshold and stands where it gets slower than half of it.
 
-    Parameters
-    ----------
-    velocity
-        Commanded [m/s].
+    Args:
+        velocity: Commanded [m/s].
     """
     speed, noise = speeds(time, position)
     threshold = max(_MOVES * velocity, _NOISE * noise)
@@ -119,12 +105,9 @@ def found_in(test: str, path: CommandedPath, time: Array, position: Array, veloc
     way, near the plan; so a way back, and a path run backwards, are none. It begins with the dwell before it, where
     there is one, and ends with the one behind it.
 
-    Parameters
-    ----------
-    time, position
-        [s], [m in the base frame], ``(n,)`` and ``(n, 3)``.
-    velocity
-        Commanded [m/s].
+    Args:
+        time, position: [s], [m in the base frame], ``(n,)`` and ``(n, 3)``.
+        velocity: Commanded [m/s].
     """
     speed, threshold, moving = motion(time, position, velocity)
     dwells, motions = spans_of(~moving), spans_of(moving)

@@ -32,33 +32,16 @@ _LEAST_RUN = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """A cycle whose samples are tied to the commanded path.
+    """A cycle whose samples are tied to the commanded path."""
 
-    Attributes
-    ----------
-    number
-        Of the cycle.
-    time
-        [s], ``(n,)``.
-    position
-        In the base frame [m], ``(n, 3)``.
-    rotation
-        ``(n, 3, 3)``; None where there are no orientations.
-    along
-        Arc length of the foot of each sample on the commanded path [m], ``(n,)``. It swings with the noise.
-    lines
-        Of the samples in the file, ``(n,)``.
-    clock
-        That of the record in which the cycle is.
-    """
-
-    number: int
-    time: Array
-    position: Array
-    rotation: Array | None
+    number: int  #: Of the cycle.
+    time: Array  #: [s], ``(n,)``.
+    position: Array  #: In the base frame [m], ``(n, 3)``.
+    rotation: Array | None  #: ``(n, 3, 3)``; None where there are no orientations.
+    #: Arc length of the foot of each sample on the commanded path [m], ``(n,)``. It swings with the noise.
     along: Array
-    lines: NDArray[np.intp]
-    clock: Clock
+    lines: NDArray[np.intp]  #: Of the samples in the file, ``(n,)``.
+    clock: Clock  #: That of the record in which the cycle is.
 
     @property
     def line(self) -> int:
@@ -74,17 +57,13 @@ def along_path(path: CommandedPath, position: Array, where: str) -> Array:
     That tells the begin of a closed path from its end, and one passing of a crossing from the other. The foot of each
     sample is then sought near its match.
 
-    Parameters
-    ----------
-    position
-        Samples of one cycle in the base frame [m], ``(n, 3)``, in the order of time.
-    where
-        File and lines, for the refusal.
+    Args:
+        position: Samples of one cycle in the base frame [m], ``(n, 3)``, in the order of time.
+        where: File and lines, for the refusal.
 
-    Raises
-    ------
-    InputError
-        If the samples do not come near the path, or run only a part of it, or run it in the other direction.
+    Raises:
+        InputError: If the samples do not come near the path, or run only a part of it, or run it in the other
+            direction.
     """
     chosen = np.unique(np.linspace(0, len(position) - 1, min(_SAMPLES, len(position))).round().astype(np.intp))
     places = np.linspace(0.0, path.length, _PLACES)
@@ -122,19 +101,13 @@ def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity:
 
     A robot is not faster than commanded, and may be slower where joints come to their limits.
 
-    Parameters
-    ----------
-    time, along
-        Of the samples [s], and the arc lengths of their feet [m], ``(n,)``.
-    velocity
-        Commanded [m/s].
-    where
-        File and lines.
+    Args:
+        time, along: Of the samples [s], and the arc lengths of their feet [m], ``(n,)``.
+        velocity: Commanded [m/s].
+        where: File and lines.
 
-    Raises
-    ------
-    InputError
-        If the pace is above twice the commanded velocity, or below a fiftieth of it.
+    Raises:
+        InputError: If the pace is above twice the commanded velocity, or below a fiftieth of it.
     """
     pace = pace_along(path, time, along)
     if _SLOWEST * velocity <= pace <= _FASTER * velocity:

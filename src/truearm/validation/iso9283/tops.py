@@ -28,15 +28,11 @@ def top_of(time: Array, away: Array, peak: int, sigma: float) -> tuple[float, fl
     Noise makes the largest of many samples too large, and the top may lie between two samples: a parabola through the
     samples about the largest knows both.
 
-    Parameters
-    ----------
-    time, away
-        Of the samples [s], ``(n,)``, and from where [m], ``(n, 3)``: of the excursion, and of nothing that goes
-        further.
-    peak
-        Which sample is the furthest.
-    sigma
-        Noise of each coordinate [m].
+    Args:
+        time, away: Of the samples [s], ``(n,)``, and from where [m], ``(n, 3)``: of the excursion, and of nothing that
+            goes further.
+        peak: Which sample is the furthest.
+        sigma: Noise of each coordinate [m].
     """
     along = away @ (away[peak] / np.linalg.norm(away[peak]))
     width = _width(time, along, peak)
@@ -49,10 +45,8 @@ def largest_top(time: Array, away: Array, counted: NDArray[np.bool_], sigma: flo
     Where the excursion is, and how wide, is seen in positions that are smoothed over more and more of its width; how
     far it goes, by a parabola as in :func:`top_of`.
 
-    Parameters
-    ----------
-    counted
-        Which samples may be the furthest, ``(n,)``.
+    Args:
+        counted: Which samples may be the furthest, ``(n,)``.
     """
     if not counted.any() or len(time) < 3:
         return 0.0, 0.0

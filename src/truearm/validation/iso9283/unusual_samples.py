@@ -36,19 +36,11 @@ _NEAR = 3
 
 @dataclass(frozen=True)
 class Unusual:
-    """A sample that lies apart.
+    """A sample that lies apart."""
 
-    Attributes
-    ----------
-    cycle, sample
-        Which, from 0.
-    distance
-        From where the two samples before and the two behind it say that it should be [m].
-    """
-
-    cycle: int
+    cycle: int  #: cycle, sample: which, from 0.
     sample: int
-    distance: float
+    distance: float  #: From where the two samples before and the two behind it say that it should be [m].
 
 
 def unusual_samples(
@@ -60,14 +52,11 @@ def unusual_samples(
     same in all cycles taken away. Where the tip turns a corner or begins to move that is off in every cycle, and
     nothing is unusual.
 
-    Parameters
-    ----------
-    times, positions
-        Of each cycle [s], ``(n,)``, and [m], ``(n, 3)``.
-    places
-        What tells where in the cycle a sample is, such as the arc length of its foot, ``(n,)`` each.
-    rounding
-        What rounding in the file leaves open of each coordinate, as a standard deviation [m]: the noise is no less.
+    Args:
+        times, positions: Of each cycle [s], ``(n,)``, and [m], ``(n, 3)``.
+        places: What tells where in the cycle a sample is, such as the arc length of its foot, ``(n,)`` each.
+        rounding: What rounding in the file leaves open of each coordinate, as a standard deviation [m]: the noise is no
+            less.
     """
     if len(times) < _LEAST_CYCLES:
         return []

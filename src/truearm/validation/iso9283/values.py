@@ -16,81 +16,41 @@ Quantity = Literal["length", "angle", "time", "ratio", "speed", "compliance"]
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under what something was measured.
+    """Under what something was measured."""
 
-    Attributes
-    ----------
-    velocity, load
-        Shares of the rated ones, 0 to 1; None where it does not matter.
-    robot
-        Its name where several were measured.
-    """
-
-    velocity: float | None = None
+    velocity: float | None = None  #: velocity, load: shares of the rated ones, 0 to 1; None where it does not matter.
     load: float | None = None
-    robot: str = ""
+    robot: str = ""  #: Its name where several were measured.
 
 
 @dataclass(frozen=True)
 class Value:
-    """A value of a criterion.
+    """A value of a criterion."""
 
-    Attributes
-    ----------
-    id
-        One of :data:`truearm.planning.iso9283.criteria.CRITERIA`.
-    component
-        What of it.
-    where
-        The pose, the two poses, the path or the corner: ``P1``, ``P2-P4``, ``line``, ``rectangle E2``.
-    value
-        In SI units (a share for a ratio); NaN where it was not measured.
-    quantity
-        What kind of number it is.
-    interval
-        From where to where the true value lies with a probability of 95 %; None where nothing can be said.
-    cycles
-        From how many.
-    conditions
-        Under what.
-    status
-        Whether it can be relied on.
-    least, largest
-        Of the cycles, where there are too few of them for an interval; None otherwise.
-    bandwidth
-        Frequency up to which it tells what fluctuates [Hz]; None of others.
-    """
-
-    id: str
-    component: Component
-    where: str
-    value: float
-    quantity: Quantity
+    id: str  #: One of :data:`truearm.planning.iso9283.criteria.CRITERIA`.
+    component: Component  #: What of it.
+    where: str  #: The pose, the two poses, the path or the corner: ``P1``, ``P2-P4``, ``line``, ``rectangle E2``.
+    value: float  #: In SI units (a share for a ratio); NaN where it was not measured.
+    quantity: Quantity  #: What kind of number it is.
+    #: From where to where the true value lies with a probability of 95 %; None where nothing can be said.
     interval: tuple[float, float] | None
-    cycles: int
-    conditions: Conditions
-    status: Status
+    cycles: int  #: From how many.
+    conditions: Conditions  #: Under what.
+    status: Status  #: Whether it can be relied on.
+    #: least, largest: of the cycles, where there are too few of them for an interval; None otherwise.
     least: float | None = None
     largest: float | None = None
-    bandwidth: float | None = None
+    bandwidth: float | None = None  #: Frequency up to which it tells what fluctuates [Hz]; None of others.
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """What is not known of a reading.
+    """What is not known of a reading."""
 
-    Attributes
-    ----------
-    sigma
-        Standard deviation of each coordinate [m].
-    sigma_rot
-        Of each angle [rad]; None where no orientation is read.
-    rounding, rounding_rot
-        What rounding in the file leaves open of each coordinate [m], and of each angle [rad], as standard deviations.
-    """
-
-    sigma: float
-    sigma_rot: float | None = None
+    sigma: float  #: Standard deviation of each coordinate [m].
+    sigma_rot: float | None = None  #: Of each angle [rad]; None where no orientation is read.
+    #: rounding, rounding_rot: what rounding in the file leaves open of each coordinate [m], and of each angle [rad], as
+    #: standard deviations.
     rounding: float = 0.0
     rounding_rot: float = 0.0
 
@@ -99,10 +59,8 @@ class Instrument:
 
         A number rounded to q is off by q / sqrt(12), and an angle by twice that of the quaternion's components.
 
-        Parameters
-        ----------
-        resolution, resolution_rot
-            Steps to which positions [m] and components of quaternions were rounded.
+        Args:
+            resolution, resolution_rot: Steps to which positions [m] and components of quaternions were rounded.
         """
         one, other = resolution / math.sqrt(12.0), 2.0 * resolution_rot / math.sqrt(12.0)
         turned = self.sigma_rot if self.sigma_rot is None else max(self.sigma_rot, other)

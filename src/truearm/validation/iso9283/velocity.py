@@ -40,41 +40,24 @@ _DRAWS = 20_000
 class VelocityCurves:
     """Velocity along a path, for pictures.
 
-    Attributes
-    ----------
-    path, conditions
-        Name, and in words of the run it belongs to.
-    commanded
-        [m/s].
-    middle
-        Between which arc lengths it is judged [m].
-    window
-        Over which time it is smoothed [s], of each cycle, ``(cycles,)``.
-    time, along, velocity
-        Of each cycle: since its first sample [s], arc length [m], velocity along the path [m/s].
-    mean
-        Of each cycle over the middle half [m/s], ``(cycles,)``.
-    least, largest
-        Of each cycle there [m/s], ``(cycles,)``.
-    noise
-        Standard deviation of the velocity that the instrument alone gives [m/s], ``(cycles,)``.
-    found
-        What was found in the stream, if it was one.
+    Attributes:
+        path, conditions: Name, and in words of the run it belongs to.
     """
 
     path: str
     run: Run
-    commanded: float
-    middle: tuple[float, float]
-    window: Array
+    commanded: float  #: [m/s].
+    middle: tuple[float, float]  #: Between which arc lengths it is judged [m].
+    window: Array  #: Over which time it is smoothed [s], of each cycle, ``(cycles,)``.
+    #: time, along, velocity: of each cycle: since its first sample [s], arc length [m], velocity along the path [m/s].
     time: tuple[Array, ...]
     along: tuple[Array, ...]
     velocity: tuple[Array, ...]
-    mean: Array
-    least: Array
+    mean: Array  #: Of each cycle over the middle half [m/s], ``(cycles,)``.
+    least: Array  #: least, largest: of each cycle there [m/s], ``(cycles,)``.
     largest: Array
-    noise: Array
-    found: FoundStream | None
+    noise: Array  #: Standard deviation of the velocity that the instrument alone gives [m/s], ``(cycles,)``.
+    found: FoundStream | None  #: What was found in the stream, if it was one.
 
     @property
     def bandwidth(self) -> float:
@@ -95,10 +78,8 @@ def velocity_values(
     is more than a quarter, and AV and RV of which the noise of a cycle's mean is more than a quarter of RV, are
     ``instrument-too-coarse``. Fewer than five cycles have no intervals.
 
-    Parameters
-    ----------
-    transform
-        The instrument's frame in the robot's base, ``(4, 4)``.
+    Args:
+        transform: The instrument's frame in the robot's base, ``(4, 4)``.
     """
     values: list[Value] = []
     curves: list[VelocityCurves] = []

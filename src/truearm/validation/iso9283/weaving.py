@@ -43,28 +43,15 @@ _LEAST_PERIODS = 2
 
 @dataclass(frozen=True, eq=False)
 class WeaveCurves:
-    """A weave, for pictures.
+    """A weave, for pictures."""
 
-    Attributes
-    ----------
-    path
-        Its name.
-    run
-        What it comes from.
-    along, across
-        Of each cycle: arc length on the line in the middle, and to the side [m].
-    time
-        Of each cycle [s].
-    stroke, frequency
-        Of each cycle [m], [Hz], ``(cycles,)``.
-    """
-
-    path: str
-    run: Run
+    path: str  #: Its name.
+    run: Run  #: What it comes from.
+    #: along, across: of each cycle: arc length on the line in the middle, and to the side [m].
     along: tuple[Array, ...]
     across: tuple[Array, ...]
-    time: tuple[Array, ...]
-    stroke: Array
+    time: tuple[Array, ...]  #: Of each cycle [s].
+    stroke: Array  #: stroke, frequency: of each cycle [m], [Hz], ``(cycles,)``.
     frequency: Array
 
 
@@ -73,10 +60,8 @@ def weaving_values(
 ) -> tuple[list[Value], list[WeaveCurves]]:
     """Return WS and WF of every weave and condition, the mean of the cycles with their range, and the curves.
 
-    Raises
-    ------
-    InputError
-        If a cycle has fewer than two whole periods.
+    Raises:
+        InputError: If a cycle has fewer than two whole periods.
     """
     values: list[Value] = []
     curves: list[WeaveCurves] = []
@@ -172,12 +157,9 @@ def _top(time: Array, across: Array, side: NDArray[np.intp], noise: float) -> fl
     noise: the largest of many samples would be too large. A turn that is sharper is read from few samples about the
     outermost, or from that one where it is beyond the parabola by more than noise.
 
-    Parameters
-    ----------
-    side
-        Samples of the turn on its side, ``(k,)``.
-    noise
-        Standard deviation of `across` by noise.
+    Args:
+        side: Samples of the turn on its side, ``(k,)``.
+        noise: Standard deviation of `across` by noise.
     """
     about = slice(max(int(side[0]) - 1, 0), int(side[-1]) + 2)
     t, y = time[about], across[about]

@@ -23,26 +23,14 @@ _LEAST_FORCES: Final = 4
 
 @dataclass(frozen=True)
 class WildPush:
-    """A push that lies far from the line of the others.
+    """A push that lies far from the line of the others."""
 
-    Attributes
-    ----------
-    direction, cycle, line
-        Which; the line of the file.
-    force
-        [N].
-    away
-        How far from the line of the others, along the force [m].
-    value, without
-        Compliance of the direction with it, and without [m/N].
-    """
-
-    direction: str
+    direction: str  #: direction, cycle, line: which; the line of the file.
     cycle: int
     line: int
-    force: float
-    away: float
-    value: float
+    force: float  #: [N].
+    away: float  #: How far from the line of the others, along the force [m].
+    value: float  #: value, without: compliance of the direction with it, and without [m/N].
     without: float
 
 

@@ -55,69 +55,35 @@ Kind = Literal["position", "orientation"]
 
 @dataclass(frozen=True, eq=False)
 class WildRow:
-    """A row that lies far from the other cycles of its pose.
+    """A row that lies far from the other cycles of its pose."""
 
-    Attributes
-    ----------
-    of
-        It alone, with what it was measured under.
-    kind
-        What is far off.
-    away, scatter
-        How far from the mean of the others, and the root mean square distance of these from it [m or rad].
-    changes
-        Values that it is in, and the same without all wild rows.
-    """
-
-    of: Cycles
-    kind: Kind
+    of: Cycles  #: It alone, with what it was measured under.
+    kind: Kind  #: What is far off.
+    #: away, scatter: how far from the mean of the others, and the root mean square distance of these from it [m or
+    #: rad].
     away: float
     scatter: float
-    changes: tuple[tuple[Value, Value], ...] = ()
+    changes: tuple[tuple[Value, Value], ...] = ()  #: Values that it is in, and the same without all wild rows.
 
 
 @dataclass(frozen=True, eq=False)
 class TwoPlaces:
-    """Cycles of one pose at rest in two places.
+    """Cycles of one pose at rest in two places."""
 
-    Attributes
-    ----------
-    of
-        The cycles.
-    kind
-        Whether positions or orientations.
-    apart
-        The distance of the two places [m or rad].
-    rows
-        How many are in either, the fewer first.
-    lines
-        Of the fewer, in the file.
-    """
-
-    of: Cycles
-    kind: Kind
-    apart: float
-    rows: tuple[int, int]
-    lines: tuple[int, ...]
+    of: Cycles  #: The cycles.
+    kind: Kind  #: Whether positions or orientations.
+    apart: float  #: The distance of the two places [m or rad].
+    rows: tuple[int, int]  #: How many are in either, the fewer first.
+    lines: tuple[int, ...]  #: Of the fewer, in the file.
 
 
 @dataclass(frozen=True, eq=False)
 class UnusualRows:
-    """What is unusual about the rows of a campaign.
+    """What is unusual about the rows of a campaign."""
 
-    Attributes
-    ----------
-    wild
-        Rows that lie far from the others.
-    two_places
-        Poses with two places of rest.
-    alike
-        Tests whose cycles are like those before them.
-    """
-
-    wild: tuple[WildRow, ...] = ()
-    two_places: tuple[TwoPlaces, ...] = ()
-    alike: tuple[AlikeCycles, ...] = ()
+    wild: tuple[WildRow, ...] = ()  #: Rows that lie far from the others.
+    two_places: tuple[TwoPlaces, ...] = ()  #: Poses with two places of rest.
+    alike: tuple[AlikeCycles, ...] = ()  #: Tests whose cycles are like those before them.
 
 
 def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRows:

@@ -32,21 +32,11 @@ _SINGLE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class WildSteps:
-    """Steps from one sample to the next that no tip can take.
+    """Steps from one sample to the next that no tip can take."""
 
-    Attributes
-    ----------
-    before
-        The sample from which each goes, ``(k,)``.
-    pace
-        Velocity of the steps about it [m/s], ``(k, 3)``.
-    count
-        So many steps there are in all.
-    """
-
-    before: NDArray[np.intp]
-    pace: Array
-    count: int
+    before: NDArray[np.intp]  #: The sample from which each goes, ``(k,)``.
+    pace: Array  #: Velocity of the steps about it [m/s], ``(k, 3)``.
+    count: int  #: So many steps there are in all.
 
     @property
     def single(self) -> bool:
@@ -71,12 +61,10 @@ def wild_steps(time: Array, position: Array, velocity: float | None) -> WildStep
     500 m/s^2 and a change of velocity by three times the commanded one; or of 100 m/s^2 and five times; or of 50 m/s^2
     and twenty times.
 
-    Parameters
-    ----------
-    time, position
-        Of a record in its order [s], [m], ``(n,)`` and ``(n, 3)``.
-    velocity
-        Commanded [m/s]; None where it is not known: then no change by less than 20 m/s counts below 500 m/s^2.
+    Args:
+        time, position: Of a record in its order [s], [m], ``(n,)`` and ``(n, 3)``.
+        velocity: Commanded [m/s]; None where it is not known: then no change by less than 20 m/s counts below 500
+            m/s^2.
     """
     if len(time) < 2 * _ABOUT:
         return WildSteps(np.empty(0, dtype=np.intp), np.empty((0, 3)), max(len(time) - 1, 0))
@@ -107,23 +95,15 @@ def refuse_wild(
 ) -> None:
     """Refuse a record with samples that no tip can have passed, naming them.
 
-    Parameters
-    ----------
-    rows
-        Of the record in `samples`, in its order.
-    position
-        Of these [m], ``(n, 3)``.
-    found
-        What no tip can do there.
-    cycle
-        Its number; 0 for a stream.
-    clock
-        Of the record.
+    Args:
+        rows: Of the record in `samples`, in its order.
+        position: Of these [m], ``(n, 3)``.
+        found: What no tip can do there.
+        cycle: Its number; 0 for a stream.
+        clock: Of the record.
 
-    Raises
-    ------
-    InputError
-        If there are such steps; of times that are rounded too coarsely to tell, this is said instead.
+    Raises:
+        InputError: If there are such steps; of times that are rounded too coarsely to tell, this is said instead.
     """
     if not len(found.before):
         return

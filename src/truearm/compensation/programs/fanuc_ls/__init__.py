@@ -115,10 +115,9 @@ class _Positions:
 def read(sources: Sequence[Source]) -> Program:
     """Read FANUC programs; each file is one.
 
-    Raises
-    ------
-    InputError
-        If a section is missing, a position is not complete or appears twice, or a number is out of all proportion.
+    Raises:
+        InputError: If a section is missing, a position is not complete or appears twice, or a number is out of all
+            proportion.
     """
     targets: list[ProgramTarget] = []
     moves: list[Move] = []

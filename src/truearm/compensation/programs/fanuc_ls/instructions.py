@@ -54,19 +54,12 @@ Active = tuple[str | None, str | None]
 
 
 class Step(NamedTuple):
-    """A move instruction.
+    """A move instruction."""
 
-    Attributes
-    ----------
-    kind, statement, target_text, via_text, routine
-        As in :class:`~truearm.compensation.programs.program.Move`.
-    target, via
-        Numbers of its positions; empty where a position is not of this program.
-    """
-
+    #: kind, statement, target_text, via_text, routine: as in :class:`~truearm.compensation.programs.program.Move`.
     kind: MoveKind
     statement: tuple[int, int]
-    target: str
+    target: str  #: target, via: numbers of its positions; empty where a position is not of this program.
     target_text: tuple[int, int]
     via: str
     via_text: tuple[int, int] | None
@@ -76,23 +69,15 @@ class Step(NamedTuple):
 class Instructions:
     """What the instructions of a file say.
 
-    Attributes
-    ----------
-    steps
-        The moves to positions of the program, in the order of the text.
-    skipped
-        The moves to other places.
-    unknown
-        How often an instruction occurs that is not known, by its first word.
-    no_place
-        Positions, by number, whose numbers are no place of the tool in a frame that stands still, and why. By the
-        empty number if a move is such that may go to any of them.
-    active
-        What is active at the moves to a position, by its number; None where they differ.
-    everywhere
-        What is ever active in the program: numbers of user frames, numbers of tools.
-    routine
-        The last routine.
+    Attributes:
+        steps: The moves to positions of the program, in the order of the text.
+        skipped: The moves to other places.
+        unknown: How often an instruction occurs that is not known, by its first word.
+        no_place: Positions, by number, whose numbers are no place of the tool in a frame that stands still, and why. By
+            the empty number if a move is such that may go to any of them.
+        active: What is active at the moves to a position, by its number; None where they differ.
+        everywhere: What is ever active in the program: numbers of user frames, numbers of tools.
+        routine: The last routine.
     """
 
     def __init__(self, file: LsFile, source: int, routine: int) -> None:

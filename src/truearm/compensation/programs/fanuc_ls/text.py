@@ -42,77 +42,45 @@ def is_one(text: str) -> bool:
 
 
 class Statement(NamedTuple):
-    """An instruction: on one line, or on several of which the first alone has a number.
+    """An instruction: on one line, or on several of which the first alone has a number."""
 
-    Attributes
-    ----------
-    number
-        Where its line number stands in the text, ``(start, stop)``; empty if it has none.
-    start, stop
-        From after the colon to after the last character, a semicolon if it is complete.
-    """
-
-    number: tuple[int, int]
-    start: int
+    number: tuple[int, int]  #: Where its line number stands in the text, ``(start, stop)``; empty if it has none.
+    start: int  #: start, stop: from after the colon to after the last character, a semicolon if it is complete.
     stop: int
 
 
 class Position(NamedTuple):
-    """A position of the section /POS.
+    """A position of the section /POS."""
 
-    Attributes
-    ----------
-    number
-        Its number, without leading zeros.
-    comment
-        Its comment, without quotes.
-    start, stop
-        Where it stands.
-    name
-        Where its name stands, such as ``P[3:"approach"]``.
-    frame, tool, configuration
-        UF, UT and CONFIG as they are written, of the first motion group.
-    names, texts, places, units
-        Its numbers: their names, x to r or J1 to the last joint, as they are written, where, and in mm or deg.
-    external
-        Where external axes of the first motion group are: name and number as it is written.
-    alone
-        Whether it has no other motion group.
-    fault
-        Why its data are not complete; empty if they are.
-    """
-
-    number: str
-    comment: str
-    start: int
+    number: str  #: Its number, without leading zeros.
+    comment: str  #: Its comment, without quotes.
+    start: int  #: start, stop: where it stands.
     stop: int
-    name: tuple[int, int]
-    frame: str = ""
+    name: tuple[int, int]  #: Where its name stands, such as ``P[3:"approach"]``.
+    frame: str = ""  #: frame, tool, configuration: uF, UT and CONFIG as they are written, of the first motion group.
     tool: str = ""
     configuration: str = ""
+    #: names, texts, places, units: its numbers: their names, x to r or J1 to the last joint, as they are written,
+    #: where, and in mm or deg.
     names: Sequence[str] = ()
     texts: Sequence[str] = ()
     places: Sequence[tuple[int, int]] = ()
     units: Sequence[str] = ()
+    #: Where external axes of the first motion group are: name and number as it is written.
     external: Sequence[tuple[str, str]] = ()
-    alone: bool = True
-    fault: str = ""
+    alone: bool = True  #: Whether it has no other motion group.
+    fault: str = ""  #: Why its data are not complete; empty if they are.
 
 
 class LsFile:
     """A FANUC program in ASCII.
 
-    Attributes
-    ----------
-    text
-        Its text with every line end as line feeds, so that all places stay what they are.
-    instructions, positions
-        Where the sections /MN and /POS begin and end.
+    Attributes:
+        text: Its text with every line end as line feeds, so that all places stay what they are.
+        instructions, positions: Where the sections /MN and /POS begin and end.
 
-    Raises
-    ------
-    InputError
-        If a section is missing.
+    Raises:
+        InputError: If a section is missing.
     """
 
     def __init__(self, source: Source) -> None:

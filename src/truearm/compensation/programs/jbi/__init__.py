@@ -61,15 +61,11 @@ def is_one(text: str) -> bool:
 def read(sources: Sequence[Source]) -> Program:
     """Read jobs.
 
-    Parameters
-    ----------
-    sources
-        Job files; each has its own table of positions, or more if there are several jobs in it.
+    Args:
+        sources: Job files; each has its own table of positions, or more if there are several jobs in it.
 
-    Raises
-    ------
-    InputError
-        If a job is not complete, or a line of its table of positions is malformed.
+    Raises:
+        InputError: If a job is not complete, or a line of its table of positions is malformed.
     """
     targets: list[ProgramTarget] = []
     moves: list[Move] = []

@@ -41,58 +41,28 @@ class State:
 
 @dataclass(slots=True)
 class Position:
-    """A position of the robot in the table of a job.
+    """A position of the robot in the table of a job."""
 
-    Attributes
-    ----------
-    table, number
-        ``C`` for a position of a step, ``P`` for a position variable, and its number.
-    name
-        As it is written.
-    line
-        In the file, from 1.
-    stop
-        Place after the last character of its line.
-    values, places
-        Its numbers, and where they stand in the text.
-    state
-        What holds for it.
-    """
-
-    table: str
+    table: str  #: table, number: ``C`` for a position of a step, ``P`` for a position variable, and its number.
     number: int
-    name: str
-    line: int
-    stop: int
-    values: tuple[float, ...]
+    name: str  #: As it is written.
+    line: int  #: In the file, from 1.
+    stop: int  #: Place after the last character of its line.
+    values: tuple[float, ...]  #: values, places: its numbers, and where they stand in the text.
     places: tuple[tuple[int, int], ...]
-    state: State
+    state: State  #: What holds for it.
 
 
 @dataclass(frozen=True)
 class Job:
-    """A job: the places of its sections, and its positions.
+    """A job: the places of its sections, and its positions."""
 
-    Attributes
-    ----------
-    start, stop
-        Where it begins and ends in the text.
-    instructions
-        Where its instructions begin.
-    count
-        Where the number of its positions is written.
-    positions
-        Of the robot, in the order of the text.
-    carried
-        Whether base axes, which carry the robot, have positions too.
-    """
-
-    start: int
+    start: int  #: start, stop: where it begins and ends in the text.
     stop: int
-    instructions: int
-    count: tuple[int, int]
-    positions: tuple[Position, ...]
-    carried: bool
+    instructions: int  #: Where its instructions begin.
+    count: tuple[int, int]  #: Where the number of its positions is written.
+    positions: tuple[Position, ...]  #: Of the robot, in the order of the text.
+    carried: bool  #: Whether base axes, which carry the robot, have positions too.
 
 
 def jobs_of(source: Source, lines: Lines) -> Iterator[Job]:

@@ -68,17 +68,13 @@ class Aggregate(NamedTuple):
 def aggregate(text: Text, start: int, stop: int, *, offset: bool = False) -> Aggregate:
     """Read what stands from one curly bracket to the other.
 
-    Parameters
-    ----------
-    start, stop
-        From the first bracket to after the last.
-    offset
-        Whether it is an offset, in which what is not written is zero; in a target it would keep the value that it has.
+    Args:
+        start, stop: From the first bracket to after the last.
+        offset: Whether it is an offset, in which what is not written is zero; in a target it would keep the value that
+            it has.
 
-    Raises
-    ------
-    InputError
-        If a number is out of all proportion.
+    Raises:
+        InputError: If a number is out of all proportion.
     """
     usual = None if offset else _USUAL.match(text.flat, start, stop)
     if usual is not None and usual.end() == stop:

@@ -42,12 +42,9 @@ _NOTHING: Final = Found(None)
 class Finder:
     """Finds places, and notes with which tool and base they are used.
 
-    Attributes
-    ----------
-    written
-        The places that stand in moves.
-    pairs
-        All names of tool and base that moves have; None among them if those of some move are not known.
+    Attributes:
+        written: The places that stand in moves.
+        pairs: All names of tool and base that moves have; None among them if those of some move are not known.
     """
 
     def __init__(self, names: Names) -> None:
@@ -76,16 +73,11 @@ class Finder:
     ) -> None:
         """Take the next move.
 
-        Parameters
-        ----------
-        held
-            The tool and the base that it has.
-        current
-            Which value a name has here, by the identity of its variable, if the routine gave it one.
-        by_axes
-            Whether it heeds Status and Turn.
-        first
-            Whether the posture before it is not known.
+        Args:
+            held: The tool and the base that it has.
+            current: Which value a name has here, by the identity of its variable, if the routine gave it one.
+            by_axes: Whether it heeds Status and Turn.
+            first: Whether the posture before it is not known.
         """
         self._routine, self._current, self._by_axes, self._first = routine, current, by_axes, first
         if held is not self._held:

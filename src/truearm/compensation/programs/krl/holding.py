@@ -45,21 +45,11 @@ _OWN: Final = frozenset({"$NULLFRAME", "$WORLD", "$ROBROOT"})
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """The tool or the base that holds.
+    """The tool or the base that holds."""
 
-    Attributes
-    ----------
-    name
-        Its name, empty for the flange or the robot's own base.
-    problem
-        Why it is not known, None if it is.
-    default
-        Whether it is only what a program starts with.
-    """
-
-    name: str = ""
-    problem: str | None = None
-    default: bool = False
+    name: str = ""  #: Its name, empty for the flange or the robot's own base.
+    problem: str | None = None  #: Why it is not known, None if it is.
+    default: bool = False  #: Whether it is only what a program starts with.
 
 
 @dataclass(frozen=True, slots=True)

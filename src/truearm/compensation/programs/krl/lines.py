@@ -29,14 +29,10 @@ def short(name: str) -> str:
 class Text:
     """One source, read as lines.
 
-    Attributes
-    ----------
-    index
-        Of the source.
-    module
-        Its name without suffix, in capitals: .src and .dat of one name are one module.
-    flat
-        Its text, every character at its place, with a newline at the end of every line.
+    Attributes:
+        index: Of the source.
+        module: Its name without suffix, in capitals: .src and .dat of one name are one module.
+        flat: Its text, every character at its place, with a newline at the end of every line.
     """
 
     def __init__(self, index: int, source: Source) -> None:

@@ -33,41 +33,23 @@ _FDAT_PART: Final = re.compile(r"\b(TOOL_NO|BASE_NO|IPO_FRAME)\s++(#?\w++)", re.
 
 @dataclass(slots=True, eq=False)
 class Taught:
-    """A place as it is written, and what its moves say about it.
+    """A place as it is written, and what its moves say about it."""
 
-    Attributes
-    ----------
-    source, place, name
-        Where it stands and what it is called.
-    numbers
-        What is written.
-    type
-        What it is declared as; None if nowhere, or if it stands in a move.
-    tool, frame
-        That its moves have.
-    used, by_axes, first
-        Whether a move goes there; one that heeds Status and Turn; one before which the posture is not known.
-    parent
-        What it is an offset from.
-    problem
-        Why it cannot be corrected.
-    index
-        Of the target that it becomes.
-    """
-
-    source: int
+    source: int  #: source, place, name: where it stands and what it is called.
     place: int
     name: str
-    numbers: Aggregate
-    type: str | None = None
-    tool: str = ""
+    numbers: Aggregate  #: What is written.
+    type: str | None = None  #: What it is declared as; None if nowhere, or if it stands in a move.
+    tool: str = ""  #: tool, frame: that its moves have.
     frame: str = ""
+    #: used, by_axes, first: whether a move goes there; one that heeds Status and Turn; one before which the posture is
+    #: not known.
     used: bool = False
     by_axes: bool = False
     first: bool = False
-    parent: Taught | None = None
-    problem: str | None = None
-    index: int = -1
+    parent: Taught | None = None  #: What it is an offset from.
+    problem: str | None = None  #: Why it cannot be corrected.
+    index: int = -1  #: Of the target that it becomes.
 
     def trouble(self) -> str | None:
         """Return why it cannot be corrected, None if it can."""
@@ -79,31 +61,15 @@ class Taught:
 
 @dataclass(slots=True, eq=False)
 class Variable:
-    """A name: every value that is written for it, and whether it is computed too.
+    """A name: every value that is written for it, and whether it is computed too."""
 
-    Attributes
-    ----------
-    name, type
-        As declared; the type is None if nowhere.
-    module
-        Where it is declared.
-    values
-        In the order of the text.
-    computed
-        Number of the line in which it gets a value that is not written, 0 for none.
-    offset
-        Whether it is used as one, and so is no target.
-    elements
-        By index, if it is a list.
-    """
-
-    name: str
+    name: str  #: name, type: as declared; the type is None if nowhere.
     type: str | None
-    module: str
-    values: list[Taught] = field(default_factory=list)
-    computed: int = 0
-    offset: bool = False
-    elements: dict[str, Variable] | None = None
+    module: str  #: Where it is declared.
+    values: list[Taught] = field(default_factory=list)  #: In the order of the text.
+    computed: int = 0  #: Number of the line in which it gets a value that is not written, 0 for none.
+    offset: bool = False  #: Whether it is used as one, and so is no target.
+    elements: dict[str, Variable] | None = None  #: By index, if it is a list.
 
     @property
     def shared(self) -> bool:

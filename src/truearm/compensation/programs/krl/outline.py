@@ -64,18 +64,12 @@ class Routine:
 class Outline:
     """What the texts of a program contain.
 
-    Attributes
-    ----------
-    names
-        All that they declare.
-    routines
-        In the order of the texts.
-    by_name
-        The same, by module and name; by an empty module, all.
-    unknown
-        Instructions that are neither KRL nor a routine of the program, by their first word.
-    sets_tool, sets_base
-        Indices of the texts that set the tool or the base somewhere.
+    Attributes:
+        names: All that they declare.
+        routines: In the order of the texts.
+        by_name: The same, by module and name; by an empty module, all.
+        unknown: Instructions that are neither KRL nor a routine of the program, by their first word.
+        sets_tool, sets_base: Indices of the texts that set the tool or the base somewhere.
     """
 
     def __init__(self, texts: Sequence[Text]) -> None:

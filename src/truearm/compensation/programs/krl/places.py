@@ -21,22 +21,12 @@ _WITH: Final = re.compile(r"\bWITH\b", re.ASCII | re.IGNORECASE)
 
 
 class Words(NamedTuple):
-    """The words of a move.
+    """The words of a move."""
 
-    Attributes
-    ----------
-    target, via
-        Where the words for the places stand; `via` is None if it is no circle.
-    angle
-        Whether a circle has an angle of its own, and does not end at its target.
-    settings
-        Where the text after WITH begins, None if there is none.
-    """
-
-    target: Span
+    target: Span  #: target, via: where the words for the places stand; `via` is None if it is no circle.
     via: Span | None
-    angle: bool
-    settings: int | None
+    angle: bool  #: Whether a circle has an angle of its own, and does not end at its target.
+    settings: int | None  #: Where the text after WITH begins, None if there is none.
 
 
 def words_of(flat: str, statement: Statement) -> Words | None:

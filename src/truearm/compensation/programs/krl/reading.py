@@ -53,11 +53,9 @@ class _Pending(NamedTuple):
 def read(sources: Sequence[Source]) -> Program:
     """Read the files of one KRL program, given together.
 
-    Raises
-    ------
-    InputError
-        If brackets, strings, routines or data lists do not close, if a move stands outside of a routine, or if a
-        number is out of all proportion.
+    Raises:
+        InputError: If brackets, strings, routines or data lists do not close, if a move stands outside of a routine, or
+            if a number is out of all proportion.
     """
     return _Reader(sources).program()
 

@@ -23,17 +23,11 @@ _OPTION: Final = re.compile(r"\\\s*+([^\W\d]\w*+)\s*+(?::=)?+")
 
 @dataclass(slots=True)
 class Arguments:
-    """The arguments of an instruction or a function.
+    """The arguments of an instruction or a function."""
 
-    Attributes
-    ----------
-    needed
-        Where those stand that are not optional, each ``(start, stop)``.
-    options
-        Where the values of the optional ones stand, by name in lower case; a switch has an empty one.
-    """
-
+    #: Where those stand that are not optional, each ``(start, stop)``.
     needed: list[tuple[int, int]] = field(default_factory=list)
+    #: Where the values of the optional ones stand, by name in lower case; a switch has an empty one.
     options: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 

@@ -152,10 +152,8 @@ def _transform(numbers: tuple[str, ...]) -> Transform:
 def tool_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | None]:
     """Return ``T_flange_tip`` of tooldata written out, None if they are not, and why targets with it are left alone.
 
-    Raises
-    ------
-    RefusedPoseError
-        If its pose cannot be.
+    Raises:
+        RefusedPoseError: If its pose cannot be.
     """
     found = _TOOL_TEXT.match(text, start, stop)
     if found is None:
@@ -180,10 +178,8 @@ def frame_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | 
 
     The object frame stands in the user frame, and that in the frame of the robot's base.
 
-    Raises
-    ------
-    RefusedPoseError
-        If one of its poses cannot be.
+    Raises:
+        RefusedPoseError: If one of its poses cannot be.
     """
     found = _FRAME_TEXT.match(text, start, stop)
     if found is None:

@@ -64,12 +64,9 @@ class Found(NamedTuple):
 class Expressions:
     """The targets that a program declares and writes out, and what its expressions for targets mean.
 
-    Attributes
-    ----------
-    candidates
-        All of them, each after the one that it is an offset from.
-    elements
-        Those that are declared, one a datum or one an element of an array.
+    Attributes:
+        candidates: All of them, each after the one that it is an offset from.
+        elements: Those that are declared, one a datum or one an element of an array.
     """
 
     def __init__(self, listing: Listing) -> None:

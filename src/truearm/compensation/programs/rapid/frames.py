@@ -81,10 +81,8 @@ class Frames:
     def use(self, at: Instruction, tool: str, frame: str | None) -> tuple[Use, str | None]:
         """Return the tool and work object that a move's words for them mean, and why its targets are left as they are.
 
-        Parameters
-        ----------
-        frame
-            None for a move without one.
+        Args:
+            frame: None for a move without one.
         """
         key = (tool, frame, id(at.routine), id(at.module))
         known = self._known.get(key)

@@ -23,12 +23,9 @@ _PAIRS: Final = {"]": "[", ")": "(", "}": "{"}
 def code_of(text: str) -> tuple[str, int | None]:
     """Blank comments, the header and the insides of strings.
 
-    Returns
-    -------
-    code
-        As long as the text.
-    unclosed
-        Where the first string begins that is not closed, None if all are.
+    Returns:
+        code: As long as the text.
+        unclosed: Where the first string begins that is not closed, None if all are.
     """
     unclosed: list[int] = []
 
@@ -50,67 +47,37 @@ def code_of(text: str) -> tuple[str, int | None]:
 
 @dataclass(slots=True, eq=False)
 class Datum:
-    """Something with a name that is declared: data or a parameter.
+    """Something with a name that is declared: data or a parameter."""
 
-    Attributes
-    ----------
-    type, name
-        Type in lower case, and the name as declared.
-    source, place
-        File, from 0, and where its name stands.
-    start, stop
-        Where its initial value stands; equal if it has none.
-    size
-        What stands in the braces of an array, None for no array.
-    parameter
-        Whether it is a parameter of a routine.
-    twice
-        Whether its name is declared again in the same scope.
-    written
-        The line of the program on which it gets a value, 0 for none.
-    """
-
-    type: str
+    type: str  #: type, name: type in lower case, and the name as declared.
     name: str
-    source: int
+    source: int  #: source, place: file, from 0, and where its name stands.
     place: int
-    start: int = 0
+    start: int = 0  #: start, stop: where its initial value stands; equal if it has none.
     stop: int = 0
-    size: str | None = None
-    parameter: bool = False
-    twice: bool = False
-    written: int = 0
+    size: str | None = None  #: What stands in the braces of an array, None for no array.
+    parameter: bool = False  #: Whether it is a parameter of a routine.
+    twice: bool = False  #: Whether its name is declared again in the same scope.
+    written: int = 0  #: The line of the program on which it gets a value, 0 for none.
 
 
 Scope = dict[str, Datum]
 
 
 class Instruction(NamedTuple):
-    """An instruction: its first word, where it stands, and what names mean there.
+    """An instruction: its first word, where it stands, and what names mean there."""
 
-    Attributes
-    ----------
-    word
-        As written.
-    source, start, arguments, stop
-        File, from 0; where it begins, where its arguments begin, and where its semicolon is.
-    routine, module
-        The scopes it is in.
-    stretch
-        Instructions of the same stretch follow each other, with nothing between them that moves the robot.
-    guarded
-        Whether it is the one instruction of an IF without THEN.
-    """
-
-    word: str
+    word: str  #: As written.
+    #: source, start, arguments, stop: file, from 0; where it begins, where its arguments begin, and where its semicolon
+    #: is.
     source: int
     start: int
     arguments: int
     stop: int
-    routine: Scope
+    routine: Scope  #: routine, module: the scopes it is in.
     module: Scope
-    stretch: int
-    guarded: bool
+    stretch: int  #: Instructions of the same stretch follow each other, with nothing between them that moves the robot.
+    guarded: bool  #: Whether it is the one instruction of an IF without THEN.
 
 
 class Writing(NamedTuple):
@@ -126,31 +93,16 @@ class Writing(NamedTuple):
 
 @dataclass(eq=False)
 class Listing:
-    """What the files of a program hold.
+    """What the files of a program hold."""
 
-    Attributes
-    ----------
-    sources, codes
-        The files, and their texts as :func:`code_of` has them.
-    data
-        Everything declared but parameters, in the order of the text.
-    instructions
-        In the order of the text: those that move the robot and those that are not known.
-    routines
-        Names of the routines, in lower case.
-    shared
-        What is declared for all modules.
-    writings
-        The assignments.
-    """
-
-    sources: tuple[Source, ...]
+    sources: tuple[Source, ...]  #: sources, codes: the files, and their texts as :func:`code_of` has them.
     codes: list[str] = field(default_factory=list)
-    data: list[Datum] = field(default_factory=list)
+    data: list[Datum] = field(default_factory=list)  #: Everything declared but parameters, in the order of the text.
+    #: In the order of the text: those that move the robot and those that are not known.
     instructions: list[Instruction] = field(default_factory=list)
-    routines: set[str] = field(default_factory=set)
-    shared: Scope = field(default_factory=dict)
-    writings: list[Writing] = field(default_factory=list)
+    routines: set[str] = field(default_factory=set)  #: Names of the routines, in lower case.
+    shared: Scope = field(default_factory=dict)  #: What is declared for all modules.
+    writings: list[Writing] = field(default_factory=list)  #: The assignments.
     _lines: list[Lines] = field(default_factory=list)
 
     def line(self, source: int, place: int) -> int:

@@ -13,31 +13,15 @@ from truearm.compensation.programs.program import MoveKind
 
 
 class Motion(NamedTuple):
-    """An instruction that moves the robot.
+    """An instruction that moves the robot."""
 
-    Attributes
-    ----------
-    kind
-        How the tip goes.
-    target, tool
-        Which of the arguments that are not optional they are; -1 for the last one.
-    via
-        Which of them the circle passes, None for no circle.
-    joints
-        Whether the target is a jointtarget.
-    searches
-        Whether the robot may stop on the way.
-    splittable
-        Whether several of it after each other do what one does.
-    """
-
-    kind: MoveKind
-    target: int = 0
+    kind: MoveKind  #: How the tip goes.
+    target: int = 0  #: target, tool: which of the arguments that are not optional they are; -1 for the last one.
     tool: int = -1
-    via: int | None = None
-    joints: bool = False
-    searches: bool = False
-    splittable: bool = False
+    via: int | None = None  #: Which of them the circle passes, None for no circle.
+    joints: bool = False  #: Whether the target is a jointtarget.
+    searches: bool = False  #: Whether the robot may stop on the way.
+    splittable: bool = False  #: Whether several of it after each other do what one does.
 
 
 def _motions() -> dict[str, Motion]:

@@ -223,17 +223,12 @@ class _Walk:
 def listing_of(sources: Sequence[Source], motions: frozenset[str], quiet: frozenset[str]) -> Listing:
     """Take the files of a program apart.
 
-    Parameters
-    ----------
-    motions
-        First words, in lower case, of instructions that move the robot.
-    quiet
-        First words, in lower case, of instructions that do not.
+    Args:
+        motions: First words, in lower case, of instructions that move the robot.
+        quiet: First words, in lower case, of instructions that do not.
 
-    Raises
-    ------
-    InputError
-        If a string, a bracket, a routine or a module is not closed.
+    Raises:
+        InputError: If a string, a bracket, a routine or a module is not closed.
     """
     listing = Listing(tuple(sources))
     for source in range(len(sources)):

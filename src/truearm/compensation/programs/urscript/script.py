@@ -31,29 +31,15 @@ _WORD: Final = re.compile(_NAME, re.ASCII)
 
 @dataclass(slots=True, eq=False)
 class Assignment:
-    """An assignment to a variable.
-
-    Attributes
-    ----------
-    start, routine
-        Where it stands.
-    value
-        What is assigned; None where it is to one of the variable's elements.
-    scope
-        ``global`` or ``local``, or empty if it does not say.
-    aimed
-        Whether a move goes there.
-    series
-        All assignments to the same variable.
-    """
+    """An assignment to a variable."""
 
     name: str
-    start: int
-    value: Value | None
+    start: int  #: start, routine: where it stands.
+    value: Value | None  #: What is assigned; None where it is to one of the variable's elements.
     routine: int
-    scope: str
-    aimed: bool = False
-    series: Series = field(init=False)
+    scope: str  #: ``global`` or ``local``, or empty if it does not say.
+    aimed: bool = False  #: Whether a move goes there.
+    series: Series = field(init=False)  #: All assignments to the same variable.
 
     @property
     def numbers(self) -> Numbers | None:
@@ -63,22 +49,12 @@ class Assignment:
 
 @dataclass(slots=True, eq=False)
 class Series:
-    """All assignments to one variable in the order of the text.
-
-    Attributes
-    ----------
-    last_computed
-        Where the last one stands that is not six numbers; -1 for none.
-    several
-        Whether they differ.
-    reached
-        Whether a move goes to one of them.
-    """
+    """All assignments to one variable in the order of the text."""
 
     assignments: list[Assignment] = field(default_factory=list)
-    last_computed: int = -1
-    several: bool = False
-    reached: bool = False
+    last_computed: int = -1  #: Where the last one stands that is not six numbers; -1 for none.
+    several: bool = False  #: Whether they differ.
+    reached: bool = False  #: Whether a move goes to one of them.
 
     def add(self, assignment: Assignment) -> None:
         """Add the next assignment."""
@@ -121,10 +97,8 @@ class Script(Text):
 
     Of calls within calls only those are listed that are not within one of `whole`.
 
-    Raises
-    ------
-    InputError
-        If a string or a bracket is not closed, or a routine or block has no end.
+    Raises:
+        InputError: If a string or a bracket is not closed, or a routine or block has no end.
     """
 
     def __init__(self, source: Source, whole: frozenset[str]) -> None:

@@ -27,55 +27,29 @@ _WHERE_IT_IS: Final = frozenset(
 
 @dataclass(slots=True, eq=False)
 class Spot:
-    """Six numbers that moves go to, as they are in one frame or as an offset from one other spot.
-
-    Attributes
-    ----------
-    tcps
-        Every TCP that moves reach it with; None before the first.
-    nears
-        Every ``qnear`` it is reached with.
-    ended
-        Whether a move ends there; else circles pass it.
-    passed_to
-        Where the first circle that passes it ends.
-    trouble
-        Why it has to stay as it is; empty if it need not.
-    shared
-        Whether it is an offset from several others, so that it stays as it is and those move.
-    """
+    """Six numbers that moves go to, as they are in one frame or as an offset from one other spot."""
 
     numbers: Numbers
     name: str = ""
     frame: str = ""
     parent: Spot | None = None
     turned: bool = False
-    tcps: set[Tcp] | None = None
-    nears: set[tuple[float, ...]] | None = None
-    ended: bool = False
-    passed_to: Spot | None = None
-    trouble: str = ""
-    shared: bool = False
+    tcps: set[Tcp] | None = None  #: Every TCP that moves reach it with; None before the first.
+    nears: set[tuple[float, ...]] | None = None  #: Every ``qnear`` it is reached with.
+    ended: bool = False  #: Whether a move ends there; else circles pass it.
+    passed_to: Spot | None = None  #: Where the first circle that passes it ends.
+    trouble: str = ""  #: Why it has to stay as it is; empty if it need not.
+    shared: bool = False  #: Whether it is an offset from several others, so that it stays as it is and those move.
     index: int = -1
 
 
 class Use(NamedTuple):
-    """A spot as a move names it.
-
-    Attributes
-    ----------
-    words
-        In whose place other numbers could stand; ``(0, 0)`` if none could.
-    near
-        The joints that it is named to be near to.
-    there
-        Whether the move ends at the spot, and not at an offset beyond it that only the robot knows.
-    """
+    """A spot as a move names it."""
 
     spot: Spot
-    words: tuple[int, int]
-    near: tuple[float, ...] | None = None
-    there: bool = True
+    words: tuple[int, int]  #: In whose place other numbers could stand; ``(0, 0)`` if none could.
+    near: tuple[float, ...] | None = None  #: The joints that it is named to be near to.
+    there: bool = True  #: Whether the move ends at the spot, and not at an offset beyond it that only the robot knows.
 
 
 class At(NamedTuple):
@@ -89,12 +63,9 @@ class At(NamedTuple):
 class Targets:
     """The spots of one file.
 
-    Parameters
-    ----------
-    script
-        The file.
-    frames
-        Frames of the whole program; those of the file are added.
+    Args:
+        script: The file.
+        frames: Frames of the whole program; those of the file are added.
     """
 
     def __init__(self, script: Script, frames: Places) -> None:
@@ -121,12 +92,9 @@ class Targets:
     def reach(self, value: Value, at: At, frame: str = "", name: str = "") -> Use | str:
         """Return the spot that a value is, or why there is none.
 
-        Parameters
-        ----------
-        frame
-            Of the value.
-        name
-            Of the variable that holds the value.
+        Args:
+            frame: Of the value.
+            name: Of the variable that holds the value.
         """
         words = (value.start, value.stop)
         if isinstance(value, Other):

@@ -80,10 +80,8 @@ class Argument(NamedTuple):
 class Text:
     """The text of a file with comments and strings blank, so that every other character keeps its place.
 
-    Raises
-    ------
-    InputError
-        If a string or a bracket is not closed.
+    Raises:
+        InputError: If a string or a bracket is not closed.
     """
 
     def __init__(self, source: Source) -> None:

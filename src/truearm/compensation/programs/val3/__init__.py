@@ -85,16 +85,12 @@ def commented(text: str, lines: Sequence[str]) -> str:
 def read(sources: Sequence[Source]) -> Program:
     """Read the files of one or more VAL3 applications.
 
-    Parameters
-    ----------
-    sources
-        Data, program and project files. A project says whether lengths are millimetres or inches; without one they
-        are millimetres.
+    Args:
+        sources: Data, program and project files. A project says whether lengths are millimetres or inches; without one
+            they are millimetres.
 
-    Raises
-    ------
-    InputError
-        If a file is not well-formed or not complete, or a number is malformed.
+    Raises:
+        InputError: If a file is not well-formed or not complete, or a number is malformed.
     """
     lines = [Lines(source.text) for source in sources]
     applications: dict[Path, _Application] = {}

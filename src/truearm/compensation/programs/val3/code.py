@@ -63,22 +63,13 @@ Reference = tuple[str, str | None]
 
 @dataclass(slots=True)
 class Words:
-    """What a move is sent to.
+    """What a move is sent to."""
 
-    Attributes
-    ----------
-    start, stop, line
-        Where it stands in the text, and on which line of the file.
-    point
-        The point or joint position, None if it is computed.
-    offset, places
-        The six numbers of an offset that are written, and where; empty for none.
-    """
-
-    start: int
+    start: int  #: start, stop, line: where it stands in the text, and on which line of the file.
     stop: int
     line: int
-    point: Reference | None
+    point: Reference | None  #: The point or joint position, None if it is computed.
+    #: offset, places: the six numbers of an offset that are written, and where; empty for none.
     offset: tuple[float, ...] = ()
     places: tuple[tuple[int, int], ...] = ()
 
@@ -98,25 +89,14 @@ class CodeMove:
 
 @dataclass
 class Routine:
-    """A program: its moves, None where the robot may come from elsewhere.
+    """A program: its moves, None where the robot may come from elsewhere."""
 
-    Attributes
-    ----------
-    own
-        Names of its parameters and local variables.
-    changed
-        Names of the variables that it changes.
-    handed_over
-        Names in calls of other programs and of instructions that are not known.
-    unknown
-        Instructions that are not known.
-    """
-
-    own: set[str] = field(default_factory=set)
+    own: set[str] = field(default_factory=set)  #: Names of its parameters and local variables.
     moves: list[CodeMove | None] = field(default_factory=list)
-    changed: set[str] = field(default_factory=set)
+    changed: set[str] = field(default_factory=set)  #: Names of the variables that it changes.
+    #: Names in calls of other programs and of instructions that are not known.
     handed_over: set[str] = field(default_factory=set)
-    unknown: Counter[str] = field(default_factory=Counter)
+    unknown: Counter[str] = field(default_factory=Counter)  #: Instructions that are not known.
 
 
 def routines_of(source: Source, lines: Lines) -> list[Routine]:

@@ -48,28 +48,16 @@ Attributes = dict[str, str]
 
 @dataclass(slots=True)
 class Element:
-    """An element of a variable.
+    """An element of a variable."""
 
-    Attributes
-    ----------
-    key
-        Its index in the variable, as text without blanks.
-    line
-        In the file, from 1.
-    values, places
-        Its numbers in the order of :data:`NUMBERS`, and where they stand; an empty place is where one could stand.
-    father
-        Reference to the frame or tool that it is relative to, empty for none.
-    posture
-        Words for the shoulder, elbow and wrist, those that are written.
-    """
-
-    key: str
-    line: int
+    key: str  #: Its index in the variable, as text without blanks.
+    line: int  #: In the file, from 1.
+    #: values, places: its numbers in the order of :data:`NUMBERS`, and where they stand; an empty place is where one
+    #: could stand.
     values: tuple[float, ...]
     places: tuple[tuple[int, int], ...]
-    father: str
-    posture: tuple[str, ...] = ()
+    father: str  #: Reference to the frame or tool that it is relative to, empty for none.
+    posture: tuple[str, ...] = ()  #: Words for the shoulder, elbow and wrist, those that are written.
 
 
 @dataclass
@@ -90,10 +78,9 @@ def parse(
 ) -> None:
     """Go through the tags of a file, or refuse it if it is not well-formed.
 
-    Parameters
-    ----------
-    started, ended
-        Called with the name of a tag, the attributes of a starting one, and the place where the tag begins.
+    Args:
+        started, ended: Called with the name of a tag, the attributes of a starting one, and the place where the tag
+            begins.
     """
     text = source.text
     skipped = len(BYTE_ORDER_MARK) if text.startswith(BYTE_ORDER_MARK) else 0

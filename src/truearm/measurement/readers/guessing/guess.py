@@ -52,20 +52,13 @@ _NUMBERED: Final = re.compile("(.*?)[0-9]{1,9}")
 class Guessed:
     """A mapping that was guessed.
 
-    Attributes
-    ----------
-    text
-        The mapping file.
-    guesses
-        Every entry with what it rests on.
-    refusal
-        Why an import with it would be refused as it stands; None if it would not, or if something is open.
-    rows, configurations
-        How many rows and configurations such an import would read; 0 if it was not tried.
+    Attributes:
+        rows, configurations: How many rows and configurations such an import would read; 0 if it was not tried.
     """
 
-    text: str
-    guesses: tuple[Guess, ...]
+    text: str  #: The mapping file.
+    guesses: tuple[Guess, ...]  #: Every entry with what it rests on.
+    #: Why an import with it would be refused as it stands; None if it would not, or if something is open.
     refusal: str | None = None
     configurations: int = 0
     targets: tuple[str, ...] = ()
@@ -79,10 +72,8 @@ class Guessed:
 def guess_mapping(path: Path) -> Guessed:
     """Return the mapping file that a table seems to need.
 
-    Raises
-    ------
-    InputError
-        If it does not look like a table.
+    Raises:
+        InputError: If it does not look like a table.
     """
     layout = guess_layout(path)
     columns = columns_of(layout)

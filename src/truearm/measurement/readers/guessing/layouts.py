@@ -58,39 +58,17 @@ Rows = list[tuple[int, list[str]]]
 
 @dataclass(frozen=True)
 class GuessedLayout:
-    """How a table seems to be laid out.
+    """How a table seems to be laid out."""
 
-    Attributes
-    ----------
-    entries
-        Entries of the mapping's layout, with what the guess rests on.
-    decimal
-        The decimal sign.
-    names
-        Name of each column; its number if there is no header, or names are there twice.
-    headings
-        What stands above each column, of two lines if the lower one alone has names twice.
-    units
-        Unit of each column by a line of units, empty where there is none.
-    columns
-        The cells of all rows, column by column.
-    lines
-        Line of each row.
-    header
-        Whether there is a header.
-    notes
-        What else was seen.
-    """
-
-    entries: dict[str, tuple[str | int, str]]
-    decimal: str
-    names: tuple[str, ...]
-    headings: tuple[str, ...]
-    units: tuple[str, ...]
-    columns: tuple[tuple[str, ...], ...]
-    lines: tuple[int, ...]
-    header: bool
-    notes: tuple[str, ...] = ()
+    entries: dict[str, tuple[str | int, str]]  #: Entries of the mapping's layout, with what the guess rests on.
+    decimal: str  #: The decimal sign.
+    names: tuple[str, ...]  #: Name of each column; its number if there is no header, or names are there twice.
+    headings: tuple[str, ...]  #: What stands above each column, of two lines if the lower one alone has names twice.
+    units: tuple[str, ...]  #: Unit of each column by a line of units, empty where there is none.
+    columns: tuple[tuple[str, ...], ...]  #: The cells of all rows, column by column.
+    lines: tuple[int, ...]  #: Line of each row.
+    header: bool  #: Whether there is a header.
+    notes: tuple[str, ...] = ()  #: What else was seen.
 
 
 @dataclass(frozen=True)
@@ -107,10 +85,8 @@ class _Split:
 def guess_layout(path: Path) -> GuessedLayout:
     """Return how a table seems to be laid out.
 
-    Raises
-    ------
-    InputError
-        If no way to cut it into cells gives rows of numbers.
+    Raises:
+        InputError: If no way to cut it into cells gives rows of numbers.
     """
     if is_workbook(path):
         return _of_workbook(path)

@@ -26,21 +26,11 @@ _ENOUGH: Final = 10
 
 @dataclass(frozen=True)
 class Guess:
-    """One entry of a mapping, and what the guess rests on.
+    """One entry of a mapping, and what the guess rests on."""
 
-    Attributes
-    ----------
-    entry
-        The entry, such as ``joints.unit``.
-    value
-        Its value; ``?`` where nothing tells it.
-    because
-        What the guess rests on.
-    """
-
-    entry: str
-    value: str
-    because: str
+    entry: str  #: The entry, such as ``joints.unit``.
+    value: str  #: Its value; ``?`` where nothing tells it.
+    because: str  #: What the guess rests on.
 
 
 @dataclass

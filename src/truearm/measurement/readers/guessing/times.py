@@ -31,22 +31,13 @@ _SECONDS: Final = frozenset({"s", "sec", "ms", "us", "min", "h"})
 
 @dataclass(frozen=True)
 class GuessedTime:
-    """What seems to tell the order of measurement.
+    """What seems to tell the order of measurement."""
 
-    Attributes
-    ----------
-    columns
-        The column that does, or one with the day and one with the time; none if there are times, and which of them
-        does, or how, is not known.
-    value
-        The entry of the mapping.
-    because
-        What it rests on.
-    """
-
+    #: The column that does, or one with the day and one with the time; none if there are times, and which of them does,
+    #: or how, is not known.
     columns: tuple[Column, ...]
-    value: str
-    because: str
+    value: str  #: The entry of the mapping.
+    because: str  #: What it rests on.
 
 
 def time_among(columns: Sequence[Column]) -> GuessedTime | None:

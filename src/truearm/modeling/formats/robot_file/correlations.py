@@ -50,19 +50,13 @@ def correlations_text(factor: Sequence[Sequence[float]]) -> list[str] | str:
 def factor_from(entry: Sequence[str] | str, count: int, where: str, cure: str) -> Factor:
     """Return the factor that a file states.
 
-    Parameters
-    ----------
-    entry
-        What :func:`correlations_text` returns.
-    count
-        How many parameters there are.
-    where, cure
-        For messages.
+    Args:
+        entry: What :func:`correlations_text` returns.
+        count: How many parameters there are.
+        where, cure: For messages.
 
-    Raises
-    ------
-    InputError
-        If there are more or fewer numbers, or one is not from -1 to 1.
+    Raises:
+        InputError: If there are more or fewer numbers, or one is not from -1 to 1.
     """
     if isinstance(entry, str):
         return _unpacked(entry, count, where, cure)

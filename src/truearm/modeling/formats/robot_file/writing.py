@@ -34,10 +34,8 @@ _LONGEST_ROW: Final = 4000
 def robot_text(robot: Robot) -> str:
     """Return the robot as the text of a robot file, in mm and degrees.
 
-    Raises
-    ------
-    InputError
-        If something acts on its tool, which a robot file does not hold.
+    Raises:
+        InputError: If something acts on its tool, which a robot file does not hold.
     """
     refuse_pushed(robot)
     from ruamel.yaml import YAML

@@ -58,11 +58,9 @@ def with_kinematics(type_: Robot, found: FactoryKinematics) -> Robot:
 
     The nominal values, masses, tools and limits are those of the type. The frames of links lie beside the type's.
 
-    Raises
-    ------
-    InputError
-        If the type is no arm of this maker's kind, its frames are not the controller's, or the file is of an arm with
-        other joints.
+    Raises:
+        InputError: If the type is no arm of this maker's kind, its frames are not the controller's, or the file is of
+            an arm with other joints.
     """
     plain = _plain(type_)
     if found.frames is None:
@@ -113,10 +111,8 @@ def _with_rows(robot: Robot, rows: Sequence[Mapping[str, float]]) -> Robot:
 def refuse_far(made: Robot, type_: Robot, where: str) -> None:
     """Refuse kinematics of an arm of another type than `type_`, or of none.
 
-    Raises
-    ------
-    InputError
-        With how far the flange is from the nominal one on average, or how far it is turned; or a link.
+    Raises:
+        InputError: With how far the flange is from the nominal one on average, or how far it is turned; or a link.
     """
     apart, turned = mean_distance(made, type_), mean_angle(made, type_)
     if not apart <= MOST_APART:

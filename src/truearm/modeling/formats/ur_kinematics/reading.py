@@ -53,33 +53,22 @@ _ROS_CURE: Final = "Let the driver's program write the file again, and copy it w
 
 @dataclass(frozen=True)
 class FactoryKinematics:
-    """What stands in a kinematics file.
+    """What stands in a kinematics file."""
 
-    Attributes
-    ----------
-    path
-        Of the file.
-    deltas
-        What is added to a column of the type's table, six numbers each [rad and m]; empty if `frames` are given.
-    frames
-        Of each joint in the one before at zero joint positions, ``(6, 4, 4)`` [m]; None if `deltas` are given.
-    identity
-        By what its maker knows it: checksums as they were read.
-    """
-
-    path: Path
+    path: Path  #: Of the file.
+    #: What is added to a column of the type's table, six numbers each [rad and m]; empty if `frames` are given.
     deltas: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    #: Of each joint in the one before at zero joint positions, ``(6, 4, 4)`` [m]; None if `deltas` are given.
     frames: Array | None = None
+    #: By what its maker knows it: checksums as they were read.
     identity: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_kinematics(path: Path) -> FactoryKinematics:
     """Read a ``calibration.conf``, or a kinematics file of the ROS driver.
 
-    Raises
-    ------
-    InputError
-        If it is neither, a part of it is missing or no number, or the controller does not use it.
+    Raises:
+        InputError: If it is neither, a part of it is missing or no number, or the controller does not use it.
     """
     text = read_text(path, "yaml_size")
     return _conf(text, path) if _CONF.search(text) else _ros(path)

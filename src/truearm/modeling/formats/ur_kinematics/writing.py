@@ -33,20 +33,14 @@ KINEMATICS_FILE: Final = "A kinematics file"
 def kinematics_text(robot: Robot) -> tuple[str, list[str]]:
     """Return the geometry of a robot as it is now, joint zeros included, as a file of the ROS driver.
 
-    Parameters
-    ----------
-    robot
-        With its base frame as the world.
+    Args:
+        robot: With its base frame as the world.
 
-    Returns
-    -------
-    text, left_out
-        The file without comments, and in words what it cannot hold beside what no table of an arm can.
+    Returns:
+        text, left_out: The file without comments, and in words what it cannot hold beside what no table of an arm can.
 
-    Raises
-    ------
-    InputError
-        If the robot is no arm of this kind.
+    Raises:
+        InputError: If the robot is no arm of this kind.
     """
     _refuse_other_arm(robot)
     frames, behind = _frames(robot)

@@ -38,6 +38,13 @@ TIP: Final = "tip"
 #: What a correction knows of the robot.
 Knowledge = Literal["nothing", "geometry", "deflection", "motion"]
 KNOWLEDGE: Final[tuple[Knowledge, ...]] = ("nothing", "geometry", "deflection", "motion")
+#: What each stage of the correction is called.
+STAGES: Final[Mapping[Knowledge, str]] = {
+    "nothing": "without correction",
+    "geometry": "geometry corrected",
+    "deflection": "and what gives way at rest",
+    "motion": "and what motion adds",
+}
 
 
 @dataclass(frozen=True, eq=False)

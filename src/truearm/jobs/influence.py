@@ -12,7 +12,7 @@ import numpy as np
 from truearm.arrays import finite_number
 from truearm.errors import InputError, refusals_of
 from truearm.identification.solving.fit import identify, place
-from truearm.identification.solving.influence import Influence
+from truearm.identification.solving.influence import Influence, Way
 from truearm.identification.solving.influence import influence as influence_of
 from truearm.identification.solving.models import MODELS, Model
 from truearm.identification.solving.pose_by_pose import (
@@ -47,7 +47,7 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.results.influence import INFLUENCE_FILES, Identified, InfluenceResult, Way
+from truearm.results.influence import INFLUENCE_FILES, Identified, InfluenceResult
 from truearm.shown import counted, listed
 from truearm.simulated import parts_of
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array, Chain, Element
 from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 #: Below this angle [rad] two axes are parallel: they part by less than 1 nm over the reach of a robot.
 PARALLEL: Final = 1e-9

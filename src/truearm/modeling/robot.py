@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral
@@ -25,7 +26,7 @@ from truearm.modeling.postures import Postures
 from truearm.modeling.robot_data import STRUCTURE, RobotData
 from truearm.modeling.robot_parameters import by_parameters, effect_rates
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.modeling.wrench import Wrench, in_base, refuse_above_rating
+from truearm.modeling.wrench import STANDARD_GRAVITY, Wrench, in_base
 
 if TYPE_CHECKING:
     from truearm.modeling.inverse.pose_solver import Orientation
@@ -110,7 +111,7 @@ class Robot(RobotData):
         )
         if self.proof is None or (other.payload, other.gravity) == (self.payload, self.gravity):
             return other
-        from truearm.modeling.formats.robot_file import is_intact, sealed
+        from truearm.modeling.formats.robot_file.seal import is_intact, sealed
 
         return sealed(other, self.proof) if is_intact(self) else other
 
@@ -140,7 +141,7 @@ class Robot(RobotData):
             wrench = wrench.at(self.tool_place(tool) if isinstance(tool, str) else tool)
         if wrench.frame != "tool":
             in_base(self, wrench)
-        refuse_above_rating(self, wrench)
+        _refuse_above_rating(self, wrench)
         return replace(self, wrench=wrench)
 
     def marked(self, simulated: bool) -> Robot:
@@ -474,3 +475,33 @@ class Robot(RobotData):
             raise wrong_kind("a random number generator belongs here", rng, "rng", "numpy.random.default_rng(seed)")
         low, high = np.array([joint.range for joint in self.joints]).T
         return rng.uniform(low, high, (count, len(self.joints)))
+
+
+def _refuse_above_rating(robot: Robot, wrench: Wrench) -> None:
+    """Refuse what acts on the tool beyond what the arm is rated for; where that is not known nothing is refused.
+
+    Makers rate a mass on the flange. A force may be as large as its weight. Moments are rated joint by joint, which few
+    data sheets print; none is allowed beyond that weight at the end of the stretched arm, which no wrist holds.
+
+    Raises:
+        InputError: If the force or the moment is larger.
+    """
+    if robot.rated_load is None:
+        return
+    from truearm.modeling.inverse.kinematics import reach  # it loads EAIK
+
+    weight = robot.rated_load * STANDARD_GRAVITY
+    at_reach = weight * reach(robot, None)
+    cure = "Check number and unit. If the maker allows it, mend the entry rated_load of the robot file."
+    for what, came, most, unit in (
+        ("force", math.hypot(*wrench.force), weight, "N"),
+        ("moment", math.hypot(*wrench.moment), at_reach, "N m"),
+    ):
+        if came > most * (1.0 + 1e-9):
+            raise InputError(
+                f"the {what} is larger than {robot.name} is rated for",
+                parameter="wrench",
+                came=f"{came:.4g} {unit}",
+                allowed=f"up to {most:.4g} {unit}, of a rated load of {robot.rated_load:g} kg",
+                cure=cure,
+            )

@@ -8,7 +8,6 @@ base, or turn with the tool.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -162,36 +161,6 @@ def wrench_on_flange(robot: Robot, wrench: Wrench, flange: ForwardKinematics) ->
     else:
         force, moment = (np.repeat(part[:, None], R.shape[2], axis=1) for part in in_base(robot, wrench))
     return np.concatenate([force, moment + np.cross(arm, force, axis=0)])
-
-
-def refuse_above_rating(robot: Robot, wrench: Wrench, parameter: str = "wrench") -> None:
-    """Refuse what acts on the tool beyond what the arm is rated for; where that is not known nothing is refused.
-
-    Makers rate a mass on the flange. A force may be as large as its weight. Moments are rated joint by joint, which few
-    data sheets print; none is allowed beyond that weight at the end of the stretched arm, which no wrist holds.
-
-    Raises:
-        InputError: If the force or the moment is larger.
-    """
-    if robot.rated_load is None:
-        return
-    from truearm.modeling.inverse.kinematics import reach  # itself needs robots
-
-    weight = robot.rated_load * STANDARD_GRAVITY
-    at_reach = weight * reach(robot, None)
-    cure = "Check number and unit. If the maker allows it, mend the entry rated_load of the robot file."
-    for what, came, most, unit in (
-        ("force", math.hypot(*wrench.force), weight, "N"),
-        ("moment", math.hypot(*wrench.moment), at_reach, "N m"),
-    ):
-        if came > most * (1.0 + 1e-9):
-            raise InputError(
-                f"the {what} is larger than {robot.name} is rated for",
-                parameter=parameter,
-                came=f"{came:.4g} {unit}",
-                allowed=f"up to {most:.4g} {unit}, of a rated load of {robot.rated_load:g} kg",
-                cure=cure,
-            )
 
 
 def refuse_pushed(robot: Robot) -> None:

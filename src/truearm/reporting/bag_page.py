@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import html
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from truearm.measurement.bags.recording import Recording
-from truearm.modeling.chain import Array
-from truearm.reporting.drawing import Figure
 from truearm.reporting.iso9283_figures import HUES, line
 from truearm.reporting.numbers import significant
 from truearm.reporting.panels import Panel, panels
 from truearm.reporting.picture_page import Drawing, Figures, picture_page
-from truearm.results.imported_bag import ImportedBag
+
+if TYPE_CHECKING:
+    from truearm.measurement.bags.recording import Recording
+    from truearm.modeling.chain import Array
+    from truearm.reporting.drawing import Figure
+    from truearm.results.imported_bag import ImportedBag
 
 _BAND: Final = "#c3d5e3"
 _MOST: Final = 3000

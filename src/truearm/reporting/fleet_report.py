@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from truearm.fleets.analysis.accuracy import Quantile
-from truearm.fleets.analysis.analysis import Analysis, KindFound
 from truearm.fleets.analysis.differing import LEAST_COMPARED
-from truearm.fleets.analysis.drift import Drift
 from truearm.fleets.analysis.spread import LEAST_SPREAD, ParameterSpread
 from truearm.notices import worst_first
 from truearm.reporting.fleet_figures import figures_text, fleet_figures
 from truearm.reporting.numbers import significant
 from truearm.reporting.page import page
-from truearm.results.fleet import PRIORS_FILE, Fleet
-from truearm.results.fleet_words import difference_words, outcome_words, reason_words, together_words
+from truearm.results.fleet_words import PRIORS_FILE, difference_words, outcome_words, reason_words, together_words
 from truearm.units import SHOWN_AS
+
+if TYPE_CHECKING:
+    from truearm.fleets.analysis.accuracy import Quantile
+    from truearm.fleets.analysis.analysis import Analysis, KindFound
+    from truearm.fleets.analysis.drift import Drift
+    from truearm.results.fleet import Fleet
 
 #: Rows of tables of robots: who wants more reads robots.csv and fleet.json.
 _ROWS: Final = 30

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import html
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truearm.identification.solving.influence import WAYS
 from truearm.notices import worst_first
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.influence_figures import influence_figure
 from truearm.reporting.numbers import rounded, rounded_to, significant
 from truearm.reporting.page import page
-from truearm.results.influence import WAYS, Identified, InfluenceResult
+
+if TYPE_CHECKING:
+    from truearm.results.influence import Identified, InfluenceResult
 
 #: Configurations in the picture pose by pose: more are not told apart.
 _SHOWN = 400

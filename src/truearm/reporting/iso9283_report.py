@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from truearm.planning.iso9283.criteria import TESTS
 from truearm.reporting.iso9283_figures import pose_pictures
 from truearm.reporting.iso9283_path_figures import path_pictures
 from truearm.reporting.picture_page import Figures, picture_page
-from truearm.results.iso9283_evaluation import Iso9283Evaluation
 from truearm.results.iso9283_table import (
     HEADING,
     UNITS,
@@ -19,8 +19,11 @@ from truearm.results.iso9283_table import (
     test_name,
     worst_places,
 )
-from truearm.validation.iso9283.comparison import Comparison
-from truearm.validation.iso9283.values import Component, Value
+
+if TYPE_CHECKING:
+    from truearm.results.iso9283_evaluation import Iso9283Evaluation
+    from truearm.validation.iso9283.comparison import Comparison
+    from truearm.validation.iso9283.values import Component, Value
 
 _AXES: tuple[Component, ...] = ("x", "y", "z")
 _ANGLES: tuple[Component, ...] = ("a", "b", "c")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from truearm.modeling.transform import quaternion_from_rotation
@@ -9,10 +11,12 @@ from truearm.planning.iso9283.criteria import TESTS
 from truearm.planning.iso9283.planned import PerformancePlan, visited
 from truearm.planning.iso9283.way import Way
 from truearm.planning.poses.pose_plan import PosePlan
-from truearm.reporting.drawing import Figure
 from truearm.reporting.picture_page import Drawing, Figures, picture_page
 from truearm.reporting.planning_figures import pose_cube
-from truearm.results.iso9283_plan import Iso9283Plan
+
+if TYPE_CHECKING:
+    from truearm.reporting.drawing import Figure
+    from truearm.results.iso9283_plan import Iso9283Plan
 
 #: What the standard asks to be noted with the results, and what a reader of them needs.
 _NOTED = (

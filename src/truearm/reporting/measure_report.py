@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from truearm.measurement.measuring.readings import REASONS
 from truearm.reporting.measure_figures import drift_figure, quality_figure
 from truearm.reporting.picture_page import Drawing, Figures, picture_page
-from truearm.results.measured import Measured
 from truearm.results.record import notice_lines
+
+if TYPE_CHECKING:
+    from truearm.results.measured import Measured
 
 
 def measure_report(measured: Measured) -> str:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import html
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from truearm.compensation.corrected_path import Knowledge
+from truearm.compensation.corrected_path import STAGES
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to
 from truearm.reporting.picture_page import Drawing, Figures, picture_page
 from truearm.reporting.planning_figures import joint_trajectories
-from truearm.results.followed_path import STAGES, FollowedPath
+
+if TYPE_CHECKING:
+    from truearm.compensation.corrected_path import Knowledge
+    from truearm.results.followed_path import FollowedPath
 
 _COLOURS: Final[dict[Knowledge, str]] = {
     "nothing": BEFORE,

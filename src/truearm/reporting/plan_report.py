@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from truearm.notices import worst_first
-from truearm.planning.choosing.measurement_plan import MeasurementPlan
-from truearm.planning.choosing.prediction import Prediction
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, Figure, axis, base_axes, figure, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to
 from truearm.reporting.page import page
-from truearm.results.plan import Plan
+
+if TYPE_CHECKING:
+    from truearm.planning.choosing.measurement_plan import MeasurementPlan
+    from truearm.planning.choosing.prediction import Prediction
+    from truearm.results.plan import Plan
 
 _INDEX_WORDS: Final = {
     "O1": "geometric mean of the singular values, per square root of the poses",

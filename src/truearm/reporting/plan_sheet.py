@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -11,11 +11,13 @@ from truearm.compensation.programs.numbers import written
 from truearm.manifest import hash_of
 from truearm.notices import worst_first
 from truearm.planning.choosing.plan_table import plan_csv
-from truearm.planning.driving.tour import Tour
 from truearm.reporting.page import page
-from truearm.results.plan import Plan
 from truearm.results.plan_program import MARK
 from truearm.units import from_si
+
+if TYPE_CHECKING:
+    from truearm.planning.driving.tour import Tour
+    from truearm.results.plan import Plan
 
 #: What a calibration needs to be repeated, and what explains it later.
 _NOTED: Final = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from truearm.planning.poses.pose_plan import PosePlan
@@ -9,7 +11,9 @@ from truearm.reporting.drawing import AFTER, CAMERA, Figure, base_axes, figure, 
 from truearm.reporting.numbers import rounded_to
 from truearm.reporting.picture_page import Drawing, picture_page
 from truearm.reporting.planning_figures import pose_cube
-from truearm.results.pose_set import PlannedPoses
+
+if TYPE_CHECKING:
+    from truearm.results.pose_set import PlannedPoses
 
 
 def pose_set_page(poses: PlannedPoses) -> str:

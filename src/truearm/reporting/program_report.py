@@ -6,21 +6,23 @@ import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation.correction import Correction, way_through
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Joint
 from truearm.notices import worst_first
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
 from truearm.reporting.figures import histogram
 from truearm.reporting.numbers import rounded, rounded_to
 from truearm.reporting.page import page
-from truearm.results.program_correction import FileCorrection, ProgramCorrection
 from truearm.units import from_si
+
+if TYPE_CHECKING:
+    from truearm.modeling.chain import Array
+    from truearm.modeling.parts import Joint
+    from truearm.results.program_correction import FileCorrection, ProgramCorrection
 
 #: Targets in a picture: more slow a browser down and show no more.
 _DRAWN: Final = 5000

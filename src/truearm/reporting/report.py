@@ -5,20 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.identification.judging.expected_error import expected_map
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import Errors
-from truearm.modeling.chain import Array
 from truearm.modeling.parts import GRAVITY
 from truearm.notices import worst_first
 from truearm.reporting.budget_figure import budget_figure, budget_rows, workspace_budget_figure
 from truearm.reporting.curve_figures import curve_figure, curve_name, curve_rows
-from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, expected_error_map, histogram, residuals, workspace
 from truearm.reporting.monte_carlo_figure import coverage_figure, interval_rows
 from truearm.reporting.page import page
@@ -40,9 +36,15 @@ from truearm.reporting.tables import (
     strongest_pairs,
 )
 from truearm.reporting.zones_figure import zone_rows, zones_figure
-from truearm.results.calibration import Calibration
 from truearm.results.simulated import simulated_lines
 from truearm.results.summaries import expected_of
+
+if TYPE_CHECKING:
+    from truearm.measurement.dataset import Dataset
+    from truearm.measurement.statistics import Errors
+    from truearm.modeling.chain import Array
+    from truearm.reporting.drawing import Figure
+    from truearm.results.calibration import Calibration
 
 _FRAMES: Final = ("base", "target", "fixture")
 #: A reading is down-weighted if its weight is less than this share of the median weight.

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import html
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded
 from truearm.reporting.picture_page import Drawing, Figures, picture_page
-from truearm.results.sphere_tests import OneSphere, SphereTests
 from truearm.simulated import without_mark
-from truearm.validation.sphere_test import SphereTest
+
+if TYPE_CHECKING:
+    from truearm.results.sphere_tests import OneSphere, SphereTests
+    from truearm.validation.sphere_test import SphereTest
 
 
 def sphere_page(tests: SphereTests) -> str:

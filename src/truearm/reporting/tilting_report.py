@@ -5,16 +5,18 @@ from __future__ import annotations
 import html
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truearm.measurement.statistics import Errors
 from truearm.notices import worst_first
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import deserved, rounded, significant
 from truearm.reporting.page import page
-from truearm.results.tilting import Tilting
+
+if TYPE_CHECKING:
+    from truearm.measurement.statistics import Errors
+    from truearm.results.tilting import Tilting
 
 _COLOURS = {"clearance": "#3b7d3b", "backlash": AFTER, "compliance": "#8a6d1d"}
 _WORDS = {

@@ -5,21 +5,23 @@ from __future__ import annotations
 import html
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
 from truearm.notices import worst_first
 from truearm.reporting.drawing import AFTER, COLOURS, Figure, axis, figure
 from truearm.reporting.figures import residuals
 from truearm.reporting.numbers import rounded, significant
 from truearm.reporting.page import page
-from truearm.results.validation import Validation
 from truearm.results.validation_parts import orientation_summary
-from truearm.validation.orientation_errors import OrientationErrors
-from truearm.validation.region_distances import RegionDistances, Span
+
+if TYPE_CHECKING:
+    from truearm.measurement.dataset import Dataset
+    from truearm.modeling.chain import Array
+    from truearm.results.validation import Validation
+    from truearm.validation.orientation_errors import OrientationErrors
+    from truearm.validation.region_distances import RegionDistances, Span
 
 _MEAN: Final = "#b3261e"
 #: The distances that are drawn: place on the page, name of the axis, unit and what makes it of SI units.

@@ -20,14 +20,12 @@ from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary, outcome_words
+from truearm.results.fleet_words import PRIORS_FILE, analysis_lines, analysis_notices, analysis_summary, outcome_words
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted, listed
 from truearm.simulated import Marked
 from truearm.writing import output_folder, write_files
 
-#: The nominal robot with the priors that follow from a fleet; written where some do.
-PRIORS_FILE: Final = "priors.yaml"
 #: What a fleet writes into its folder beside its parts.
 FLEET_FILES: Final = ("fleet.json", "robots.csv", "report.html", PRIORS_FILE)
 

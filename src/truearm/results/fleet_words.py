@@ -15,6 +15,8 @@ from truearm.notices import Notice
 from truearm.shown import counted, listed
 from truearm.units import SHOWN_AS, from_si
 
+#: The nominal robot with the priors that follow from a fleet; written where some do.
+PRIORS_FILE: Final = "priors.yaml"
 #: What errors are of, by their names in rows.
 ERRORS_OF: Final = {
     "nominal": "Nominal robots",

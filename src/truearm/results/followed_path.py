@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.compensation.corrected_path import KNOWLEDGE, CorrectedPath, Knowledge
+from truearm.compensation.corrected_path import KNOWLEDGE, STAGES, CorrectedPath, Knowledge
 from truearm.compensation.corrected_targets import LedgerEntry, remember
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
@@ -28,14 +28,6 @@ REPORT: Final = "report.html"
 #: Written for a calibrated robot, and for one with masses.
 CORRECTED: Final = "corrected.csv"
 LOADS: Final = "loads.csv"
-
-#: What each stage of the correction is called.
-STAGES: Final[Mapping[Knowledge, str]] = {
-    "nothing": "without correction",
-    "geometry": "geometry corrected",
-    "deflection": "and what gives way at rest",
-    "motion": "and what motion adds",
-}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

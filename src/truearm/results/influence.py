@@ -9,11 +9,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
-from truearm.identification.solving.influence import Influence
+from truearm.identification.solving.influence import WAYS, Influence, Way
 from truearm.identification.solving.pose_by_pose import PoseByPose
 from truearm.measurement.statistics import Errors
 from truearm.modeling.robot import Robot
@@ -27,15 +27,6 @@ from truearm.writing import output_folder, write_files
 
 #: What is written into a folder.
 INFLUENCE_FILES: Final = ("influence.csv", "result.json", "report.html")
-#: How parameters are identified from the same readings.
-Way = Literal["nominal", "minimum norm", "influence", "least squares", "calibrate"]
-WAYS: Final[Mapping[Way, str]] = {
-    "nominal": "nominal",
-    "minimum norm": "minimum norm, pose by pose",
-    "influence": "influence-based, pose by pose",
-    "least squares": "least squares, all poses at once",
-    "calibrate": "the same with base and targets free",
-}
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,12 +7,13 @@ lie. Each step is a linear program: with the linearised residual ``J s + r``, mi
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from truearm.identification.solving.solver import Evaluated, Solvable
-from truearm.modeling.chain import Array
+if TYPE_CHECKING:
+    from truearm.identification.solving.solver import Evaluated, Solvable
+    from truearm.modeling.chain import Array
 
 _STEPS: Final = 60
 _LEAST_PROMISE: Final = 1e-9  # share of the objective that a step must promise

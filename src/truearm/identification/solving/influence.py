@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -18,6 +18,17 @@ from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
+
+#: How parameters are identified from the same readings.
+Way = Literal["nominal", "minimum norm", "influence", "least squares", "calibrate"]
+#: What each way is called.
+WAYS: Final[Mapping[Way, str]] = {
+    "nominal": "nominal",
+    "minimum norm": "minimum norm, pose by pose",
+    "influence": "influence-based, pose by pose",
+    "least squares": "least squares, all poses at once",
+    "calibrate": "the same with base and targets free",
+}
 
 #: +0.05 deg and +0.1 mm, by SI unit (Patel, section 3.5).
 PERTURBATION: Final[Mapping[str, float]] = {"rad": math.radians(0.05), "m": 1e-4}

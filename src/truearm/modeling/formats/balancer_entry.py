@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -14,8 +14,10 @@ from truearm.modeling.balancers import Anchor, Balancer
 from truearm.modeling.chain import Array, Chain, Element
 from truearm.modeling.formats.entries import STRICT, Name, NotNegative, Number, Positive, Triple
 from truearm.modeling.lines import at_zero
-from truearm.modeling.robot import Robot
 from truearm.units import sized_si, written
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 #: Anchors nearer to each other, or to the axis that they should relieve, hold nothing [m].
 _NEAREST: Final = 1e-3

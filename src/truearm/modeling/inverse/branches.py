@@ -26,15 +26,17 @@ So joints far from a singular posture have the same name before and after a cali
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array, Chain, ForwardKinematics
-from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, dot
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 #: Names of the branches, in the order of their numbers.
 BRANCHES: Final = tuple(f"{s}-{e}-{w}" for s in ("front", "back") for e in ("up", "down") for w in ("noflip", "flip"))

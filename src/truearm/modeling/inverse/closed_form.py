@@ -13,15 +13,17 @@ moved metres from ``d_1`` to ``base_z``), and the start is off by the errors bet
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.inverse.branches import Line, joint_axes
-from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, homogeneous
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 #: Most solutions of one pose.
 SLOTS: Final = 8

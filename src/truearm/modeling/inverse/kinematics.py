@@ -11,7 +11,7 @@ calibration left it: base and first joint can share an offset in many ways, and 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,8 +26,10 @@ from truearm.modeling.inverse.candidates import REACHED, Candidates
 from truearm.modeling.inverse.closed_form import ClosedForm
 from truearm.modeling.inverse.pose_solver import ORIENTATIONS, Orientation, PoseTask, smallest_singular_value
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
-from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, quaternion_from_rotation, rotation_from_quaternion
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 #: A rotation matrix may be off by this much, as by rounding; it is then made exact.
 ROTATION_TOLERANCE: Final = 1e-6

@@ -14,15 +14,17 @@ steps: near singular postures, where it matters, the others would not end.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.equilibrium import settled
-from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, dot
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 #: ``full``; ``axis``, the direction of the tip's z axis alone; ``free``, the position alone.
 Orientation = Literal["full", "axis", "free"]

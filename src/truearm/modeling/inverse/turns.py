@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 _TURN: Final = 2 * np.pi
 #: A joint this far beyond a limit still lies on it [rad or m].

@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from truearm.modeling.formats.robot_file.correlations import digits_of
 from truearm.modeling.formats.robot_file.writing import file_content
 from truearm.modeling.parameters import PLACES
 from truearm.modeling.proof import Proof
-from truearm.modeling.robot import Robot
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 #: Entries of a robot file that say nothing of where the robot goes.
 _BESIDE: Final = (

@@ -6,7 +6,7 @@ import io
 import math
 import re
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.formats.balancer_entry import balancer_entry
@@ -19,10 +19,12 @@ from truearm.modeling.formats.robot_file.schema import SCHEMA
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
 from truearm.modeling.proof import Proof, position_text
-from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.modeling.wrench import refuse_pushed
 from truearm.units import SHOWN_AS, written
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 #: Texts that stand without quotes, but for words that are no texts in some YAML.
 _PLAIN: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

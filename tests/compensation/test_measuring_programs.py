@@ -15,8 +15,8 @@ from truearm.compensation.cell import Cell, read_tools
 from truearm.compensation.iso9283.programs import measuring_programs
 from truearm.compensation.iso9283.routes import Routes
 from truearm.compensation.joint_speeds import fastest_point, known_speeds
-from truearm.compensation.path_program import BY_NAME
 from truearm.compensation.program_correction import commanded
+from truearm.compensation.programs import BY_NAME
 from truearm.compensation.programs.motion_program import (
     CircleMove,
     JointMove,

@@ -21,8 +21,8 @@ from truearm.compensation.joint_speeds import (
     speed_notices,
     speed_words,
 )
-from truearm.compensation.path_program import BY_NAME
 from truearm.compensation.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
+from truearm.compensation.programs import BY_NAME
 from truearm.compensation.programs.motion_program import LONGEST_COMMENT, JointMove, MotionProgram, Wait, percent
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.urscript.measuring import FASTEST

@@ -24,13 +24,18 @@ from truearm.cli.export import export, export_robodk
 from truearm.cli.fleet import fleet
 from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
-from truearm.cli.importing import app as importing
+from truearm.cli.import_circle import circle
+from truearm.cli.import_hand_eye import hand_eye
+from truearm.cli.import_ros import ros
+from truearm.cli.import_ur_kinematics import ur_kinematics
+from truearm.cli.importing import guess, matrices, robodk, sockets, table
+from truearm.cli.inclinometers import plan_pairs, simulate_readings
 from truearm.cli.influence import influence
 from truearm.cli.iso9283 import app as iso9283
 from truearm.cli.library import robots, show
 from truearm.cli.lines import lines
 from truearm.cli.measure import measure
-from truearm.cli.options import CommandError, Commands
+from truearm.cli.options import CommandError, Commands, by_device
 from truearm.cli.path import path
 from truearm.cli.plan import plan
 from truearm.cli.poses import poses
@@ -75,6 +80,20 @@ def _root(
     pass
 
 
+importing = Commands(
+    help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
+    no_args_is_help=True,
+)
+importing.command()(matrices)
+importing.command()(table)
+importing.command()(guess)
+importing.command()(robodk)
+importing.command()(circle)
+importing.command()(sockets)
+importing.command("hand-eye")(hand_eye)
+importing.command("ur-kinematics")(ur_kinematics)
+importing.command()(ros)
+
 app.command()(check)
 app.command()(calibrate)
 app.command()(tilting)
@@ -82,7 +101,7 @@ app.command()(validate)
 app.command()(distances)
 app.command()(compensate)
 app.command()(ik)
-app.command()(plan)
+app.command()(by_device(plan, {"inclinometers": plan_pairs}))
 app.command()(measure)
 app.command()(poses)
 app.command()(path)
@@ -91,7 +110,7 @@ app.command()(tolerance)
 app.command()(lines)
 app.command()(influence)
 app.command()(sphere)
-app.command()(simulate)
+app.command()(by_device(simulate, {"inclinometers": simulate_readings}))
 app.command()(devices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")

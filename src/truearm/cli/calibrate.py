@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truearm.cli.loading import GravityText, NoteTexts, PayloadText, read_gravity, read_notes
+from truearm.cli.loading import GravityText, NoteTexts, PayloadText, number_or, read_gravity, read_notes, read_train
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
 
@@ -140,7 +140,7 @@ def calibrate(
             without=[name.strip() for text in without or () for name in text.split(",")],
             exclude=exclude,
             monte_carlo=monte_carlo,
-            zones=_number_or(zones),
+            zones=number_or(zones),
             notes=read_notes(notes),
             replace=replace,
             command=command_line(),
@@ -170,16 +170,3 @@ def _print(calibration: Calibration, *, json: bool) -> None:
         print_json(calibration.summary())
     else:
         print_record(calibration)
-
-
-def _number_or(text: str | None) -> Any:
-    """Return a number where the text is one, else the text."""
-    try:
-        return text if text is None else int(text)
-    except ValueError:
-        return text
-
-
-def read_train(text: str | None) -> Any:
-    """Return a number where the text is one; the job refuses what is neither that nor all."""
-    return _number_or(text)

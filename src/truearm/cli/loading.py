@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -64,6 +64,15 @@ NoteTexts = Annotated[
     ),
 ]
 
+Pull = Annotated[
+    float | None,
+    typer.Option(
+        metavar="N",
+        min=0.0,
+        help="Of a string or weight on the flange under which inclinometers are read; 0: gravity alone.",
+        show_default="20",
+    ),
+]
 JointsText = Annotated[
     str | None,
     typer.Option(
@@ -102,3 +111,27 @@ def read_gravity(text: str | None) -> tuple[float, float, float] | None:
         )
     x, y, z = (float(number) for number in numbers if number is not None)
     return x, y, z
+
+
+def number_or(text: str | None) -> Any:
+    """Return a number where the text is one, else the text."""
+    try:
+        return text if text is None else int(text)
+    except ValueError:
+        return text
+
+
+def read_train(text: str | None) -> Any:
+    """Return a number where the text is one; the job refuses what is neither that nor all."""
+    return number_or(text)
+
+
+def refuse_pull(pull: float | None) -> None:
+    """Refuse a pull for devices that are not read under one."""
+    if pull is not None:
+        raise InputError(
+            "only inclinometers are read under a pull",
+            parameter="pull",
+            came=pull,
+            cure="Leave `pull` out, or use `device=inclinometers`.",
+        )

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextvars import ContextVar
+from functools import wraps
 from itertools import pairwise
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, cast
 
 import typer
 from typer.core import TyperArgument, TyperCommand
 
 from truearm.errors import InputError, with_parameters
+
+JointsAreText = Annotated[
+    str | None,
+    typer.Option(
+        "--joints-are",
+        metavar="controller|model",
+        help="Whose joint positions they are: as the robot's controller shows them, or its model's.",
+        show_default="the model's",
+    ),
+]
+
 
 C = TypeVar("C", bound=Callable[..., Any])
 
@@ -123,3 +136,27 @@ def _option(name: str) -> str:
         if parameter.name == name:
             return max(parameter.opts, key=len)
     return f"--{name.replace('_', '-')}"
+
+
+def _named(entries: list[str], parameter: str, what: str = "FILE") -> dict[str, Path]:
+    named: dict[str, Path] = {}
+    for entry in entries:
+        name, separator, file = entry.partition("=")
+        if not separator or not name or not file:
+            raise InputError(
+                f"a name and a {what.lower()} belong here", parameter=parameter, came=entry, allowed=f"NAME={what}"
+            )
+        if name in named:
+            raise InputError("this name is given twice", parameter=parameter, came=name)
+        named[name] = Path(file)
+    return named
+
+
+def by_device(command: C, others: Mapping[str, Callable[..., None]]) -> C:
+    """Return a command that leaves some devices, by their names, to other functions with the same parameters."""
+
+    @wraps(command)
+    def chosen(**given: Any) -> None:
+        others.get(given["device"], command)(**given)
+
+    return cast("C", chosen)

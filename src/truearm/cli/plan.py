@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_beside, refuse_pull
-from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, JointsText, PayloadText, Pull, read_gravity, refuse_pull
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
 from truearm.jobs.texts import read_poses, read_region, read_seed, read_speed
@@ -147,42 +146,8 @@ def plan(
     Without a device every target on the robot's tool is measured at each of them. Writes a CSV file, its page, the
     ways between and a sheet for the operator; with --program a folder with these and a program that drives the plan.
     """
-    from truearm.units import sized_si
-
-    deviation = sized_si(noise, "mm", parameter="noise", deviation=True)
-    if device == INCLINOMETERS:
-        from truearm.jobs.plan_inclinometers import plan_inclinometers
-
-        beside: dict[str, object] = {"objective": objective, "accurate_at": accurate_at, "region": region}
-        beside |= {"tools": tools, "frames": frames, "candidates_from": candidates_from, "constraints": constraints}
-        beside |= {"program": program, "approach": approach or None, "speed": speed, "dwell": dwell, "wait": wait}
-        refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
-        with progress() as say:
-            pairs = plan_inclinometers(
-                robot,
-                poses=even_poses(poses),
-                out=out,
-                pull=20.0 if pull is None else pull,
-                candidates=candidates,
-                noise=deviation,
-                seed=seed,
-                payload=payload,
-                gravity=read_gravity(gravity),
-                joints=joints,  # type: ignore[arg-type]
-                floor=None if floor is None else sized_si(floor, "mm", parameter="floor"),
-                no_floor=no_floor,
-                clearance=None if clearance is None else sized_si(clearance, "mm", parameter="clearance"),
-                home=read_seed(robot, home, joints, "home"),
-                command=command_line(),
-                progress=say,
-            )
-        if json:
-            print_json(pairs.summary())
-        else:
-            print_record(pairs)
-            print_line(f"Written: {out}, {out.with_name(f'{out.stem}-ways.csv')}")
-        return
     from truearm.jobs.plan import plan as run
+    from truearm.units import sized_si
 
     refuse_pull(pull)
     with progress() as say:
@@ -200,7 +165,7 @@ def plan(
             candidates=candidates,
             device=device,
             constraints=constraints,
-            noise=deviation,
+            noise=sized_si(noise, "mm", parameter="noise", deviation=True),
             seed=seed,
             payload=payload,
             gravity=read_gravity(gravity),

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from truearm.cli.inclinometers import INCLINOMETERS, Pull, refuse_beside, refuse_pull
-from truearm.cli.loading import GravityText, PayloadText, WrenchAtText, WrenchFrameText, WrenchText, read_gravity
+from truearm.cli.loading import (
+    GravityText,
+    PayloadText,
+    Pull,
+    WrenchAtText,
+    WrenchFrameText,
+    WrenchText,
+    number_or,
+    read_gravity,
+    refuse_pull,
+)
 
 
 def simulate(
@@ -56,35 +65,15 @@ def simulate(
 ) -> None:
     """Measure a digital twin whose truth is known, with a simulated instrument."""
     from truearm.cli.output import print_record, progress
-    from truearm.units import sized_si
-
-    if device == INCLINOMETERS:
-        from truearm.jobs.simulate_inclinometers import simulate_inclinometers
-
-        refuse_beside({"noise": noise, "wrench": wrench, "wrench_frame": wrench_frame, "wrench_at": wrench_at})
-        with progress() as say:
-            read = simulate_inclinometers(
-                robot,
-                truth=truth,
-                poses=_poses(poses),
-                out=out,
-                pull=20.0 if pull is None else pull,
-                seed=seed,
-                payload=payload,
-                gravity=read_gravity(gravity),
-                joints=joints,  # type: ignore[arg-type]
-                progress=say,
-            )
-        print_record(read)
-        return
     from truearm.jobs.simulate import simulate as run
+    from truearm.units import sized_si
 
     refuse_pull(pull)
     with progress() as say:
         simulated = run(
             robot,
             truth=truth,
-            poses=_poses(poses),
+            poses=number_or(poses),
             out=out,
             noise=sized_si(noise, "mm", parameter="noise", deviation=True) if noise else noise,
             device=device,
@@ -98,11 +87,3 @@ def simulate(
             progress=say,
         )
     print_record(simulated)
-
-
-def _poses(text: str) -> Any:
-    """Return a number where the text is one, else the file of configurations."""
-    try:
-        return int(text)
-    except ValueError:
-        return text

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.calibrate import read_train
-from truearm.cli.loading import GravityText, NoteTexts, PayloadText, read_gravity, read_notes
+from truearm.cli.loading import GravityText, NoteTexts, PayloadText, read_gravity, read_notes, read_train
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation.corrected_path import TIP, CorrectedPath
-from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.new_program import NAME, NewProgram
-from truearm.compensation.programs.program import Language
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branches import branch_rule
@@ -23,10 +20,6 @@ from truearm.planning.poses.tip import Tip
 
 #: What the targets of a program are.
 TargetKind = Literal["joints", "poses"]
-#: What each language is called as an option.
-BY_NAME: Final[Mapping[str, Language]] = {
-    re.sub(r"[^a-z0-9]+", "-", language.name.lower()): language for language in LANGUAGES
-}
 _AXES: Final = 6
 
 

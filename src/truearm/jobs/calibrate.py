@@ -19,6 +19,7 @@ from truearm.identification.choosing.choice import AUTO
 from truearm.identification.choosing.chosen_fit import check_choice, check_part, identify_chosen
 from truearm.identification.choosing.selection import select
 from truearm.identification.held import Held
+from truearm.identification.judging.data_check import notices_of
 from truearm.identification.judging.gain import check_gain
 from truearm.identification.judging.held_places import check_held
 from truearm.identification.judging.judgement import DOUBTED, PULLED, judge
@@ -48,7 +49,6 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
-from truearm.jobs.check import notices_of
 from truearm.jobs.excluding import check_excluded, count_excluded, in_parts, without_excluded
 from truearm.jobs.following import followed
 from truearm.jobs.holding import held_argument

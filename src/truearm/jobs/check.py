@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from truearm.errors import InputError
+from truearm.identification.judging.data_check import _compared
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.next_steps import steps_after_check
-from truearm.identification.judging.plausibility import check_against
-from truearm.identification.solving.fit import Fit
-from truearm.jobs.arguments import data_argument, device_argument, readings_argument, refuse_swapped, robot_argument
+from truearm.jobs.arguments import data_argument, readings_argument, refuse_swapped, robot_argument
 from truearm.jobs.excluding import count_excluded, excluded_notices, without_excluded
-from truearm.limits import limit
-from truearm.measurement.checks import check_data, check_range
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.table_motion import without_table_motion
-from truearm.measurement.thinning import thinned
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
 from truearm.results.data_check import DataCheck
-from truearm.shown import counted
 from truearm.simulated import parts_of
 
 
@@ -68,64 +60,3 @@ def check(
         return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None), marks)
     steps = steps_after_check(noticed, LeftOver.of(fit, part), errors_of(fit.robot, part))
     return DataCheck(measured, noticed, steps, marks)
-
-
-def notices_of(
-    data: Dataset, robot: Robot, *, steady: Dataset, excluded: Mapping[str, int] | None = None
-) -> tuple[Notice, ...]:
-    """Return one notice for each kind of fault; none for believable data.
-
-    Args:
-        steady: The same data without the motion of the table.
-        excluded: How many readings of each target were excluded.
-    """
-    return _compared(data, robot, steady=steady, excluded=excluded)[0]
-
-
-def _compared(
-    data: Dataset,
-    robot: Robot | None,
-    device: str | None = None,
-    *,
-    steady: Dataset | None = None,
-    excluded: Mapping[str, int] | None = None,
-) -> tuple[tuple[Notice, ...], Fit | None, Dataset | None]:
-    """Return one notice for each kind of fault, a robust fit of the robot, and what is believed of its readings.
-
-    Args:
-        steady: The same data without the motion of the table, where that has been removed already.
-        excluded: How many readings of each target were excluded.
-    """
-    ranged: tuple[Notice, ...] = ()
-    if device is not None:
-        ranged = tuple(check_range(data, device_argument(device)))
-    if robot is None:
-        return (*ranged, *check_data(data, excluded=excluded)), None, None
-    still = without_table_motion(data) if steady is None else steady
-    part = thinned(still, len(robot.parameters), limit("derivatives") // 2)
-    if part is None:
-        return (*ranged, *check_data(data, excluded=excluded), _too_seldom(data)), None, None
-    against = check_against(robot, part)
-    left_out = () if part is still else (_in_part(part, still),)
-    scaled = {row for notice in against.notices if notice.code == "unit-length" for row in notice.at}
-    notices = (*ranged, *check_data(data, against.suspects, excluded, scaled), *against.notices, *left_out)
-    return notices, against.fit, against.believed
-
-
-def _too_seldom(data: Dataset) -> Notice:
-    return Notice(
-        "not-compared",
-        f"{counted(len(data.targets), 'target')} of {counted(data.configurations, 'configuration')} were not compared "
-        "with the robot: none was read at four configurations or more, so that nothing is said of the robot. Does "
-        "every reading have a name of its own? Readings of the same point on the tool have the same target.",
-    )
-
-
-def _in_part(part: Dataset, data: Dataset) -> Notice:
-    return Notice(
-        "compared-in-part",
-        f"The data are large: {part.configurations} of {counted(data.configurations, 'configuration')} and "
-        f"{len(part.targets)} of {counted(len(data.targets), 'target')} were compared with the robot, evenly spaced "
-        "and read most often. What is far off elsewhere was not looked for.",
-        "note",
-    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from truearm.results.library import DeviceList
+from truearm.results.simulation import DeviceList
 from truearm.simulation.devices import DEVICES
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from truearm.compensation.programs import PROGRAM_LANGUAGES
 from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.errors import InputError, Words, refusals_of
 from truearm.files import path_argument
@@ -24,7 +25,7 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.driving import constraints_argument
 from truearm.jobs.iso9283_cell import stated_cell
-from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES, refuse_losing_slow_run, refuse_stale, written_programs
+from truearm.jobs.iso9283_programs import refuse_losing_slow_run, refuse_stale, written_programs
 from truearm.jobs.plans_replaced import replaced_notices
 from truearm.jobs.tip import tip_argument
 from truearm.library.wider_limits import wider_limits_notices

@@ -14,7 +14,6 @@ from truearm.compensation.iso9283.programs import measuring_programs
 from truearm.compensation.iso9283.slow_run import SLOW_RUN, check_slow_run, slow_run_text
 from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
 from truearm.compensation.joint_speeds import speed_notices
-from truearm.compensation.path_program import BY_NAME
 from truearm.compensation.programs.motion_program import MotionProgram
 from truearm.compensation.programs.program import Language
 from truearm.compensation.programs.urscript.measuring import FASTEST
@@ -31,8 +30,6 @@ from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.results.iso9283_plan import WrittenPrograms
 from truearm.writing import same_place
 
-#: What each language is called; FANUC's has a short name as well.
-PROGRAM_LANGUAGES: Final[Mapping[str, Language]] = {**BY_NAME, "fanuc": BY_NAME["fanuc-ls"]}
 #: Where programs are, in the folder of the plan.
 _FOLDER: Final = "programs"
 #: Characters of the plan's hash by which programs name it.

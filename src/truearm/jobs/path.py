@@ -18,7 +18,8 @@ from truearm.compensation.corrected_path import TIP, CorrectedPath, correct_path
 from truearm.compensation.corrected_targets import LedgerEntry, corrected_digests
 from truearm.compensation.correction_limit import CorrectionLimit, check_size, correction_limit
 from truearm.compensation.gauge import turns_between
-from truearm.compensation.path_program import BY_NAME, TargetKind, path_program
+from truearm.compensation.path_program import TargetKind, path_program
+from truearm.compensation.programs import BY_NAME
 from truearm.compensation.programs.new_program import NewProgram
 from truearm.compensation.programs.program import Language, Source
 from truearm.compensation.questions import refuse_unanswered

@@ -12,12 +12,12 @@ from typing import Any, Final, Literal
 from truearm.compensation.joint_counts import counts_notices, refuse_unknown_counts
 from truearm.compensation.joint_speeds import joint_rates, known_speeds, speed_notices, speed_words, stated_speeds
 from truearm.compensation.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
+from truearm.compensation.programs import PROGRAM_LANGUAGES
 from truearm.compensation.programs.motion_program import LONGEST_WAIT
 from truearm.compensation.programs.program import Language
 from truearm.compensation.programs.urscript.measuring import FASTEST
 from truearm.errors import InputError
 from truearm.jobs.arguments import choice_argument, flag_argument, folder_for, numbers_argument
-from truearm.jobs.iso9283_programs import PROGRAM_LANGUAGES
 from truearm.jobs.plan_notices import assumed_notices, load_notices
 from truearm.library.wider_limits import wider_limits_notices
 from truearm.manifest import hash_of, sets_in

@@ -5,16 +5,24 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from numbers import Integral
 from typing import Final
 
 from truearm.errors import InputError, did_you_mean, nearest_names, wrong_kind
-from truearm.jobs.validate import training_of
 from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.repeats import copies, revisits
+from truearm.measurement.repeats import copies, readings_digest, revisits
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import counted, listed
+
+#: How a calibration says in the robot's history which configurations of which data it was trained on: by the hash of
+#: the file, of the readings, or of both; and how many it left out.
+_TRAINED: Final = re.compile(
+    r"(\d+) of (\d+) configurations of .*?\((?:sha256 ([0-9a-f]+))?(?:, )?(?:readings ([0-9a-f]+))?\), seed (\d+)"
+    r"(?:.*? without (\d+) configuration)?"
+)
+
 
 #: The hash by which the history tells which configurations were left out.
 _LEFT_OUT: Final = re.compile(r"; ([0-9a-f]{8})\),")
@@ -180,3 +188,30 @@ def nothing_held_out() -> Notice:
         "Nothing was held out: the errors are those of the training readings and flatter the model. "
         "Leave `train` out to see the error on configurations the fit has not seen.",
     )
+
+
+@dataclass(frozen=True)
+class Training:
+    """What the history of a robot says of a calibration."""
+
+    split: tuple[int, int, int]  #: How many configurations it was trained on, of how many, and the seed.
+    left_out: int  #: How many were left out before.
+    line: str  #: The line of the history.
+
+
+def training_of(robot: Robot, data: Dataset, digest: str | None) -> Training | None:
+    """Return how a robot was trained on data; None if it was not.
+
+    Args:
+        data: As they were read.
+        digest: SHA-256 of their file, by which older calibrations know them; None if they are in none.
+    """
+    readings = readings_digest(data)
+    for line in robot.history:
+        found = _TRAINED.search(line)
+        if found is None:
+            continue
+        same_file = found[3] is not None and digest is not None and found[3] == digest[: len(found[3])]
+        if same_file or (found[4] is not None and found[4] == readings[: len(found[4])]):
+            return Training((int(found[1]), int(found[2]), int(found[5])), int(found[6] or 0), line)
+    return None

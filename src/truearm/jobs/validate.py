@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
+from truearm.identification.choosing.zoned_robot import zoned_robot
 from truearm.identification.judging.beyond_proof import check_proof
 from truearm.identification.judging.external_force import check_force
 from truearm.identification.judging.next_step import NextStep
@@ -35,9 +34,8 @@ from truearm.jobs.arguments import (
     wrench_argument,
 )
 from truearm.jobs.proof import changed_since
-from truearm.jobs.zones import zoned_robot
+from truearm.jobs.split import training_of
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.effects.warm_up import LEFT
 from truearm.modeling.parts import Payload
@@ -230,41 +228,6 @@ def _pushed(robot: Robot, data: Dataset, wrench: Wrench | None, at: str | None) 
             cure="Leave `wrench` out, or take the columns out.",
         )
     return pushed_at_argument(robot, wrench, at)
-
-
-#: How a calibration says in the robot's history which configurations of which data it was trained on: by the hash of
-#: the file, of the readings, or of both; and how many it left out.
-_TRAINED: Final = re.compile(
-    r"(\d+) of (\d+) configurations of .*?\((?:sha256 ([0-9a-f]+))?(?:, )?(?:readings ([0-9a-f]+))?\), seed (\d+)"
-    r"(?:.*? without (\d+) configuration)?"
-)
-
-
-@dataclass(frozen=True)
-class Training:
-    """What the history of a robot says of a calibration."""
-
-    split: tuple[int, int, int]  #: How many configurations it was trained on, of how many, and the seed.
-    left_out: int  #: How many were left out before.
-    line: str  #: The line of the history.
-
-
-def training_of(robot: Robot, data: Dataset, digest: str | None) -> Training | None:
-    """Return how a robot was trained on data; None if it was not.
-
-    Args:
-        data: As they were read.
-        digest: SHA-256 of their file, by which older calibrations know them; None if they are in none.
-    """
-    readings = readings_digest(data)
-    for line in robot.history:
-        found = _TRAINED.search(line)
-        if found is None:
-            continue
-        same_file = found[3] is not None and digest is not None and found[3] == digest[: len(found[3])]
-        if same_file or (found[4] is not None and found[4] == readings[: len(found[4])]):
-            return Training((int(found[1]), int(found[2]), int(found[5])), int(found[6] or 0), line)
-    return None
 
 
 def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:

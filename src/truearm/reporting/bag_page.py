@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from truearm.reporting.iso9283_figures import HUES, line
+from truearm.reporting.drawing import HUES, line
 from truearm.reporting.numbers import significant
 from truearm.reporting.panels import Panel, panels
 from truearm.reporting.picture_page import Drawing, Figures, picture_page

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import html
 import math
 from typing import Any, Final
+
+from truearm.modeling.chain import Array
+from truearm.reporting.numbers import rounded_to
 
 Figure = dict[str, Any]
 
@@ -34,9 +38,11 @@ DARK: Final = {
 }
 #: Colours of x, y and z, or of the first things that are drawn together.
 COLOURS: Final = ("#b3261e", "#3b7d3b", "#2456a6")
+#: Colours of things that are drawn together.
+HUES: Final = (*COLOURS, "#8a6d1d", "#5b3a8c", "#1d7f86", "#6b6f73")
+INK: Final = "#2b2f33"
+SHADE: Final = "#e4e6e8"
 CAMERA: Final = {"eye": {"x": 1.55, "y": 1.55, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.15}}
-_INK: Final = "#2b2f33"
-_GRID: Final = "#e4e6e8"
 _FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 
 
@@ -44,7 +50,7 @@ def axis(title: str) -> Figure:
     """Make an axis of a plane picture."""
     return {
         "title": {"text": title},
-        "gridcolor": _GRID,
+        "gridcolor": SHADE,
         "zeroline": False,
         "linecolor": "#9aa0a6",
         "showline": True,
@@ -105,11 +111,25 @@ def figure(traces: list[Figure], height: int, **layout: Any) -> Figure:
     """Put traces into the house's layout, `height` pixels high; `layout` adds to it."""
     common = {
         "height": height,
-        "font": {"family": _FONT, "size": 13, "color": _INK},
+        "font": {"family": _FONT, "size": 13, "color": INK},
         "paper_bgcolor": "#ffffff",
         "plot_bgcolor": "#ffffff",
         "margin": {"l": 60, "r": 20, "t": 36, "b": 50},
         "legend": {"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
-        "hoverlabel": {"bgcolor": "#ffffff", "bordercolor": "#9aa0a6", "font": {"color": _INK}},
+        "hoverlabel": {"bgcolor": "#ffffff", "bordercolor": "#9aa0a6", "font": {"color": INK}},
     }
     return {"data": traces, "layout": {**common, **layout}}
+
+
+def line(name: str, x: Array, y: Array, colour: str, width: float = 1.5, **more: object) -> Figure:
+    """Return a line; without a name it is not in the legend."""
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": html.escape(name),
+        "x": rounded_to(x, 4),
+        "y": [value if math.isfinite(value) else None for value in rounded_to(y, 4)],  # a gap
+        "line": {"color": colour, "width": width},
+        "hoverinfo": "skip" if not name else "x+y+name",
+        **more,
+    }

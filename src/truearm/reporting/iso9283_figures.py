@@ -12,7 +12,20 @@ import numpy as np
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.planning.poses.iso9283 import DiagonalPlane
-from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
+from truearm.reporting.drawing import (
+    AFTER,
+    BEFORE,
+    CAMERA,
+    COLOURS,
+    HUES,
+    INK,
+    SHADE,
+    Figure,
+    axis,
+    figure,
+    line,
+    scene_axis,
+)
 from truearm.reporting.numbers import rounded_to
 from truearm.reporting.panels import Panel, panels
 from truearm.reporting.picture_page import Drawing
@@ -24,10 +37,6 @@ from truearm.validation.iso9283.poses import PoseCloud
 from truearm.validation.iso9283.settling import SettlingCurve
 from truearm.validation.iso9283.values import Conditions
 
-#: Colours of things that are drawn together.
-HUES: Final = (*COLOURS, "#8a6d1d", "#5b3a8c", "#1d7f86", "#6b6f73")
-INK: Final = "#2b2f33"
-SHADE: Final = "#e4e6e8"
 #: Arrows of errors are as long as this share of the cube's side.
 _ARROW: Final = 0.15
 #: Where the camera is before the plane of the cube, and aside.
@@ -47,20 +56,6 @@ def fastest(things: Sequence[PoseCloud]) -> list[PoseCloud]:
 def thinned(count: int, most: int = _MOST_SAMPLES) -> np.ndarray:
     """Return which of so many samples are drawn."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
-
-
-def line(name: str, x: Array, y: Array, colour: str, width: float = 1.5, **more: object) -> Figure:
-    """Return a line; without a name it is not in the legend."""
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": html.escape(name),
-        "x": rounded_to(x, 4),
-        "y": [value if math.isfinite(value) else None for value in rounded_to(y, 4)],  # a gap
-        "line": {"color": colour, "width": width},
-        "hoverinfo": "skip" if not name else "x+y+name",
-        **more,
-    }
 
 
 def dots(name: str, x: Array, y: Array, colour: str, size: float = 5.0, symbol: str = "circle") -> Figure:

@@ -8,8 +8,8 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure
-from truearm.reporting.iso9283_figures import HUES, INK, SHADE, line, thinned
+from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, HUES, INK, SHADE, Figure, axis, figure, line
+from truearm.reporting.iso9283_figures import thinned
 from truearm.reporting.numbers import rounded_to
 from truearm.reporting.panels import Panel, panels
 from truearm.reporting.picture_page import Drawing

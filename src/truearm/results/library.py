@@ -9,7 +9,6 @@ from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.formats.reach_entry import reach_summary
 from truearm.modeling.robot import Robot
 from truearm.results.record import Record
-from truearm.simulation.devices import Device
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,22 +43,3 @@ class RobotList(Record):
             rows.append((robot.name, robot.maker or "-", str(len(robot.joints)), reach, known, title))
         widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
         return ["  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class DeviceList(Record):
-    """The instruments that can be simulated and planned for."""
-
-    devices: tuple[Device, ...]  #: In the order of the registry.
-
-    def summary(self) -> dict[str, Any]:
-        """Return name, words, deviation and source of each, as JSON holds them."""
-        rows = [
-            {"name": d.name, "summary": d.summary, "sigma_mm": d.sigma * 1e3, "source": d.source} for d in self.devices
-        ]
-        return {"devices": rows}
-
-    def lines(self) -> list[str]:
-        """Return one line an instrument."""
-        width = max(len(device.name) for device in self.devices)
-        return [f"{d.name:<{width}}  {d.summary}; deviation {d.sigma * 1e3:g} mm" for d in self.devices]

@@ -9,6 +9,7 @@ from typing import Any
 from truearm.measurement.dataset import Dataset
 from truearm.results.record import Record
 from truearm.shown import counted
+from truearm.simulation.devices import Device
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,3 +46,22 @@ class Simulation(Record):
         if self.stopped_before:
             said.append("Before each the arm stopped at its approach_i; the order of the data counts these stops, too.")
         return said
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DeviceList(Record):
+    """The instruments that can be simulated and planned for."""
+
+    devices: tuple[Device, ...]  #: In the order of the registry.
+
+    def summary(self) -> dict[str, Any]:
+        """Return name, words, deviation and source of each, as JSON holds them."""
+        rows = [
+            {"name": d.name, "summary": d.summary, "sigma_mm": d.sigma * 1e3, "source": d.source} for d in self.devices
+        ]
+        return {"devices": rows}
+
+    def lines(self) -> list[str]:
+        """Return one line an instrument."""
+        width = max(len(device.name) for device in self.devices)
+        return [f"{d.name:<{width}}  {d.summary}; deviation {d.sigma * 1e3:g} mm" for d in self.devices]

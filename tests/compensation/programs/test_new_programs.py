@@ -10,9 +10,10 @@ import pytest
 
 from truearm.compensation.cell import Cell, read_tools
 from truearm.compensation.corrected_path import CorrectedPath, correct_path
-from truearm.compensation.path_program import BY_NAME, path_program
+from truearm.compensation.path_program import path_program
 from truearm.compensation.program_correction import commanded
 from truearm.compensation.program_files import program_files
+from truearm.compensation.programs import BY_NAME
 from truearm.compensation.programs.marks import MARK
 from truearm.compensation.programs.new_program import NewProgram
 from truearm.compensation.programs.program import Program, Source

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from typing import Final
 
 from truearm.compensation.programs.fanuc_ls import FANUC_LS
@@ -13,3 +15,9 @@ from truearm.compensation.programs.urscript import URSCRIPT
 from truearm.compensation.programs.val3 import VAL3
 
 LANGUAGES: Final[tuple[Language, ...]] = (RAPID, KRL, FANUC_LS, URSCRIPT, JBI, VAL3)
+#: What each language is called as an option.
+BY_NAME: Final[Mapping[str, Language]] = {
+    re.sub(r"[^a-z0-9]+", "-", language.name.lower()): language for language in LANGUAGES
+}
+#: What each language is called; FANUC's has a short name as well.
+PROGRAM_LANGUAGES: Final[Mapping[str, Language]] = {**BY_NAME, "fanuc": BY_NAME["fanuc-ls"]}

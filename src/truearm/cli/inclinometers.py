@@ -30,7 +30,8 @@ def plan_pairs(
     deviation = sized_si(noise, "mm", parameter="noise", deviation=True)
     beside = {name: None if given[name] is False else given[name] for name in _NOT_PLANNED}
     _refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
-    lengths = {name: given[name] for name in ("floor", "clearance") if given[name] is not None}
+    lengths = [name for name in ("floor", "clearance") if given[name] is not None]
+    more: dict[str, Any] = {name: sized_si(given[name], "mm", parameter=name) for name in lengths}
     with progress() as say:
         pairs = plan_inclinometers(
             robot,
@@ -43,7 +44,7 @@ def plan_pairs(
             command=command_line(),
             progress=say,
             **{name: given[name] for name in ("candidates", "seed", "payload", "joints", "no_floor")},
-            **{name: sized_si(value, "mm", parameter=name) for name, value in lengths.items()},
+            **more,
         )
     if json:
         print_json(pairs.summary())

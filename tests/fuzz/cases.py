@@ -21,8 +21,8 @@ from tests.fuzz.mutations import Random, damaged
 from tests.fuzz.readers import READERS
 
 import truearm
+from truearm import JOBS
 from truearm.errors import InputError
-from truearm.jobs import JOBS
 from truearm.results.record import Record
 
 KINDS: Final = (*(f"read-{name}" for name in READERS), *(f"job-{name}" for name in JOBS), "command")

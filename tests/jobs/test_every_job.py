@@ -21,9 +21,8 @@ from tests.arms import ARMS
 from tests.jobs.examples import EXAMPLES
 
 import truearm
-from truearm import results
+from truearm import JOBS, results
 from truearm.errors import InputError
-from truearm.jobs import JOBS
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import Payload
@@ -56,7 +55,7 @@ def parameters(job: str) -> dict[str, inspect.Parameter]:
 
 def kinds(job: str, name: str) -> set[Any]:
     """Return the types that a parameter takes, unions opened."""
-    module = import_module(f"truearm.jobs.{job}")
+    module = import_module(JOBS[job])
     hint = get_type_hints(function(job), vars(module) | {"np": np})[name]
 
     def opened(hint: Any) -> Iterator[Any]:
@@ -133,13 +132,13 @@ def test_every_job_is_exported_and_has_an_example() -> None:
     for job in JOBS:
         assert job in dir(truearm)
         assert job in truearm.__all__
-        assert function(job).__module__ == f"truearm.jobs.{job}"
+        assert function(job).__module__ == JOBS[job]
         assert function(job).__name__ == job
 
 
 @pytest.mark.parametrize("job", JOBS)
 def test_every_parameter_and_the_result_have_a_type_and_a_word(job: str) -> None:
-    hints = get_type_hints(function(job), vars(import_module(f"truearm.jobs.{job}")))
+    hints = get_type_hints(function(job), vars(import_module(JOBS[job])))
     assert set(hints) == {*inspect.signature(function(job)).parameters, "return"}
     text = inspect.getdoc(function(job))
     assert text

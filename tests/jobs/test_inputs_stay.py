@@ -14,9 +14,9 @@ from tests.jobs.examples import EXAMPLES
 from tests.performance_plan import small_plan
 
 import truearm
+from truearm import JOBS
 from truearm.errors import InputError
 from truearm.fleets.recorded import RECORD
-from truearm.jobs import JOBS
 from truearm.jobs.measuring_begun import BEGUN
 from truearm.manifest import MANIFEST, UNFINISHED
 from truearm.measurement.measuring.reading_log import LOG

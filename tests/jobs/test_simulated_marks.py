@@ -15,8 +15,8 @@ from tests.jobs.examples import EXAMPLES
 from tests.simulated import campaign, more_of
 
 import truearm
+from truearm import JOBS
 from truearm.errors import InputError
-from truearm.jobs import JOBS
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.modeling.formats.robot_file import is_intact

@@ -15,7 +15,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
-from truearm.version import __version__
+__version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from truearm.errors import InputError as InputError
@@ -75,8 +75,9 @@ if TYPE_CHECKING:
     from truearm.modeling.robot import Robot as Robot
     from truearm.results.calibration import Calibration as Calibration
 
-#: Every job, in the order of the work, and where it is: one function, which takes objects, arrays or paths and plain
-#: keywords, refuses what it cannot use with an :class:`InputError` that names the parameter, and returns a frozen record.
+#: Every job, in the order of the work, and where it is. A job is a function that takes objects, arrays or paths and
+#: plain keywords, refuses what it cannot use with an :class:`InputError` that names the parameter, and returns a frozen
+#: record.
 JOBS: Final = {
     "load_robot": "truearm.jobs.load_robot",
     "show": "truearm.jobs.show",

@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from truearm import __version__
 from truearm.errors import InputError
-from truearm.version import __version__
 
 #: What was written together into a folder, with hashes.
 MANIFEST: Final = "truearm.manifest.json"

@@ -16,13 +16,12 @@ from tests.answered import compensate
 from tests.simulated import campaign
 
 import truearm
-from truearm import InputError, Robot, writing
+from truearm import InputError, Robot, __version__, writing
 from truearm.compensation.corrected_targets import LEDGER
 from truearm.compensation.programs.marks import MARK
 from truearm.manifest import hash_of
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.results.program_correction import SimulatedRun
-from truearm.version import __version__
 
 
 def calibrated() -> Robot:

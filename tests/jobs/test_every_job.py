@@ -21,7 +21,7 @@ from tests.arms import ARMS
 from tests.jobs.examples import EXAMPLES
 
 import truearm
-from truearm import JOBS, results
+from truearm import JOBS
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.effects import EFFECTS
@@ -260,8 +260,9 @@ def test_a_payload_that_is_none_is_refused(mass: float) -> None:
 
 
 def records() -> list[type[Record]]:
-    for module in pkgutil.iter_modules(results.__path__, "truearm.results."):
-        import_module(module.name)
+    for module in pkgutil.walk_packages(truearm.__path__, "truearm."):
+        if not module.name.endswith(("__main__", "python_template")):
+            import_module(module.name)
     import_module("truearm.studies.study")
 
     found, left = list[type[Record]](), [Record]

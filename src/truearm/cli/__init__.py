@@ -13,6 +13,7 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
+from truearm import __version__
 from truearm.cli.axes import axes
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
@@ -49,7 +50,6 @@ from truearm.cli.tolerance import tolerance
 from truearm.cli.validate import validate
 from truearm.errors import InputError
 from truearm.printable import is_one_line, printable
-from truearm.version import __version__
 
 # A calibration's matrices are small: a second BLAS thread gains nothing on a quiet machine and waits for its turn on
 # a busy one. NumPy reads this when it is first imported, which is after here.

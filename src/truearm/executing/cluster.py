@@ -15,9 +15,9 @@ from contextlib import suppress
 from typing import Any, Final, TypeVar
 from urllib.parse import urlsplit
 
+from truearm import __version__
 from truearm.errors import InputError, Words
 from truearm.shown import counted, listed
-from truearm.version import __version__
 
 P = TypeVar("P")
 R = TypeVar("R")
@@ -161,7 +161,7 @@ class Cluster:
             there = _within(
                 _ANSWER,
                 lambda: self._client.run(
-                    pkgutil.resolve_name, "truearm.version:__version__", workers=workers, on_error="return"
+                    pkgutil.resolve_name, "truearm:__version__", workers=workers, on_error="return"
                 ),
             )
         except TimeoutError as error:

@@ -19,13 +19,13 @@ from typing import Any, Final
 
 from pydantic_core import from_json
 
+from truearm import __version__
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes, read_text, reason_of
 from truearm.fleets.manifest import Manifest
 from truearm.fleets.part_schema import head_of, rows_of, said_of
 from truearm.fleets.rows import Row
 from truearm.shown import counted, listed
-from truearm.version import __version__
 from truearm.writing import write_text
 
 RECORD: Final = "record.json"

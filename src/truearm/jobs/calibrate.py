@@ -10,6 +10,7 @@ from typing import Final, Literal, TypedDict, get_args
 
 import numpy as np
 
+from truearm import __version__
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import checked_parts, with_one_base
@@ -76,7 +77,6 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES, Calibration
 from truearm.shown import listed
-from truearm.version import __version__
 
 Train = int | Literal["all"] | None
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 
+from truearm import __version__
 from truearm.errors import InputError, Words, kind_of, refusals_of
 from truearm.executing.parts import done_parts
 from truearm.executing.workers import Given, ThisProcess, Workers, processes, with_workers
@@ -29,7 +30,6 @@ from truearm.jobs.arguments import (
 from truearm.jobs.fleet_parts import Finished, Task, finished
 from truearm.results.fleet import FLEET_FILES, Fleet, Run
 from truearm.shown import counted
-from truearm.version import __version__
 
 
 def fleet(

@@ -8,10 +8,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from truearm import __version__
 from truearm.errors import InputError
 from truearm.fleets.rows import part_text
 from truearm.fleets.series import Experiment, Series
-from truearm.version import __version__
 
 if TYPE_CHECKING:  # with all that a calibration needs
     from truearm.fleets.entries import RobotEntry

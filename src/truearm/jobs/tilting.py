@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm import __version__
 from truearm.errors import InputError, name_parameter, refusals_of, wrong_kind
 from truearm.files import path_argument, read_bytes
 from truearm.identification.inclinometers.fit import TILTING, TiltingFit, calibrate_tilting
@@ -46,7 +47,6 @@ from truearm.notices import Notice
 from truearm.results.calibration import Calibration
 from truearm.results.tilting import GEOMETRY, TILTING_FILES, Tilting
 from truearm.shown import counted
-from truearm.version import __version__
 
 #: Models that leave tilt, backlash and stiffness as the inclinometers told them.
 _MODELS: Final = {model.name: model for model in MODELS if not set(model.effects) & set(TILTING)}

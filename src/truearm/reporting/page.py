@@ -15,10 +15,10 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from truearm import __version__
 from truearm.printable import LONGEST_WORD, TURNING, printable, shortened, with_short_words
 from truearm.reporting.drawing import AFTER, BEFORE, DARK, Figure
 from truearm.simulated import parts_of, said_of
-from truearm.version import __version__
 
 #: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
 _UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}

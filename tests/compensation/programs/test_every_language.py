@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from truearm import __version__
 from truearm.compensation.program_files import edited, language_called
 from truearm.compensation.program_poses import edits_of, numbers_of, pose_numbers, poses_of
 from truearm.compensation.programs import LANGUAGES
@@ -23,7 +24,6 @@ from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Edit, Language, Program, ProgramTarget, Source, Split
 from truearm.errors import InputError
 from truearm.modeling.orientations import QUATERNION
-from truearm.version import __version__
 
 SAMPLES = Path(__file__).parent / "samples"
 splitting = pytest.mark.parametrize("language", [one for one in LANGUAGES if one.split], ids=lambda one: one.name)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from datetime import date
 from typing import Final
 
+from truearm import __version__
 from truearm.compensation.programs.lines import line_end
-from truearm.version import __version__
 
 #: What stands in a program that was written corrected, in a comment of its own.
 MARK: Final = "corrected by truearm"

@@ -1,3 +1,0 @@
-"""The version of truearm, in one place that costs nothing to import."""
-
-__version__ = "0.1.0"

@@ -17,16 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from truearm.identification.choosing.chosen_fit import identify_chosen
-from truearm.identification.choosing.selection import select
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
+from truearm.engine.choosing.chosen_fit import identify_chosen
+from truearm.engine.choosing.selection import select
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.importing.files import read_matrices
 
 DATA = Path(os.environ.get("TRUEARM_DATA", Path(__file__).parents[2] / "shared" / "data"))
 PAYLOAD = Payload(2.7, (0.05, 0.025, 0.1))

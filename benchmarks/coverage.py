@@ -1,6 +1,6 @@
 """How often the 95 % intervals of calibrations contain the truth. Arguments: calibrations a line, lines (all).
 
-Every calibration is one of :func:`truearm.identification.solving.fit.identify` as it stands, of an IRB 120 of its own:
+Every calibration is one of :func:`truearm.engine.fit.fit.identify` as it stands, of an IRB 120 of its own:
 parameters drawn from their priors, base and targets at random, joints that miss by a repeatability, an instrument with
 noise. Counted are parameters that the data inform by half or more, by group, and coordinates of targets predicted at
 configurations that the calibration has not seen. One line of JSON a line of the study goes to standard output.
@@ -17,13 +17,13 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
 
 SIGMA = 0.02e-3
 INFORMED = 0.5

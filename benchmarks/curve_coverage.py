@@ -18,16 +18,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
-from truearm.identification.judging.found_curves import found_curves
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.curves import found_curves
+from truearm.engine.diagnose.expected_error import as_residuals_allow, expected_error
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 OUT = Path(__file__).with_suffix(".json")
 DATA = Path(os.environ.get("TRUEARM_DATA", Path(__file__).parents[2] / "shared" / "data"))

@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 
 import truearm
-from truearm.identification.solving.models import named_model
-from truearm.modeling.robot import Robot
-from truearm.planning.choosing.measurement_plan import plan_measurements, random_candidates, with_targets
-from truearm.planning.constraints.constraints import Constraints
-from truearm.planning.driving.joint_window import joint_window
-from truearm.results.plan import Plan
+from truearm.engine.fit.models import named_model
+from truearm.engine.motion.constraints import Constraints, joint_window
+from truearm.engine.robot.robot import Robot
+from truearm.planning.choosing import plan_measurements, random_candidates, with_targets
+from truearm.planning.result import Plan
 
 POSES, CANDIDATES = 30, 5000
 ARMS = (

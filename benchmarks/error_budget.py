@@ -11,19 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from truearm.identification.choosing.zone_boxes import flange_places
-from truearm.identification.choosing.zones import error_sizes
-from truearm.identification.judging.error_budget import ErrorBudget, error_budget
-from truearm.identification.judging.simulated_calibrations import simulated_calibrations
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import named_model
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.parameters import PLACES
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.choosing.zones import error_sizes, flange_places
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
+from truearm.engine.diagnose.simulated_calibrations import simulated_calibrations
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import PLACES
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 GEOMETRIC = named_model("geometric")
 nominal = load_robot("irb120")

@@ -19,19 +19,20 @@ from typing import Any
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
-from truearm.identification.judging.narrow_data import check_narrow_data
-from truearm.identification.solving.fit import Status, identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rigid_motion
-from truearm.simulation.devices import in_view_of, measured_with, named_device, seen_by
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.expected_error import as_residuals_allow, expected_error
+from truearm.engine.diagnose.narrow_data import check_narrow_data
+from truearm.engine.fit.fit import Status, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import rigid_motion
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import in_view_of, measured_with, seen_by
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 CENTRE = np.array([10.0, 20.0, 10.0, 20.0, 40.0, 10.0])
 WIDTHS = (1.0, 5.0, 15.0, 40.0, None)

@@ -39,7 +39,7 @@ THREADS = {"OPENBLAS_NUM_THREADS": "1"}
 def one_run(manifest: str, out: str, how: dict[str, Any]) -> None:
     """Run a fleet in this process, and print how long its steps took and the most memory that it had."""
     began = time.perf_counter()
-    from truearm.jobs.fleet import fleet
+    from truearm.fleets.fleet import fleet
 
     if "process" in how:  # one worker as the others are, and not this process
         how = {"executor": ProcessPoolExecutor(how["process"], mp_context=multiprocessing.get_context("spawn"))}

@@ -19,19 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from truearm.modeling.chain import Array
-from truearm.planning.iso9283.planned import PlannedTest
-from truearm.validation.iso9283.drift import drift_values
-from truearm.validation.iso9283.intervals import (
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.drift import drift_values
+from truearm.iso9283.criteria.intervals import (
     Interval,
+    largest_difference,
     mean_interval,
+    norm_interval,
     repeatability,
     repeatability_interval,
     spread_interval,
 )
-from truearm.validation.iso9283.inverted_tests import largest_difference, norm_interval
-from truearm.validation.iso9283.pose_rows import Cycles
-from truearm.validation.iso9283.values import Instrument
+from truearm.iso9283.criteria.rows import Cycles, Instrument
+from truearm.iso9283.plan.criteria import PlannedTest
 
 CYCLES = 30
 MANY = 300_000

@@ -35,12 +35,11 @@ from tests.moving_tip import (
     times,
 )
 
-from truearm.measurement.readers.performance_samples import read_path_samples
-from truearm.planning.iso9283.way import Way
-from truearm.validation.iso9283.corners import corner_values
-from truearm.validation.iso9283.paths import path_values
-from truearm.validation.iso9283.velocity import velocity_values
-from truearm.validation.iso9283.weaving import weaving_values
+from truearm.iso9283.criteria.corners import corner_values, weaving_values
+from truearm.iso9283.criteria.paths import path_values
+from truearm.iso9283.criteria.velocity import velocity_values
+from truearm.iso9283.evaluate.samples import read_path_samples
+from truearm.iso9283.plan.criteria import Way
 
 PATHS = ("line", "rectangle", "large-circle", "small-circle")
 RATES = (25.0, 50.0, 100.0, 250.0, 1000.0)
@@ -201,7 +200,7 @@ def size(rows: int = 1_000_000) -> dict[str, object]:
                     p = 1e3 * (way.position(at) + rng.normal(0, 1e-5, (each, 3)))
                     if name == "weave":
                         p += 1e3 * np.outer(0.01 * np.sin(2 * np.pi * at / 0.04), np.cross(NORMAL, ALONG))
-                    from truearm.modeling.transform import quaternion_from_rotation
+                    from truearm.engine.robot.transform import quaternion_from_rotation
 
                     q = quaternion_from_rotation(way.rotation(at))
                     for k in range(each):

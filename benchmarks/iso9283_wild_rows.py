@@ -14,10 +14,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from truearm.modeling.chain import Array
-from truearm.validation.iso9283.pose_rows import Cycles
-from truearm.validation.iso9283.values import Instrument
-from truearm.validation.iso9283.wild_rows import unusual_rows
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.rows import Cycles, Instrument
+from truearm.iso9283.criteria.wild_rows import unusual_rows
 
 SHAPES = ([1.0, 1.0, 1.0], [1.0, 1.0, 0.1], [3.0, 1.0, 0.3], [1.0, 0.1, 0.02])
 TRACKER = Instrument(1e-9)

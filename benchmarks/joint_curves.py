@@ -17,19 +17,19 @@ from typing import Any
 
 import numpy as np
 
-from truearm.identification.choosing.selection import select
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import Model, named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.reporting.tables import standard_error
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.choosing.selection import select
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.document.tables import standard_error
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import Model, named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.importing.files import read_matrices
 
 OUT = Path(__file__).with_suffix(".json")
 DATA = Path(os.environ.get("TRUEARM_DATA", Path(__file__).parents[2] / "shared" / "data"))

@@ -17,16 +17,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.results.calibration import Calibration
-from truearm.simulation.truths import DEFAULT_TOOL, truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import DEFAULT_TOOL, truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import JointTruth
 
 #: What is wrong, and for how many of thirty robots.
 FAULTS: Final = {

@@ -13,19 +13,19 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.jobs.accuracy_goal import accuracy_goal
-from truearm.library import load_robot
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Payload
-from truearm.modeling.postures import Postures
-from truearm.planning.choosing import prediction
-from truearm.planning.choosing.measurement_plan import plan_measurements, random_candidates, with_targets
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.postures import Postures
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.importing.files import read_matrices
+from truearm.planning import accuracy as prediction
+from truearm.planning.accuracy import accuracy_goal
+from truearm.planning.choosing import plan_measurements, random_candidates, with_targets
 
 POSES, CANDIDATES, NOISE = 30, 3000, 1e-4
 OBJECTIVES = ("O1", "error")

@@ -20,23 +20,23 @@ from typing import Any
 import numpy as np
 
 import truearm
-from truearm.compensation.fake_targets import matrices
-from truearm.compensation.gauge import best_agreement
 from truearm.compensation.program_correction import commanded
-from truearm.compensation.program_files import edited
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.rapid import RAPID
-from truearm.errors import InputError
-from truearm.jobs.proof import refuse_unaccepted
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.inverse.branches import branch_rule
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, quaternion_from_rotation
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import PERFECT
+from truearm.engine.base.errors import InputError
+from truearm.engine.command.split import refuse_unaccepted
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.programs.fake_targets import matrices
+from truearm.engine.programs.gauge import best_agreement
+from truearm.engine.programs.program import Program, Source
+from truearm.engine.programs.program_files import edited
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.inverse.branches import branch_rule
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import PERFECT
 
 ROBOTS = ("irb120", "irb120", "lrmate200ic", "kr5", "puma560")
 CAMPAIGNS = ("narrow", "far", "few", "full")
@@ -151,7 +151,7 @@ def campaign(twin: Twin, kind: str, rng: np.random.Generator) -> Dataset:
 def poses_somewhere(robot: Robot, rng: np.random.Generator) -> str:
     """Return a program: near to some posture, in paths of straight moves, or all over the workspace, or the plate."""
     if robot.name == "irb120" and rng.random() < 0.4:
-        return (files("truearm.examples") / "plate.mod").read_text()
+        return (files("truearm.starting.examples") / "plate.mod").read_text()
     low, high = limits(robot)
     middle, spread = rng.uniform(low, high), math.radians(rng.choice([5, 15, 180]))
     joints = rng.uniform(np.maximum(low, middle - spread), np.minimum(high, middle + spread), (24, 6))
@@ -175,7 +175,7 @@ def poses_somewhere(robot: Robot, rng: np.random.Generator) -> str:
             )
         )
     ]
-    head, _ = (files("truearm.examples") / "plate.mod").read_text().split("  CONST jointtarget")
+    head, _ = (files("truearm.starting.examples") / "plate.mod").read_text().split("  CONST jointtarget")
     return f"{head}  PROC main()\n" + "\n".join(lines) + "\n  ENDPROC\nENDMODULE\n"
 
 

@@ -20,14 +20,14 @@ from scipy.cluster.vq import kmeans2
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.effects import EFFECTS
-from truearm.modeling.parts import Payload
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.importing.files import read_matrices
 
 DATA = Path(os.environ.get("TRUEARM_DATA", "../shared/data"))
 BLOCKS, MOST = 8, 300

@@ -23,10 +23,10 @@ import numpy as np
 from studio_line import Line, Message, moved, studio
 
 import truearm
-from truearm.library import load_robot
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import quaternion_from_rotation
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import quaternion_from_rotation
 from truearm.studio.jogging import Jogging
 
 _KINDS = ("joint", "handle")

@@ -16,15 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from truearm.identification.judging.wrong_robot import Lengths
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
-from truearm.simulation.twin_joint import PERFECT
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.wrong_robot import Lengths
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.engine.twin.twin_joint import PERFECT
 
 WIDTHS = (None, 40.0, 15.0)
 POSES, NOISE, DOUBTED = 40, 0.05e-3, 1e-4

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from truearm.library import library
+from truearm.engine.robot.library import library
 
 ARMS: Final = (
     "crb15000_5_0.95",  # axis 6 beside axis 5

@@ -28,7 +28,7 @@ def pages_without_what_draws_them(request: pytest.FixtureRequest) -> Iterator[No
     """Leave Plotly's own script out of the pages: hundreds are written here, and that makes each of them 5 MB."""
     with pytest.MonkeyPatch.context() as patch:
         if not request.node.nodeid.startswith(DRAWN):
-            patch.setattr("truearm.reporting.page._plotly", lambda: "/* plotly.js */")
+            patch.setattr("truearm.engine.document.page._plotly", lambda: "/* plotly.js */")
         yield
 
 
@@ -41,7 +41,7 @@ def plans_judged_at_few_numbers_of_poses(request: pytest.FixtureRequest) -> Iter
     """Judge plans at few numbers of poses: all of them take most of a plan's time, and are tested with the planning."""
     with pytest.MonkeyPatch.context() as patch:
         if request.node.nodeid.startswith(PLANNING):
-            patch.setattr("truearm.planning.choosing.prediction.NUMBERS", (8, 30))
+            patch.setattr("truearm.planning.accuracy.NUMBERS", (8, 30))
         yield
 
 

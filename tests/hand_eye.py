@@ -13,14 +13,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.library import load_robot
-from truearm.measurement.board.charuco import Charuco
-from truearm.modeling.chain import Array
-from truearm.modeling.inverse import inverse
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_vector, rotation_vector
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
+from truearm.board.pictures import Charuco
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation, rotation_from_vector, rotation_vector
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
 
 BOARD: Final = Charuco(14, 10, 0.025, 0.018, "5X5_250")
 #: What small pictures show: larger squares.

@@ -6,13 +6,13 @@ import math
 from typing import Final
 
 import numpy as np
+from papers.katana.robot import NAMES
 
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.simulation.twin import Twin, measure
-from truearm.studies.katana.robot import NAMES
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.twin import Twin, measure
 
 #: One step of a parameter as the document counts them: rad and mm.
 UNIT: Final = np.array([0.2 if n == "target_tip_y" else 1e-3 if n in NAMES[-4:] else 1.0 for n in NAMES])

@@ -19,10 +19,10 @@ from tests.jobs.examples import EXAMPLES
 from tests.killing import contents, done, found, killed_copies, leftovers
 
 import truearm
-from truearm.compensation.program_files import program_files
-from truearm.errors import InputError
-from truearm.manifest import MANIFEST, sets_in
-from truearm.measurement.hexapod.poses import poses
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.manifest import MANIFEST, sets_in
+from truearm.engine.data.hexapod import poses
+from truearm.engine.programs.program_files import program_files
 
 Arguments = dict[str, Any]
 

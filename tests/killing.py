@@ -19,9 +19,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from truearm.errors import InputError
-from truearm.files import read_bytes
-from truearm.manifest import MANIFEST, UNFINISHED
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import read_bytes
+from truearm.engine.base.manifest import MANIFEST, UNFINISHED
 
 _CHANGES = ("os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate")
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from truearm.modeling.robot import Robot
+from truearm.engine.robot.robot import Robot
 
 
 def frames_of(robot: Robot, path: Path, *, base: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Path:

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 
 def sized(like: str, name: str, **lengths: float) -> Robot:

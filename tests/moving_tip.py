@@ -6,15 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from truearm.library import load_robot
-from truearm.measurement.performance.records import Names, Samples
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import rotation_from_vector
-from truearm.planning.iso9283.criteria import TESTS
-from truearm.planning.iso9283.planned import PerformancePlan, PlannedPath, PlannedPose, PlannedTest
-from truearm.planning.iso9283.way import Way
-from truearm.planning.poses.iso9283 import Cube
-from truearm.validation.iso9283.values import Instrument, Value
+from truearm.engine.motion.cube import Cube
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import rotation_from_vector
+from truearm.iso9283.criteria.rows import Instrument, Value
+from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest, Way
+from truearm.iso9283.plan.records import Names, Samples
 
 EXACT = Instrument(0.0, 0.0)
 TRACKER = Instrument(0.02e-3)

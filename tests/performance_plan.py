@@ -7,13 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.inverse import inverse
-from truearm.modeling.transform import rotation_from_vector
-from truearm.planning.iso9283.criteria import TESTS
-from truearm.planning.iso9283.planned import PerformancePlan, PlannedPath, PlannedPose, PlannedTest
-from truearm.planning.poses.iso9283 import Cube
+from truearm.engine.motion.cube import Cube
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import rotation_from_vector
+from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest
 
 #: z of the tip down.
 DOWN = np.diag([1.0, -1.0, -1.0])

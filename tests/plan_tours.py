@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from truearm.modeling.robot import Robot
-from truearm.planning.driving.tour import Stop, Tour
-from truearm.simulation.truths import carrying_targets
+from truearm.engine.motion.tour import Stop, Tour
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import carrying_targets
 
 
 def a_tour(robot: Robot, count: int = 4, *, approach: bool = False, labels: tuple[str, ...] = ()) -> tuple[Robot, Tour]:

@@ -13,9 +13,9 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import quaternion_from_rotation
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import quaternion_from_rotation
 
 NAMES = tuple(f"joint_{number}" for number in range(1, 7))
 #: The five configurations [deg].

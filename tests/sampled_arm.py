@@ -8,9 +8,9 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from truearm.modeling.robot import Robot
-from truearm.planning.driving.cell import Cell
-from truearm.planning.driving.collisions import APART, MARGIN
+from truearm.engine.motion.cell import Cell
+from truearm.engine.motion.collisions import APART, MARGIN
+from truearm.engine.robot.robot import Robot
 
 _POINTS = 24
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 
 def campaign(robot: str, poses: int, noise: float, seed: int, truth: str = "random") -> tuple[Twin, Dataset]:

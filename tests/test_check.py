@@ -10,18 +10,17 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.errors import InputError
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.check import check
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.rigid_tool import rigid_suspects
-from truearm.measurement.statistics import errors_of
-from truearm.measurement.table_motion import without_table_motion
-from truearm.modeling.chain import Array
+from truearm.calibration.calibrate import calibrate
+from truearm.checking.check import check
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset, IntArray
+from truearm.engine.data.rigid_tool import rigid_suspects
+from truearm.engine.data.statistics import errors_of, without_table_motion
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.importing.files import read_matrices
 
 Corruption = Callable[[Dataset, np.random.Generator], Dataset]
 SEEDS = range(3)

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.few_readings import check_few_to_doubt
-from truearm.identification.solving.fit import Status, identify
-from truearm.identification.solving.models import named_model
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.check import check
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Tool
-from truearm.modeling.transform import quaternion_from_rotation
-from truearm.simulation.truths import at_station
-from truearm.simulation.twin import Twin, measure
+from truearm.calibration.calibrate import calibrate
+from truearm.checking.check import check
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.narrow_data import check_few_to_doubt
+from truearm.engine.fit.fit import Status, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Tool
+from truearm.engine.robot.transform import quaternion_from_rotation
+from truearm.engine.twin.truths import at_station
+from truearm.engine.twin.twin import Twin, measure
 
 ROBOT = "irb120"
 

@@ -9,20 +9,21 @@ from functools import cache
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.identification.judging.advice import check_fit
-from truearm.identification.judging.expected_error import expected_error
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.check import check
-from truearm.jobs.validate import validate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.transform import rigid_motion
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
+from truearm.calibration.calibrate import calibrate
+from truearm.checking.check import check
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.advice import check_fit
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import rigid_motion
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
+from truearm.validation.validate import validate
 
 ROBOT = load_robot("irb120")
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]

@@ -22,10 +22,10 @@ from typing import get_args
 
 import pytest
 
-from truearm.cli import main
-from truearm.identification.judging.changes import Kind
-from truearm.limits import LIMITS
-from truearm.measurement.rigid_tool import Suspicion
+from truearm.commands import main
+from truearm.engine.base.limits import LIMITS
+from truearm.engine.data.rigid_tool import Suspicion
+from truearm.engine.diagnose.changes import Kind
 
 ROOT = Path(__file__).parents[1]
 GUIDE = sorted((ROOT / "docs" / "guide").glob("*.md"))

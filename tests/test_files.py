@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from truearm.errors import InputError
-from truearm.files import exists, noted_reads, read_bytes, read_text, read_yaml
-from truearm.writing import write_text
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists, noted_reads, read_bytes, read_text, read_yaml
+from truearm.engine.base.writing import write_text
 
 
 class Anything(BaseModel):

@@ -17,13 +17,13 @@ from tests.jobs.examples import EXAMPLES
 from tests.killing import between, contents, found, killed, killed_copies, leftovers, operations
 
 import truearm
-from truearm.compensation.corrected_targets import LEDGER, LedgerEntry, known_by_ledger, remember
-from truearm.compensation.program_files import program_files, restored, write_programs
-from truearm.errors import InputError
-from truearm.files import read_bytes
-from truearm.manifest import MANIFEST, UNFINISHED, hash_of, sets_in
-from truearm.results.program_correction import ProgramCorrection
-from truearm.writing import output_file, output_folder, write_files, write_text
+from truearm.compensation.result import ProgramCorrection
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import read_bytes
+from truearm.engine.base.manifest import MANIFEST, UNFINISHED, hash_of, sets_in
+from truearm.engine.base.writing import output_file, output_folder, write_files, write_text
+from truearm.engine.programs.corrected_targets import LEDGER, LedgerEntry, known_by_ledger, remember
+from truearm.engine.programs.program_files import program_files, restored, write_programs
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a process cannot copy itself here")
 
@@ -195,7 +195,7 @@ def test_records_stand_before_their_programs(
         "plate.mod.truearm.json",
         "plate.mod",
         "compensation.html",
-        "truearm.manifest.json",
+        "truearm.engine.base.manifest.json",
     ]
 
 

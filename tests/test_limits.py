@@ -18,22 +18,21 @@ from PIL import Image
 from tests.simulated import campaign
 
 import truearm
-from truearm.compensation.program_files import program_files, recorded, restored
-from truearm.errors import InputError
-from truearm.files import read_bytes, read_yaml
-from truearm.limits import LIMITS, VARIABLE, limit, refuse_beyond
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.drawn_circle.page import read_page
-from truearm.measurement.drawn_circle.scan import read_circle
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.mapping import name_pattern
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.readers.table import read_table
-from truearm.measurement.rigid_tool import rigid_suspects
-from truearm.modeling.formats.dh_csv import read_dh_csv
-from truearm.modeling.formats.robot_file.schema import RobotFile
-from truearm.modeling.formats.urdf import read_urdf
-from truearm.results.calibration import Calibration
+from truearm.calibration.result import Calibration
+from truearm.drawn_circle.scan import read_circle, read_page
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import read_bytes, read_yaml
+from truearm.engine.base.limits import LIMITS, VARIABLE, limit, refuse_beyond
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.readers.mapping import name_pattern
+from truearm.engine.data.readers.table import read_table
+from truearm.engine.data.rigid_tool import rigid_suspects
+from truearm.engine.programs.program_files import program_files, recorded, restored
+from truearm.engine.robot.robot_file.schema import RobotFile
+from truearm.engine.robot.urdf import read_urdf
+from truearm.importing.files import read_matrices
+from truearm.robot_files.formats import read_dh_csv
 
 HEADER = "configuration,joint_1 [deg],target,x [mm],y [mm],z [mm]\n"
 ROWS = "".join(f"{n},{n},a,1,2,{n}\n" for n in range(1, 9))

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from truearm.identification.solving.fit import Fit, identify, place
-from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import MODELS, named_model
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.planning.choosing import prediction
-from truearm.planning.choosing.measurement_plan import plan_measurements, with_targets
-from truearm.results.calibration import Calibration
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
+from truearm.engine.data.dataset import Dataset, IntArray
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import Fit, identify, place
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.models import MODELS, named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.importing.files import read_matrices
+from truearm.planning import accuracy as prediction
+from truearm.planning.choosing import plan_measurements, with_targets
 
 SEEDS = range(3)
 #: The end-effector of the campaign, after Nubiola's triangular artefact, which it resembles.

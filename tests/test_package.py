@@ -29,7 +29,7 @@ def unpacked_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_wheel_calibrates_outside_the_clone(unpacked_wheel: Path, tmp_path: Path) -> None:
     script = (
-        f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nimport truearm\nfrom truearm.cli import main\n"
+        f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nimport truearm\nfrom truearm.commands import main\n"
         f"assert {str(unpacked_wheel)!r} in truearm.__file__\n"
         "for words in ('robots', 'demo --out demo', 'new-robot mine.yaml', 'show mine.yaml'):\n"
         "    sys.argv[1:] = words.split()\n"

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from truearm.errors import InputError
-from truearm.printable import is_one_line, printable, shortened, with_short_words
-from truearm.reporting.page import json_for_script, with_code
+from truearm.engine.base.errors import InputError, is_one_line, printable, shortened, with_short_words
+from truearm.engine.document.page import json_for_script, with_code
 
 
 @pytest.mark.parametrize("text", ["smr 1", "<b>", "Träger", "a: #{}", "日本", "\u00a0x", "שלום", "👩\u200d🔧"])

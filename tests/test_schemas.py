@@ -10,14 +10,15 @@ from typing import Any, Final
 import pytest
 from pydantic import BaseModel
 
-from truearm.compensation.cell import CellFile
-from truearm.compensation.program_files import CorrectionRecord
-from truearm.errors import InputError
-from truearm.identification.solving.bounds import Bounds
-from truearm.measurement.readers.mapping import MappingFile
-from truearm.modeling.formats.robot_file import RobotFile, robot_from_file
-from truearm.planning.constraints.constraints import Constraints
-from truearm.schemas import validated
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.schemas import validated
+from truearm.engine.data.readers.mapping import MappingFile
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.motion.constraints import Constraints
+from truearm.engine.programs.cell import CellFile
+from truearm.engine.programs.program_files import CorrectionRecord
+from truearm.engine.robot.robot_file.reading import robot_from_file
+from truearm.engine.robot.robot_file.schema import RobotFile
 
 UNITS: Final = {"length": "mm", "angle": "deg"}
 BOUNDS: Final[dict[object, object]] = {"truearm": "truearm-bounds/1", "units": UNITS}

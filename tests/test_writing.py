@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from truearm.errors import InputError
-from truearm.files import read_bytes
-from truearm.manifest import MANIFEST, UNFINISHED, hash_of, sets_in
-from truearm.writing import output_folder, put_in_place, write_files, write_text, write_text_over
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import read_bytes
+from truearm.engine.base.manifest import MANIFEST, UNFINISHED, hash_of, sets_in
+from truearm.engine.base.writing import output_folder, put_in_place, write_files, write_text, write_text_over
 
 
 def test_what_is_no_plain_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

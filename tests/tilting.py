@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from truearm.library import load_robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
+from truearm.engine.twin.twin_joint import JointTruth
 
 DEGREE: Final = math.radians(1.0)
 #: Of the document's inclinometers.

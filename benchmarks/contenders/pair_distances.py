@@ -10,8 +10,8 @@ from scipy.spatial.distance import pdist
 from stopwatch import median_seconds, report
 
 import truearm
-from truearm.validation import pair_distances as module
-from truearm.validation.pair_distances import pair_distances
+from truearm.validation import distances as module
+from truearm.validation.distances import pair_distances
 
 rng = np.random.default_rng(0)
 measured = rng.uniform(-0.6, 0.6, (9905, 3))

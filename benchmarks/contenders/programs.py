@@ -14,11 +14,10 @@ import numpy as np
 from stopwatch import median_seconds, report
 
 import truearm
-from truearm.compensation.program_files import ProgramFile, edited, read_programs
-from truearm.compensation.program_poses import edits_of, pose_numbers, poses_of
-from truearm.compensation.programs import LANGUAGES
-from truearm.compensation.programs.numbers import NUMBER
-from truearm.compensation.programs.program import Language, Program, Source
+from truearm.engine.programs import LANGUAGES
+from truearm.engine.programs.program import NUMBER, Language, Program, Source
+from truearm.engine.programs.program_files import ProgramFile, edited, read_programs
+from truearm.engine.programs.program_poses import edits_of, pose_numbers, poses_of
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 COUNT = 100_000

@@ -12,10 +12,10 @@ import numpy as np
 from stopwatch import report
 
 import truearm
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.library import load_robot
 
 COUNTS, NOISE, POINT = (500, 2500), 0.05e-3, (0.075, 0.0937, 0.215)
 

@@ -6,15 +6,15 @@ import numpy as np
 from stopwatch import inputs, median_seconds, report
 
 import truearm
-from truearm.identification.judging.monte_carlo import monte_carlo
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.problem import Problem
-from truearm.identification.solving.solver import solve
-from truearm.identification.start_values.frames import initial_frames
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.simulation.truths import truth_twin
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.frames import initial_frames
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.solver import solve
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.fleets.series import monte_carlo
 
 NOISE = 0.05e-3
 nominal = load_robot("irb120")

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.library import load_robot
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.modeling.formats.urdf_writing import urdf_text
-from truearm.modeling.inverse.branches import BRANCHES, branch_rule
-from truearm.simulation.truths import truth_twin
+from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.urdf_writing import urdf_text
+from truearm.engine.twin.truths import truth_twin
+from truearm.importing.files import read_matrices
 
 CONFIGURATIONS, POSES = 1000, 10_000
 TRAIN, HELD_OUT, CAMPAIGNS, NOISE = 50, 200, 5, 0.05e-3

@@ -6,8 +6,8 @@ import numpy as np
 from stopwatch import inputs, median_seconds, report
 
 import truearm
-from truearm.library import load_robot
-from truearm.modeling.inverse import inverse
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.library import load_robot
 
 given = np.load(inputs() / "inverse.npz")
 values = np.load(inputs() / "kinematics.npz")

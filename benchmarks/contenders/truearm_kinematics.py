@@ -6,8 +6,8 @@ import numpy as np
 from stopwatch import inputs, median_seconds, report
 
 import truearm
-from truearm.library import load_robot
-from truearm.simulation.truths import STATION
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import STATION
 
 given = np.load(inputs() / "kinematics.npz")
 real = load_robot("irb120").with_values(dict(zip(given["names"].tolist(), given["values"].tolist(), strict=True)))

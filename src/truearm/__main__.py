@@ -60,7 +60,7 @@ def main() -> None:
         import warnings
 
         warnings.simplefilter("ignore")
-    from truearm.cli import main as run
+    from truearm.commands import main as run
 
     interrupts.loaded()
     try:

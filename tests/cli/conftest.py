@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from truearm.cli import main
-from truearm.jobs.demo import demo
-from truearm.results.demonstration import Demonstration
+from truearm.commands import main
+from truearm.starting.demo import Demonstration, demo
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with ``data.csv``, a small simulated campaign of the IRB 120."""
     from tests.simulated import campaign
 
-    from truearm.measurement.readers.canonical import csv_text
+    from truearm.engine.data.readers.canonical import csv_text
 
     folder = tmp_path_factory.mktemp("small")
     _, data = campaign("irb120", 40, 0.05e-3, 1)

@@ -10,11 +10,11 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.identification.test_axes import runs
 
-from truearm.library import load_robot
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.transform import IDENTITY
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 
 @pytest.fixture(scope="module")

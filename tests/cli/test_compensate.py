@@ -14,14 +14,13 @@ from tests.answered import ANSWERS
 from tests.cli.conftest import Truearm
 from tests.simulated import campaign
 
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.demo import demo
-from truearm.library import load_robot
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import quaternion_from_rotation
-from truearm.results.demonstration import Demonstration
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import quaternion_from_rotation
+from truearm.starting.demo import Demonstration, demo
 
 
 def worn() -> Robot:
@@ -40,7 +39,7 @@ def stiff() -> Robot:
 def cell(tmp_path: Path) -> Path:
     """A folder with a calibrated robot, the plate's program and a file of its tool and frame."""
     (tmp_path / "calibrated.yaml").write_text(robot_text(worn()))
-    (tmp_path / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text())
+    (tmp_path / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     (tmp_path / "cell.yaml").write_text(
         "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
         "tools:\n  tProbe: {of: flange, translation: [0.2, 0, 125]}\n"
@@ -86,7 +85,7 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
         "compensation.html",
         "plate.mod",
         "plate.mod.truearm.json",
-        "truearm.manifest.json",
+        "truearm.engine.base.manifest.json",
     ]
     record = json.loads((cell / "out" / "plate.mod.truearm.json").read_text())
     assert record["applied"]["frames"] == "assumed"

@@ -16,9 +16,9 @@ import pytest
 from tests.cli.conftest import Truearm
 
 import truearm as package
-from truearm.library import load_robot
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.results.demonstration import Demonstration
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.robot.library import load_robot
+from truearm.starting.demo import Demonstration
 
 IDS = [
     "fr3",
@@ -40,7 +40,7 @@ IDS = [
 
 def test_version_and_help_need_no_scipy_and_no_numpy() -> None:
     script = (
-        "import sys\nfrom truearm.cli import main\nsys.argv = ['truearm', {!r}]\n"
+        "import sys\nfrom truearm.commands import main\nsys.argv = ['truearm', {!r}]\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         "print([m for m in ('scipy', 'numpy', 'plotly', 'pydantic') if m in sys.modules])"
     )
@@ -90,7 +90,7 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
         "calibrated.yaml",
         "report.html",
         "result.json",
-        "truearm.manifest.json",
+        "truearm.engine.base.manifest.json",
     ]
     result = json.loads((out / "result.json").read_text())
     assert {k: result[k] for k in summary} == summary
@@ -268,7 +268,7 @@ def test_a_demo_that_does_not_converge_ends_like_a_calibration(
     data = read_csv(small / "data.csv").of_configurations([0, 1])
     run = package.calibrate("irb120", data, train=1)
     assert run.status.value == "rank-loss"
-    monkeypatch.setattr("truearm.jobs.demo.demo", lambda out, **_: Demonstration(out, run, None))
+    monkeypatch.setattr("truearm.starting.demo.demo", lambda out, **_: Demonstration(out, run, None))
     assert truearm("demo", "--out", tmp_path / "demo").code == 3
 
 

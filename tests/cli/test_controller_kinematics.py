@@ -8,7 +8,7 @@ from tests.cli.conftest import Truearm
 from tests.compensation.test_controller_model import POSES, program, worn
 from tests.ur_controller import UR10_CONF
 
-from truearm.modeling.formats.robot_file import robot_text
+from truearm.engine.robot.robot_file.writing import robot_text
 
 
 def test_the_command_names_its_option(truearm: Truearm, tmp_path: Path) -> None:

@@ -7,14 +7,13 @@ from pathlib import Path
 import pytest
 from tests.cli.conftest import Truearm
 
-from truearm.library import load_robot
-from truearm.modeling.formats.dh_csv import read_dh_csv
-from truearm.modeling.formats.export import FORMATS
+from truearm.engine.robot.library import load_robot
+from truearm.robot_files.formats import FORMATS, read_dh_csv
 
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from truearm.modeling.formats.robot_file import robot_text
+    from truearm.engine.robot.robot_file.writing import robot_text
 
     robot = load_robot("irb120").with_effects(["gain", "approach"])
     away = {n: p.value + 1e-3 for n, p in robot.parameters.items() if p.group in ("geometry", "gain", "approach")}

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
 
-from truearm.library import load_robot
-from truearm.measurement.hexapod.geometry import triangle
-from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet_reading import read_sheet
-from truearm.measurement.readers.canonical import read_csv
+from truearm.engine.data.hexapod import poses, triangle
+from truearm.engine.data.readers.canonical import read_csv
+from truearm.engine.robot.library import load_robot
+from truearm.hexapod.sheet_reading import read_sheet
 
 
 def test_enumerate(truearm: Truearm) -> None:
@@ -192,8 +191,8 @@ def test_a_wrong_fixture_and_a_plan_over_its_robot(truearm: Truearm, tmp_path: P
 
 
 def test_world_frame(truearm: Truearm, tmp_path: Path) -> None:
-    from truearm.modeling.inverse import inverse
-    from truearm.planning.hexapod.tool import with_cups
+    from truearm.engine.robot.inverse.kinematics import inverse
+    from truearm.hexapod.reachable import with_cups
 
     robot, _ = with_cups(load_robot("irb120"))
     cups = triangle([0.3003, 0.3, 0.2996], "B") + np.array([0.25, -0.1, 0.1])

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
 
-from truearm.library import load_robot
-from truearm.modeling.inverse.branches import BRANCHES
-from truearm.modeling.transform import quaternion_from_rotation
+from truearm.engine.robot.inverse.branches import BRANCHES
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import quaternion_from_rotation
 
 HEADER = ["pose", "branch", "status", *(f"joint_{n} [deg]" for n in range(1, 7))]
 HEADER += ["position_error [mm]", "orientation_error [mrad]"]

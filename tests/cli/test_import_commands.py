@@ -9,7 +9,7 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.jobs.examples import EXAMPLES
 
-from truearm.measurement.readers.presets import PRESETS
+from truearm.engine.data.readers.presets import PRESETS
 
 
 def test_sockets(truearm: Truearm, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.cli.test_refusals import refused
 
-from truearm.library import load_robot
+from truearm.engine.robot.library import load_robot
 
 #: The tool of the truth `tracker-triangular`.
 PAYLOAD = "2.7kg,50mm,25mm,100mm"

@@ -8,7 +8,7 @@ import pytest
 from tests.cli.conftest import Truearm
 
 import truearm as package
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 
 
 def test_the_old_order_is_refused_with_the_new_line(truearm: Truearm, small: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
 
-from truearm.measurement.readers.canonical import read_csv
+from truearm.engine.data.readers.canonical import read_csv
 
 RULES = """\
 truearm: truearm-constraints/1

@@ -13,13 +13,13 @@ from tests.cli.conftest import Truearm
 from tests.jobs.examples import EXAMPLES, PATH
 
 import truearm as package
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.poses import read_poses
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rotation_from_quaternion
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.readers.configurations import read_poses
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import rotation_from_quaternion
+from truearm.engine.twin.twin import Twin
 
 CUBE = ("--centre", "350,0,350", "--side", "200")
 
@@ -33,7 +33,7 @@ def test_a_set_is_written_as_other_commands_read_it(truearm: Truearm, tmp_path: 
     assert run.out.startswith("6 poses of the set diagonal in the cube of 200 mm about (350, 0, 350) mm.")
     assert {path.name for path in tmp_path.iterdir()} == {
         *("set.csv", "set-poses.csv", "set.html"),
-        "truearm.manifest.json",
+        "truearm.engine.base.manifest.json",
     }
     data, read = read_csv(out), read_poses(tmp_path / "set-poses.csv")
     robot = package.load_robot("irb120")

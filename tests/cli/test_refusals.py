@@ -344,8 +344,8 @@ def test_unknown_truth(truearm: Truearm, tmp_path: Path) -> None:
 
 
 def test_a_truth_of_another_robot(truearm: Truearm, tmp_path: Path) -> None:
-    from truearm.library import load_robot
-    from truearm.modeling.formats.robot_file import robot_text
+    from truearm.engine.robot.library import load_robot
+    from truearm.engine.robot.robot_file.writing import robot_text
 
     (tmp_path / "li3.yaml").write_text(robot_text(load_robot("li3")))
     message = refused(

@@ -7,11 +7,11 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from papers import STUDIES, irb120_simulation
+from papers.study import Study
 from tests.cli.conftest import Truearm
 
-from truearm.manifest import MANIFEST
-from truearm.studies import STUDIES, irb120_simulation
-from truearm.studies.study import Study
+from truearm.engine.base.manifest import MANIFEST
 
 WHOLE = irb120_simulation.study
 

@@ -12,16 +12,16 @@ from tests.compensation.test_program_on_twin import plate
 
 import truearm
 from truearm import InputError
-from truearm.compensation.gauge import best_agreement
+from truearm.calibration.result import Calibration
 from truearm.compensation.program_correction import commanded
-from truearm.library import load_robot
-from truearm.modeling.transform import quaternion_from_rotation
-from truearm.results.calibration import Calibration
-from truearm.results.program_correction import ProgramCorrection
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.compensation.result import ProgramCorrection
+from truearm.engine.programs.gauge import best_agreement
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import quaternion_from_rotation
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
-ORIGINAL = (files("truearm.examples") / "plate.mod").read_text()
+ORIGINAL = (files("truearm.starting.examples") / "plate.mod").read_text()
 NOISE = 2e-5
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.cell import Cell, read_frames, read_known_places, read_tools
-from truearm.compensation.programs import LANGUAGES
-from truearm.compensation.programs.program import Language
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs import LANGUAGES
+from truearm.engine.programs.cell import Cell, read_frames, read_known_places, read_tools
+from truearm.engine.programs.program import Language
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
 
 HEAD = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
 

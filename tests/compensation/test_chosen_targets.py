@@ -13,16 +13,16 @@ import pytest
 from tests.answered import compensate
 
 import truearm
-from truearm.compensation.chosen_targets import Patterns
-from truearm.compensation.fake_targets import matrices
 from truearm.compensation.program_correction import commanded
-from truearm.compensation.programs.fanuc_ls import FANUC_LS
-from truearm.compensation.programs.program import Source
-from truearm.compensation.programs.urscript import URSCRIPT
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.chosen_targets import Patterns
+from truearm.engine.programs.fake_targets import matrices
+from truearm.engine.programs.fanuc_ls import FANUC_LS
+from truearm.engine.programs.program import Source
+from truearm.engine.programs.urscript import URSCRIPT
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
 
 POSE = "[[{x:.3f},{y:.3f},300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
 
@@ -38,7 +38,7 @@ def worn(effects: tuple[str, ...] = ()) -> Robot:
 
 def plate(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
     path = folder / "plate.mod"
-    path.write_text((files("truearm.examples") / "plate.mod").read_text().replace(*change))
+    path.write_text((files("truearm.starting.examples") / "plate.mod").read_text().replace(*change))
     return path
 
 

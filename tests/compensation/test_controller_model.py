@@ -12,11 +12,13 @@ from tests.ur_controller import UR3E_CONF, UR10_CONF
 
 import truearm
 from truearm import InputError, Robot
-from truearm.compensation.fake_targets import nominal_robot
-from truearm.compensation.programs import LANGUAGES
-from truearm.modeling.formats.controller_entry import STATED
-from truearm.modeling.formats.robot_file import is_intact, read_robot, robot_text, sealed
-from truearm.modeling.proof import Proof
+from truearm.engine.programs import LANGUAGES
+from truearm.engine.programs.fake_targets import nominal_robot
+from truearm.engine.robot.proof import Proof
+from truearm.engine.robot.robot_file.entries import STATED
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.seal import is_intact, sealed
+from truearm.engine.robot.robot_file.writing import robot_text
 
 POSES = (
     "def a():\n  set_tcp(p[0,0,0,0,0,0])\n"

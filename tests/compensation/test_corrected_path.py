@@ -10,14 +10,14 @@ import pytest
 
 import truearm
 from truearm.compensation.corrected_path import KNOWLEDGE, CorrectedPath, Knowledge, correct_path
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.wrench import Wrench
-from truearm.planning.paths.path_file import PlannedPath, read_path
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.path_file import PlannedPath, read_path
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.wrench import Wrench
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 LOAD = "2.7kg,50mm,25mm,100mm"
 NOMINAL = load_robot("irb120")

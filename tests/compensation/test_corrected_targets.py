@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from tests.compensation.programs.test_every_language import languages, samples, shifted, texts
 
-from truearm.compensation.corrected_targets import KnownCorrection, corrected_digests, refuse_corrected
-from truearm.compensation.correction import Correction
-from truearm.compensation.program_poses import edits_of
-from truearm.compensation.programs.program import Form, Language, Program, ProgramTarget, Source
-from truearm.errors import InputError
-from truearm.modeling.orientations import QUATERNION
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.corrected_targets import KnownCorrection, corrected_digests, refuse_corrected
+from truearm.engine.programs.correction import Correction
+from truearm.engine.programs.program import Form, Language, Program, ProgramTarget, Source
+from truearm.engine.programs.program_poses import edits_of
+from truearm.engine.robot.transform import QUATERNION
 
 POSE = Form("robtarget", "pose", orientation=QUATERNION, decimals=(3, 7))
 JOINTS = Form("jointtarget", "joints", angle=np.pi / 180.0)

@@ -13,16 +13,16 @@ import pytest
 from tests.jobs.examples import PATH
 
 import truearm
-from truearm.compensation.cell import Cell, read_frames, read_tools
-from truearm.compensation.correction import shared_motion
-from truearm.compensation.correction_limit import CorrectionLimit, check_size, correction_limit
+from truearm.compensation.limit import CorrectionLimit, check_size, correction_limit
 from truearm.compensation.program_correction import commanded
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform, rotation_from_vector
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.cell import Cell, read_frames, read_tools
+from truearm.engine.programs.correction import shared_motion
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY, Transform, rotation_from_vector
 
 HEAD: Final = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
 #: What must be answered before anything is corrected.
@@ -37,7 +37,7 @@ def longer() -> Robot:
 
 def plate(folder: Path) -> Path:
     path = folder / "plate.mod"
-    path.write_text((files("truearm.examples") / "plate.mod").read_text())
+    path.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     return path
 
 

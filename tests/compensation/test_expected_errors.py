@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.compensation.cell import Cell, Placed
-from truearm.compensation.chosen_targets import ALONE, Choice
-from truearm.compensation.correction import Correction
+from truearm.calibration.calibrate import calibrate
 from truearm.compensation.program_correction import corrected_programs
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.rapid import RAPID
-from truearm.jobs.calibrate import calibrate
-from truearm.modeling.formats.robot_file import sealed
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.programs.cell import Cell, Placed
+from truearm.engine.programs.chosen_targets import ALONE, Choice
+from truearm.engine.programs.correction import Correction
+from truearm.engine.programs.program import Program, Source
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.seal import sealed
+from truearm.engine.robot.transform import Transform
 
 DRAWS = 25
 
 
 def program() -> Program:
     """Return the plate's program, a tenth of its targets and a posture by joints among them."""
-    text = (files("truearm.examples") / "plate.mod").read_text()
+    text = (files("truearm.starting.examples") / "plate.mod").read_text()
     lines = [line for line in text.splitlines() if not line.startswith("    Move") or "Circle" in line]
     jumps = [f"    MoveJ pHole{i},v20,fine,tProbe\\WObj:=wobjPlate;" for i in (1, 6, 8)]
     at = next(i for i, line in enumerate(lines) if "PROC main" in line)
@@ -115,7 +115,7 @@ def test_what_is_not_known_is_not_said(robot: Robot) -> None:
 
 
 def test_one_target_alone_has_no_correction_of_which_something_could_be_promised(robot: Robot) -> None:
-    text = (files("truearm.examples") / "plate.mod").read_text()
+    text = (files("truearm.starting.examples") / "plate.mod").read_text()
     lines = [line for line in text.splitlines() if "Move" not in line and "CONST" not in line]
     pose = "[[20,20,0],[-0.069237,-0.008501,0.990128,0.121572],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
     move = f"    MoveJ {pose},v20,fine,tProbe\\WObj:=wobjPlate;"

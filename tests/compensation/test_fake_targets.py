@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from truearm.compensation.fake_targets import fake_targets, matrices, nominal_robot
-from truearm.compensation.gauge import best_agreement
-from truearm.compensation.programs.program import Configuration
-from truearm.compensation.resolved_configurations import resolved_configurations
-from truearm.errors import InputError
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.modeling.inverse.branches import BRANCHES, branch_rule
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.fake_targets import fake_targets, matrices, nominal_robot
+from truearm.engine.programs.gauge import best_agreement
+from truearm.engine.programs.program import Configuration
+from truearm.engine.programs.resolved_configurations import resolved_configurations
+from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.importing.files import read_matrices
 
 
 def worn(robot: Robot, seed: int = 1) -> Robot:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from truearm.compensation.fake_targets import fake_targets, matrices, nominal_robot
-from truearm.compensation.gauge import base_shift, best_agreement, common_motion
-from truearm.library import load_robot
-from truearm.modeling.robot import Robot
+from truearm.engine.programs.fake_targets import fake_targets, matrices, nominal_robot
+from truearm.engine.programs.gauge import base_shift, best_agreement, common_motion
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
 
 
 def small(motion: list[float]) -> np.ndarray:

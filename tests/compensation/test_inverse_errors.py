@@ -10,14 +10,12 @@ from numpy.testing import assert_allclose
 from tests.modeling.test_conventions import about, slid
 from tests.modeling.test_joint_errors import TABLE_1, TABLE_3, error, with_table_3
 
-from truearm.compensation.inverse_errors import design, fake_targets, inverted
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, seven_lines, usable_joints
-from truearm.results.line_test import LineTest
-from truearm.simulation.twin import Twin, measure
-from truearm.validation.line_test import LineErrors, from_data, on_twin, reduction
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cube import DIRECTIONS, SevenLines, seven_lines, usable_joints
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import IDENTITY, Transform
+from truearm.engine.twin.twin import Twin, measure
+from truearm.validation.lines import LineErrors, LineTest, design, fake_targets, from_data, inverted, on_twin, reduction
 
 
 @pytest.fixture(scope="module")

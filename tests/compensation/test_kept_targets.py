@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.compensation.expected_errors import DrawnErrors, ExpectedErrors
-from truearm.compensation.kept_targets import kept_targets, paths_of
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.rapid import RAPID
+from truearm.engine.programs.correction import kept_targets, paths_of
+from truearm.engine.programs.expected_errors import DrawnErrors, ExpectedErrors
+from truearm.engine.programs.program import Program, Source
+from truearm.engine.programs.rapid import RAPID
 
 POSE = "[[{},0,400],[0.7071068,0,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
 

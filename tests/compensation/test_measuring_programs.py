@@ -11,29 +11,20 @@ import numpy as np
 import pytest
 from tests.performance_plan import small_plan
 
-from truearm.compensation.cell import Cell, read_tools
-from truearm.compensation.iso9283.programs import measuring_programs
-from truearm.compensation.iso9283.routes import Routes
-from truearm.compensation.joint_speeds import fastest_point, known_speeds
 from truearm.compensation.program_correction import commanded
-from truearm.compensation.programs import BY_NAME
-from truearm.compensation.programs.motion_program import (
-    CircleMove,
-    JointMove,
-    MotionProgram,
-    Remark,
-    StraightMove,
-    Wait,
-)
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.urscript.measuring import FASTEST
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import rotation_from_vector, rotation_vector
-from truearm.planning.iso9283.criteria import TESTS
-from truearm.planning.iso9283.planned import PerformancePlan
-from truearm.planning.iso9283.way import Way
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs import BY_NAME
+from truearm.engine.programs.cell import Cell, read_tools
+from truearm.engine.programs.joint_speeds import fastest_point, known_speeds
+from truearm.engine.programs.new_program import CircleMove, JointMove, MotionProgram, Remark, StraightMove, Wait
+from truearm.engine.programs.program import Program, Source
+from truearm.engine.programs.urscript.new import FASTEST
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import rotation_from_vector, rotation_vector
+from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, Way
+from truearm.iso9283.plan.programs import measuring_programs
+from truearm.iso9283.plan.routes import Routes
 
 PLAN = small_plan(cycles=dict.fromkeys(TESTS, 2), velocities=(1.0, 0.1))
 TIP = 0.1

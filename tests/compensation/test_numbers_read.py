@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from tests.answered import compensate
 
-from truearm.compensation.programs import LANGUAGES
-from truearm.errors import InputError
-from truearm.library import load_robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs import LANGUAGES
+from truearm.engine.robot.library import load_robot
 
 READ = {
     "RAPID": [

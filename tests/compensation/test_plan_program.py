@@ -13,7 +13,9 @@ import pytest
 from tests.plan_tours import a_tour
 
 import truearm
-from truearm.compensation.joint_speeds import (
+from truearm.engine.motion.tour import Tour
+from truearm.engine.programs import BY_NAME
+from truearm.engine.programs.joint_speeds import (
     fastest_point,
     first_shares,
     joint_rates,
@@ -21,20 +23,17 @@ from truearm.compensation.joint_speeds import (
     speed_notices,
     speed_words,
 )
-from truearm.compensation.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
-from truearm.compensation.programs import BY_NAME
-from truearm.compensation.programs.motion_program import LONGEST_COMMENT, JointMove, MotionProgram, Wait, percent
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.urscript.measuring import FASTEST
-from truearm.library import library, load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.planning.driving.tour import Tour
-from truearm.simulation.moving.arm import DRIVES, MovingArm, last_moves
-from truearm.simulation.moving.interpolator import joint_move
-from truearm.simulation.truths import truth_twin
+from truearm.engine.programs.new_program import LONGEST_COMMENT, JointMove, MotionProgram, Wait, percent
+from truearm.engine.programs.program import Program, Source
+from truearm.engine.programs.urscript.new import FASTEST
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import library, load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.truths import truth_twin
+from truearm.iso9283.simulate.moving_arm import DRIVES, MovingArm, joint_move, last_moves
+from truearm.planning.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
 
 ROBOTS = {
     "rapid": "irb1600",

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from tests.answered import compensate
 
-from truearm.compensation.cell import Cell, Placed
-from truearm.compensation.chosen_targets import Choice
 from truearm.compensation.program_correction import commanded, corrected_programs
-from truearm.compensation.programs.fanuc_ls import FANUC_LS
-from truearm.compensation.programs.program import Configuration, Program, Source
-from truearm.compensation.programs.rapid import RAPID
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.cell import Cell, Placed
+from truearm.engine.programs.chosen_targets import Choice
+from truearm.engine.programs.fanuc_ls import FANUC_LS
+from truearm.engine.programs.program import Configuration, Program, Source
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
 
 JOINTS = "MoveAbsJ [[{},20,-10,0,45,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;"
 POSE = "MoveL [[{},0,400],[0.70710678,0,0.70710678,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0{};"

@@ -11,7 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from truearm.compensation.program_files import (
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.limits import VARIABLE
+from truearm.engine.programs.program import Edit
+from truearm.engine.programs.program_files import (
     ProgramFile,
     edited,
     program_files,
@@ -21,9 +24,6 @@ from truearm.compensation.program_files import (
     restored,
     write_programs,
 )
-from truearm.compensation.programs.program import Edit
-from truearm.errors import InputError
-from truearm.limits import VARIABLE
 
 POINT = b"  CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\r\n"
 MODULE = b"MODULE m\r\n  ! gr\xfc\xdfe\r\n" + POINT + b"ENDMODULE\r\n"

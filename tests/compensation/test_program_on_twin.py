@@ -10,23 +10,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.cell import Cell, Placed
-from truearm.compensation.chosen_targets import Choice
-from truearm.compensation.correction import Correction
-from truearm.compensation.fake_targets import matrices
-from truearm.compensation.gauge import best_agreement
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
 from truearm.compensation.program_correction import commanded, corrected_programs
-from truearm.compensation.program_files import edited
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.rapid import RAPID
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.modeling.inverse.branches import branch_rule
-from truearm.modeling.transform import Transform, quaternion_from_rotation
-from truearm.results.calibration import Calibration
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import PERFECT
+from truearm.engine.programs.cell import Cell, Placed
+from truearm.engine.programs.chosen_targets import Choice
+from truearm.engine.programs.correction import Correction
+from truearm.engine.programs.fake_targets import matrices
+from truearm.engine.programs.gauge import best_agreement
+from truearm.engine.programs.program import Program, Source
+from truearm.engine.programs.program_files import edited
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.robot.inverse.branches import branch_rule
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import PERFECT
 
 NOISE = 0.03e-3
 EVERY = Choice(joint_targets=True)
@@ -57,7 +57,7 @@ def plate(text: str) -> Program:
 
 
 def original() -> str:
-    return (files("truearm.examples") / "plate.mod").read_text()
+    return (files("truearm.starting.examples") / "plate.mod").read_text()
 
 
 def missed(twin: Twin, calibration: Calibration, program: Program, meant: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -17,19 +17,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tests.simulated import campaign
 
+from truearm.calibration.calibrate import calibrate
 from truearm.compensation.advice import check_correction
-from truearm.compensation.cell import Cell, Placed
-from truearm.compensation.chosen_targets import Choice
-from truearm.compensation.expected_errors import REPEATABILITY
-from truearm.compensation.gauge import flange_draws, flange_spread
 from truearm.compensation.program_correction import corrected_programs
-from truearm.compensation.programs.program import Source
-from truearm.compensation.programs.rapid import RAPID
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.programs.cell import Cell, Placed
+from truearm.engine.programs.chosen_targets import Choice
+from truearm.engine.programs.expected_errors import REPEATABILITY
+from truearm.engine.programs.gauge import flange_draws, flange_spread
+from truearm.engine.programs.program import Source
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
 
 ROBOTS: Final = 8
 #: alpha [deg], a [mm], zero [deg], d [mm] of the IRB 120 (Nubiola, Table 2.2).

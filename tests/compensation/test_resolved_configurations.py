@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.compensation.fake_targets import matrices
-from truearm.compensation.programs.program import ANY_POSTURE, Configuration
-from truearm.compensation.resolved_configurations import ON_EDGE, agrees, resolved_configurations
-from truearm.library import load_robot
-from truearm.modeling.inverse.branches import BRANCHES, branch_rule
-from truearm.modeling.robot import Robot
+from truearm.engine.programs.fake_targets import matrices
+from truearm.engine.programs.program import ANY_POSTURE, Configuration
+from truearm.engine.programs.resolved_configurations import ON_EDGE, agrees, resolved_configurations
+from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
 
 IRB120 = load_robot("irb120")
 UNKNOWN = np.full(6, np.nan)

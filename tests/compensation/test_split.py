@@ -11,18 +11,17 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 from tests.compensation.test_program_correction import FLANGE, worn
 
-from truearm.compensation.cell import Cell, Placed
-from truearm.compensation.fake_targets import nominal_robot
-from truearm.compensation.program_correction import corrected_programs
-from truearm.compensation.program_files import edited
-from truearm.compensation.program_poses import poses_of
-from truearm.compensation.programs.fanuc_ls import FANUC_LS
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.rapid import RAPID
-from truearm.compensation.split import MOST_SEGMENTS, ProgramSplit, split_program
-from truearm.library import load_robot
-from truearm.modeling.inverse.kinematics import inverse
-from truearm.modeling.transform import Transform
+from truearm.compensation.program_correction import MOST_SEGMENTS, ProgramSplit, corrected_programs, split_program
+from truearm.engine.programs.cell import Cell, Placed
+from truearm.engine.programs.fake_targets import nominal_robot
+from truearm.engine.programs.fanuc_ls import FANUC_LS
+from truearm.engine.programs.program import Program, Source
+from truearm.engine.programs.program_files import edited
+from truearm.engine.programs.program_poses import poses_of
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform
 
 IRB120 = worn(load_robot("irb120"), 2.0)
 AT_BASE = Cell(FLANGE.tools, {"": Placed(None, Transform())})

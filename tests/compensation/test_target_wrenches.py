@@ -10,15 +10,15 @@ import pytest
 from tests.compensation.test_program_on_twin import EVERY, HIGH, LOW, given, missed, original, plate
 from tests.identification.test_external_force import elastic_twin
 
-from truearm.compensation.cell import TargetWrench, read_wrenches
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
-from truearm.compensation.program_files import edited
-from truearm.compensation.target_wrenches import wrenches_of_targets
-from truearm.errors import InputError
-from truearm.jobs.calibrate import calibrate
-from truearm.modeling.wrench import Wrench
-from truearm.results.calibration import Calibration
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.cell import TargetWrench, read_wrenches
+from truearm.engine.programs.chosen_targets import wrenches_of_targets
+from truearm.engine.programs.program_files import edited
+from truearm.engine.robot.wrench import Wrench
+from truearm.engine.twin.twin import Twin, measure
 
 #: Half the rated load of the IRB 120.
 HALF = 0.5 * 3.0 * 9.80665

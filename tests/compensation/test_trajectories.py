@@ -10,18 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from truearm.compensation.trajectories import corrected, path_error
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.paths.joint_motion import JointMotion, joint_motion
-from truearm.planning.paths.paths import Circle, Line
-from truearm.planning.paths.time_law import timed
-from truearm.planning.paths.trajectory import Trajectory
-from truearm.simulation.twin import Twin
-from truearm.simulation.twin_joint import JointTruth
+from truearm.compensation.corrected_path import corrected, path_error
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.joint_motion import JointMotion, joint_motion
+from truearm.engine.motion.paths import Circle, Line, Trajectory, timed
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY, Transform
+from truearm.engine.twin.twin import Twin
+from truearm.engine.twin.twin_joint import JointTruth
 
 #: Tables 4.3 and 4.4 of the Katana thesis.
 COMPLIANCE = [math.radians(1 / k) / 9.80665 for k in (122, 90, 75, 78, 80)]

@@ -18,11 +18,10 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.executing import cluster
-from truearm.executing.cluster import Cluster, checked_address
-from truearm.executing.parts import done_parts
-from truearm.executing.workers import with_workers
+from truearm.engine.base import parts as cluster
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.parts import Cluster, checked_address, done_parts
+from truearm.engine.base.workers import with_workers
 
 SERIES = """\
 truearm: truearm-fleet/1

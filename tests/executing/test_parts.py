@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from tests.executing.dying import deadly_once, divided, doubled, thread_setting
 
-from truearm.errors import InputError
-from truearm.executing.parts import done_parts
-from truearm.executing.workers import Given, Processes, processes, with_workers
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.parts import done_parts
+from truearm.engine.base.workers import Given, Processes, processes, with_workers
 
 
 class Breaking(Executor):

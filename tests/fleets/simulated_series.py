@@ -12,13 +12,13 @@ from functools import cache
 
 import numpy as np
 
-from truearm.fleets.analysis.kind import Gathered, Kind
-from truearm.fleets.rows import FoundParameter, FoundParameters, Row
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.parameters import PLACES, Parameter
-from truearm.simulation.truths import DEFAULT_TOOL, at_station
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import PLACES, Parameter
+from truearm.engine.twin.truths import DEFAULT_TOOL, at_station
+from truearm.fleets.drift import Gathered, Kind
+from truearm.fleets.series import FoundParameter, FoundParameters, Row
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.fleets.analysis.accuracy import quantiles, share_interval
+from truearm.fleets.drift import quantiles, share_interval
 
 
 @pytest.mark.parametrize(("robots", "share"), [(20, 0.5), (100, 0.9), (100, 0.95)])

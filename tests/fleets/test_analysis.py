@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tests.fleets.simulated_series import campaign, rows
 
-from truearm.fleets.analysis.analysis import analysed
-from truearm.fleets.rows import Accuracy, FoundParameters, Row
-from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary
+from truearm.fleets.analysis import analysed
+from truearm.fleets.series import Accuracy, FoundParameters, Row
+from truearm.fleets.words import analysis_lines, analysis_notices, analysis_summary
 
 COUNT = len(campaign().own)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tests.fleets.simulated_series import calibrations, campaign, kind_of, rows
 
-from truearm.fleets.analysis.differing import differences
-from truearm.fleets.rows import FoundParameters
+from truearm.fleets.analysis import differences
+from truearm.fleets.series import FoundParameters
 
 COUNT = len(campaign().own)
 

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from tests.fleets.simulated_series import Calibrations, calibrations, campaign, kind_of, rows
 
-from truearm.fleets.analysis.analysis import analysed
-from truearm.fleets.analysis.differing import differences
-from truearm.fleets.analysis.drift import MONTH, Drifts, drifts
-from truearm.fleets.rows import FoundParameters, Row
-from truearm.modeling.chain import Array
-from truearm.results.fleet_words import analysis_notices
+from truearm.engine.robot.chain import Array
+from truearm.fleets.analysis import analysed, differences
+from truearm.fleets.drift import MONTH, Drifts, drifts
+from truearm.fleets.series import FoundParameters, Row
+from truearm.fleets.words import analysis_notices
 
 COUNT = len(campaign().own)
 NAMES = campaign().names

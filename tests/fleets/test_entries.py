@@ -9,10 +9,9 @@ from typing import Any
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.fleets.entries import robots_of
+from truearm.engine.base.errors import InputError
+from truearm.fleets.entries import OPTIONS, robots_of
 from truearm.fleets.manifest import read_manifest
-from truearm.fleets.options import OPTIONS
 
 HEADER = "name,robot,data,of,date,model,train,effects\n"
 

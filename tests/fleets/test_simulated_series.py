@@ -19,18 +19,15 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm import replacing
-from truearm.errors import InputError
+from truearm.engine.base import writing as replacing
+from truearm.engine.base.errors import InputError
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
 from truearm.fleets import recorded
-from truearm.fleets.experiment import experiment
-from truearm.fleets.manifest import read_manifest
+from truearm.fleets.manifest import experiment, read_manifest
 from truearm.fleets.recorded import Recorded
-from truearm.fleets.rows import Row
-from truearm.fleets.series import Experiment, ExperimentEntry, Series
-from truearm.identification.judging.monte_carlo import calibrated
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.results.fleet import Fleet, Run
+from truearm.fleets.result import Fleet, Run
+from truearm.fleets.series import Experiment, ExperimentEntry, Row, Series, calibrated
 
 ASKED = ExperimentEntry("irb120", 6, 15, 1, "geometric", 5e-5, 8, 3)
 
@@ -227,7 +224,7 @@ def test_a_part_that_is_not_as_it_was_written_is_named(
     part = out / "parts" / "0000" / "0000002.jsonl"
     part.write_text(DAMAGES[damage](part.read_text()))
     begun: list[object] = []
-    monkeypatch.setattr("truearm.jobs.fleet._computed", lambda *given: begun.append(given))
+    monkeypatch.setattr("truearm.fleets.fleet._computed", lambda *given: begun.append(given))
     told = refused(lambda: truearm.fleet(file, out=out, workers=1))
     assert (told.where, told.parameter, begun) == (str(part), "out", [])
 
@@ -317,7 +314,7 @@ def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
         plan.write_text(plan.read_text() + "\n")
         return experiment(asked, where)
 
-    monkeypatch.setattr("truearm.jobs.fleet.experiment", late)
+    monkeypatch.setattr("truearm.fleets.manifest.experiment", late)
     file = manifest(tmp_path, configurations="plan.csv")
     told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
     assert ("changed while it was read" in str(told), told.where) == (True, "plan.csv")
@@ -470,7 +467,7 @@ def test_one_of_several_does_the_parts(tmp_path: Path) -> None:
 
 
 def test_a_worker_with_another_version_is_refused() -> None:
-    from truearm.jobs.fleet_parts import Task, finished
+    from truearm.fleets.parts import Task, finished
 
     told = refused(lambda: finished(Task(0, "99.0")))
     assert (told.parameter, told.allowed) == ("scheduler", "99.0")

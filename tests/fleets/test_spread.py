@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from tests.fleets.simulated_series import calibrations, campaign, kind_of, rows
 
-from truearm.fleets.analysis.differing import differences
-from truearm.fleets.analysis.priors import with_proposed
-from truearm.fleets.analysis.spread import ParameterSpread, spreads
-from truearm.library import load_robot
-from truearm.modeling.formats.robot_file import read_robot, robot_text
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.fleets.analysis import ParameterSpread, differences, spreads, with_proposed
 
 COUNT = len(campaign().own)
 

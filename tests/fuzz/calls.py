@@ -14,8 +14,8 @@ from tests.fuzz.mutations import ODD, Random, damaged, one_of
 from tests.jobs.examples import EXAMPLES
 
 import truearm
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.robot import Robot
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.robot import Robot
 
 #: No number of these lets a job work for long: they are small, or no job can take them.
 _NUMBERS: Final = (math.nan, math.inf, -math.inf, 0, -1, 1, 2, 3, 0.5, -0.0, 1e-300, 1e300, 1e-6, 10**13, 10**400, True)

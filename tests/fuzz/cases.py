@@ -22,8 +22,8 @@ from tests.fuzz.readers import READERS
 
 import truearm
 from truearm import JOBS
-from truearm.errors import InputError
-from truearm.results.record import Record
+from truearm.engine.base.errors import InputError
+from truearm.engine.document.records import Record
 
 KINDS: Final = (*(f"read-{name}" for name in READERS), *(f"job-{name}" for name in JOBS), "command")
 

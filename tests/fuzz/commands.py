@@ -17,7 +17,7 @@ from typing import Final
 from tests.fuzz import samples
 from tests.fuzz.mutations import ODD, Random, damaged, one_of
 
-from truearm.cli import main
+from truearm.commands import main
 
 #: Words of a command; what is a sample is copied beside it.
 COMMANDS: Final[tuple[str, ...]] = (

@@ -10,47 +10,43 @@ from typing import Any, Final
 import numpy as np
 from ruamel.yaml import YAML
 
-from truearm.compensation.cell import read_frames, read_tools, read_wrenches
-from truearm.compensation.corrected_targets import LEDGER, known_by_ledger
-from truearm.compensation.program_files import program_files, read_programs, restored
-from truearm.errors import InputError
+from truearm.board.import_hand_eye import read_hand_eye
+from truearm.drawn_circle.import_circle import Page, read_drawn_circles
+from truearm.engine.base.errors import InputError
+from truearm.engine.choosing.zones import boxes_of, read_zones
+from truearm.engine.command.reading import load_robot
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.excluded import read_exclusions
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.readers.configurations import read_poses
+from truearm.engine.data.readers.mapping import MappingFile
+from truearm.engine.data.readers.robodk import read_robodk
+from truearm.engine.data.readers.table import read_table
+from truearm.engine.fit.bounds import read_bounds
+from truearm.engine.motion.constraints import read_constraints
+from truearm.engine.motion.path_file import read_path
+from truearm.engine.programs.cell import read_frames, read_tools, read_wrenches
+from truearm.engine.programs.corrected_targets import LEDGER, known_by_ledger
+from truearm.engine.programs.program_files import program_files, read_programs, restored
+from truearm.engine.robot.library import load_robot as of_library
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.fleets.manifest import read_manifest
-from truearm.identification.choosing.zone_boxes import boxes_of, read_zones
-from truearm.identification.solving.bounds import read_bounds
-from truearm.jobs.import_ur_kinematics import import_ur_kinematics
-from truearm.jobs.load_robot import load_robot
-from truearm.library import load_robot as of_library
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.excluded import read_exclusions
-from truearm.measurement.hexapod.sheet_reading import read_sheet
-from truearm.measurement.hexapod.sheets_together import together
-from truearm.measurement.hexapod.touches import read_touches
-from truearm.measurement.measuring.about import read_about
-from truearm.measurement.measuring.campaign import Campaign
-from truearm.measurement.measuring.reading_log import ReadingLog
-from truearm.measurement.measuring.readings import Quality
-from truearm.measurement.measuring.session import Session
-from truearm.measurement.measuring.watched_folder import WatchedFolder
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
-from truearm.measurement.readers.guessing.guess import guess_mapping
-from truearm.measurement.readers.hand_eye import read_hand_eye
-from truearm.measurement.readers.inclinations import inclinations_text, read_inclinations
-from truearm.measurement.readers.mapping import MappingFile
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.readers.performance_poses import read_attained_poses, read_pushes
-from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
-from truearm.measurement.readers.poses import read_poses
-from truearm.measurement.readers.robodk import read_robodk
-from truearm.measurement.readers.sockets import Apart, read_sockets
-from truearm.measurement.readers.table import read_table
-from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.robot import Robot
-from truearm.planning.constraints.constraints import read_constraints
-from truearm.planning.iso9283.plan_file import plan_text, read_cube, read_plan
-from truearm.planning.paths.path_file import read_path
-from truearm.validation.iso9283.alignment import read_alignment
+from truearm.hexapod.sheet import together
+from truearm.hexapod.sheet_reading import read_sheet, read_touches
+from truearm.importing.files import Apart, read_matrices, read_sockets
+from truearm.importing.guess import guess_mapping
+from truearm.inclinometers.reading import inclinations_text, read_inclinations
+from truearm.iso9283.criteria.alignment import read_alignment
+from truearm.iso9283.evaluate.reading import read_attained_poses, read_pushes
+from truearm.iso9283.evaluate.samples import read_path_samples, read_settling_samples
+from truearm.iso9283.plan.plan_file import plan_text, read_cube, read_plan
+from truearm.measuring.campaign import Campaign
+from truearm.measuring.reading_log import ReadingLog, read_about
+from truearm.measuring.session import Quality, Session
+from truearm.measuring.watched_folder import WatchedFolder
+from truearm.robot_files.formats import complete_dh_csv, read_dh_csv
+from truearm.robot_files.import_ur_kinematics import import_ur_kinematics
 
 
 @dataclass(frozen=True)

@@ -11,18 +11,17 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
+from papers.simulated import ballbar, measured_legs, measured_sides
 from tests.jobs.examples import EXAMPLES, performance_files
 from tests.measurement.test_fixture_rows import MIXED
 from tests.measurement.test_table import JOINTS, POINTS, SPATIAL
 
 import truearm
-from truearm.compensation.corrected_targets import LEDGER, LedgerEntry, remember
-from truearm.library import load_robot
-from truearm.measurement.hexapod.geometry import triangle
-from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet import PlannedRow, sheet_csv
-from truearm.modeling.parts import Joint
-from truearm.simulation.hexapod.simulated import ballbar, measured_legs, measured_sides
+from truearm.engine.data.hexapod import poses, triangle
+from truearm.engine.programs.corrected_targets import LEDGER, LedgerEntry, remember
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint
+from truearm.hexapod.sheet import PlannedRow, sheet_csv
 
 PROGRAMS = Path(__file__).parents[1] / "compensation" / "programs" / "samples"
 
@@ -198,7 +197,7 @@ def folder() -> Path:
     _rename(place, {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"})
     remember(place / LEDGER, [LedgerEntry(program="plate.mod", date="2026-11-27", robot="irb120", targets="AAAAAAAA")])
     for name in ("irb120", "kr5"):
-        (place / f"{name}.yaml").write_text((files("truearm.library") / f"{name}.yaml").read_text())
+        (place / f"{name}.yaml").write_text((files("truearm.engine.robot.library") / f"{name}.yaml").read_text())
     truearm.new_robot(place / "robot.yaml")
     truearm.export(place / "ur10-controller.yaml", "ur-kinematics", out=place / "ros-kinematics.yaml")
     for form, name in (("urdf", "arm.urdf"), ("dh", "dh.csv"), ("mdh", "mdh.csv"), ("hayati", "hayati.csv")):

@@ -13,7 +13,7 @@ from tests.fuzz import cases, regressions, samples, verdicts
 from tests.fuzz.mutations import damaged
 from tests.fuzz.readers import READERS
 
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 unix = pytest.mark.skipif(sys.platform == "win32", reason="processes are not forked there")

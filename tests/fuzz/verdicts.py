@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 
 #: Longest message that is still read.
 LONGEST: Final = 3000

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from truearm.cli import main
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text
+from truearm.commands import main
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,13 @@ from tests.honesty.telling import told, written
 from tests.simulated import campaign
 
 import truearm as package
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.results.standing import ResultKeptError
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
-from truearm.writing import write_files
+from truearm.calibration.parts import ResultKeptError
+from truearm.engine.base.writing import write_files
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 NOISE: Final = 2e-5
 #: Places of reflectors on the flange [m], some 40 mm from each other.
@@ -110,7 +110,7 @@ def test_a_fit_that_is_worse_than_the_nominal_robot_is_an_error(tmp_path: Path) 
     assert found.code == 3
     assert found.says("worse-than-nominal", "error", r"1 %\)"), found
     program = tmp_path / "plate.mod"
-    program.write_text((files("truearm.examples") / "plate.mod").read_text())
+    program.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     refused = told("compensate", tmp_path / "out" / "calibrated.yaml", program, "--out", tmp_path / "corrected")
     assert refused.code == 2
     assert "--accept worse-than-nominal" in refused.refusal

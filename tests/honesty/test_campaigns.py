@@ -13,9 +13,9 @@ import pytest
 from tests.honesty.telling import Told, told, written
 from tests.simulated import campaign
 
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.chain import Array
+from truearm.engine.twin.twin import Twin, measure
 
 CONFIGURATIONS: Final = 24
 HALF: Final = CONFIGURATIONS // 2

@@ -15,18 +15,17 @@ from tests.answered import compensate
 from tests.simulated import campaign, more_of
 
 import truearm
-from truearm.compensation.cell import Cell, read_frames, read_tools
-from truearm.compensation.corrected_targets import LEDGER
-from truearm.compensation.gauge import best_agreement
 from truearm.compensation.program_correction import commanded, corrected_programs
-from truearm.compensation.program_files import edited
-from truearm.compensation.programs.marks import MARK
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.rapid import RAPID
-from truearm.errors import InputError
-from truearm.modeling.transform import Transform
-from truearm.results.program_correction import ProgramCorrection
-from truearm.simulation.twin import Twin
+from truearm.compensation.result import ProgramCorrection
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.cell import Cell, read_frames, read_tools
+from truearm.engine.programs.corrected_targets import LEDGER
+from truearm.engine.programs.gauge import best_agreement
+from truearm.engine.programs.program import MARK, Program, Source
+from truearm.engine.programs.program_files import edited
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.twin import Twin
 
 NOISE = 2e-5
 CELL = """\
@@ -83,7 +82,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
     twin, data = campaign("irb120", 60, NOISE, 3)
     for name, readings in (("first", data), ("second", more_of(twin, 60, NOISE, 4))):
         truearm.calibrate("irb120", readings, out=folder / name)
-    (folder / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text())
+    (folder / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     place = (
         twin.robot.base.matrix @ best_agreement(twin.robot)[0] @ read(folder / "plate.mod").frames["wobjPlate"].matrix
     )
@@ -118,7 +117,7 @@ def reformatted(text: str) -> str:
 
 def some_targets(text: str) -> str:
     """Return it as another program that has taken two of its targets over: the rest are the original ones."""
-    original = (files("truearm.examples") / "plate.mod").read_text()
+    original = (files("truearm.starting.examples") / "plate.mod").read_text()
     for name in ("pHole3", "pHole7"):
         taken = re.search(rf"{name}:=(.*);", text)
         assert taken is not None

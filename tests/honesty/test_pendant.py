@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import quaternion_from_rotation
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import quaternion_from_rotation
 
 ROBOT: Final = "lrmate200ic"
 #: What the real arm differs by: three lengths [m] and three turns [rad] behind each of seven frames.

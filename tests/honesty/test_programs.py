@@ -14,7 +14,7 @@ from tests.answered import ANSWERS
 from tests.honesty.telling import Told, told, written
 from tests.simulated import campaign
 
-from truearm.simulation.twin import measure
+from truearm.engine.twin.twin import measure
 
 NOISE: Final = 2e-5
 
@@ -22,7 +22,7 @@ NOISE: Final = 2e-5
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("programs")
-    (made / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text())
+    (made / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     return made
 
 

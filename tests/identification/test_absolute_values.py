@@ -9,27 +9,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+from papers.li_table.arm import BOUNDS, CAMERA, TIP, arm, believed, board, fit, tables, touched_by_hand, truth
 from tests.simulated import campaign
 
-from truearm.errors import InputError
-from truearm.identification.held import Held
-from truearm.identification.judging.expected_error import expected_error
-from truearm.identification.solving.bootstrap import refit_draws
-from truearm.identification.solving.componentwise import least_absolute
-from truearm.identification.solving.fit import Fit, Status, identify
-from truearm.identification.solving.models import named_model
-from truearm.identification.solving.problem import Problem
-from truearm.identification.solving.rounds import find_parameters
-from truearm.identification.solving.solver import solve
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.simulate import simulate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.parameters import FreeParameters
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY
-from truearm.simulation.twin import Twin, measure
-from truearm.studies.li_table.arm import BOUNDS, CAMERA, TIP, arm, believed, board, fit, tables, touched_by_hand, truth
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.fit.fit import Fit, Status, identify, refit_draws
+from truearm.engine.fit.held import Held
+from truearm.engine.fit.models import named_model
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.rounds import find_parameters
+from truearm.engine.fit.solver import least_absolute, solve
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import FreeParameters
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.twin import Twin, measure
+from truearm.simulation.simulate import simulate
 
 KNOWN = Held(IDENTITY, {TIP: IDENTITY})
 OFFSETS, GEOMETRIC = named_model("offsets"), named_model("geometric")
@@ -38,7 +36,7 @@ OFFSETS, GEOMETRIC = named_model("offsets"), named_model("geometric")
 @cache
 def rolled(seed: int = 3) -> tuple[Robot, Dataset]:
     """Return Li's arm as a twin, and what its rolled table reads in the base frame."""
-    from truearm.simulation.devices.calibration_table import CalibrationTable
+    from truearm.engine.twin.devices.calibration_table import CalibrationTable
 
     rng = np.random.default_rng(seed)
     twin = truth(arm(), rng)

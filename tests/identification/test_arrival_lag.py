@@ -11,14 +11,14 @@ import pytest
 from tests.simulated import campaign
 
 from truearm import Dataset, calibrate, load_robot
-from truearm.identification.judging.arrival_lag import check_arrival_lag
-from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import named_model
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.diagnose.arrivals import check_arrival_lag
+from truearm.engine.diagnose.unmodelled import LeftOver
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 
 def late(true: Robot, data: Dataset, lag: float | Array) -> Dataset:

@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.arrival_likelihood import joints_as_far_off
-from truearm.identification.judging.joint_rounding import check_rounding, step_of
-from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.judging.separate_visits import check_separate_visits
-from truearm.identification.judging.sigma import check_sigma_beside_joints
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.simulation.twin import measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.arrivals import check_separate_visits, check_sigma_beside_joints, joints_as_far_off
+from truearm.engine.diagnose.plausibility import check_rounding, step_of
+from truearm.engine.diagnose.unmodelled import LeftOver
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.twin import measure
 
 NOISE = 2e-5
 

@@ -10,22 +10,20 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.modeling.test_joint_errors import with_table_3
 
-from truearm.errors import InputError
-from truearm.identification.axes.analysis import AxisAnalysis, analyse
-from truearm.identification.axes.circles import AxisProblem, axis_circles
-from truearm.identification.axes.fit import NORMAL_95, fit_axes
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.conversion import converted
-from truearm.modeling.lines import base_and_flange, frame_between, joint_axes
-from truearm.modeling.parameters import FreeParameters
-from truearm.modeling.transform import IDENTITY
-from truearm.results.axis_calibration import AxisCalibration
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.axis_circles.axes import AxisCalibration
+from truearm.axis_circles.fit import NORMAL_95, AxisAnalysis, AxisProblem, analyse, axis_circles, fit_axes
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.conversion import converted
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.lines import base_and_flange, frame_between, joint_axes
+from truearm.engine.robot.parameters import FreeParameters
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import JointTruth
 
 
 def runs(step: float = 6.0, posture: tuple[float, ...] = (0, 0, 0, 0, 30, 0)) -> Array:

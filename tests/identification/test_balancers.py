@@ -11,13 +11,13 @@ import pytest
 from tests.modeling.test_balancers import ARM, PULL
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.formats.robot_file import read_robot
-from truearm.modeling.robot import Robot
-from truearm.results.calibration import Calibration
-from truearm.simulation.truths import joint_truths
-from truearm.simulation.twin import Twin, measure
+from truearm.calibration.result import Calibration
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.twin.truths import joint_truths
+from truearm.engine.twin.twin import Twin, measure
 
 #: Of joints 1 to 6 [rad/(N m)], as stiff as such arms are.
 COMPLIANCE = (3.8e-6, 3e-7, 4e-7, 3e-6, 3.3e-6, 2.4e-6)

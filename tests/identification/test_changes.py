@@ -11,19 +11,18 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.errors import InputError
-from truearm.identification.judging.changes import check_changes, find_change
-from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import rotation_from_vector
-from truearm.notices import Notice
-from truearm.simulation.twin import Twin
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.changes import check_changes, find_change
+from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import rotation_from_vector
+from truearm.engine.twin.twin import Twin
+from truearm.importing.files import read_matrices
 
 FIRST_MOVED = 23
 

@@ -10,18 +10,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.identification.judging.advice import check_fit
-from truearm.identification.judging.expected_error import expected_error
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rigid_motion
-from truearm.simulation.devices import in_view_of, measured_with, named_device, seen_by
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.advice import check_fit
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import rigid_motion
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import in_view_of, measured_with, seen_by
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
 
 IRB120 = load_robot("irb120")
 GEOMETRIC = named_model("geometric")

@@ -8,15 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.identification.solving.componentwise import least_absolute
-from truearm.identification.solving.problem import Problem
-from truearm.identification.solving.solver import solve
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.parameters import FreeParameters
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.solver import least_absolute, solve
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import FreeParameters
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.twin import Twin, measure
 
 
 def arm() -> Robot:

@@ -8,20 +8,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from truearm.identification.judging.curve_range import check_curves
-from truearm.identification.judging.curves_of_loads import check_curves_of_loads, share_of_loads
-from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.judging.step_words import other_model
-from truearm.identification.judging.unmodelled import Explanation
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.parts import LinkMass, Payload
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.curves import check_curves, check_curves_of_loads, share_of_loads
+from truearm.engine.diagnose.next_steps import other_model
+from truearm.engine.diagnose.unmodelled import Explanation, LeftOver
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import LinkMass, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.engine.twin.twin_joint import JointTruth
 
 CURVES = named_model("geometric").also(["joint-curve"])
 

@@ -8,19 +8,20 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.error_budget import ErrorBudget, error_budget
-from truearm.identification.judging.expected_error import expected_error
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.table_motion import table_motion, without_table_motion
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import rotation_from_vector
-from truearm.results.budgets import budget_lines, budget_summary
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.calibration.parts import budget_lines, budget_summary
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import table_motion, without_table_motion
+from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import rotation_from_vector
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 MODEL = {model.name: model for model in MODELS}
 ROBOT = load_robot("irb120")

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from tests.simulated import more_of
 
-from truearm.identification.solving.fit import Fit, Status, identify
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.redundancy import Redundancy
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.conversion import CONVERSIONS, converted
-from truearm.modeling.formats import dh_table
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import Fit, Status, identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.problem import Redundancy
+from truearm.engine.robot import dh_table
+from truearm.engine.robot.conversion import CONVERSIONS, converted
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
 GUIDE = Path(__file__).parents[2] / "docs" / "guide" / "conventions.md"

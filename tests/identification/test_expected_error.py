@@ -12,19 +12,20 @@ import pytest
 from scipy.special import chdtri, fdtri
 from tests.simulated import campaign
 
-from truearm.identification.judging.expected_error import as_residuals_allow, expected_error, expected_map
-from truearm.identification.solving.fit import Fit, Status, identify
-from truearm.identification.solving.models import FRAMES, MODELS, Model
-from truearm.identification.solving.variance_components import CovariancePart
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.robot import Robot
-from truearm.results.calibration import Calibration
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.expected_error import as_residuals_allow, expected_error, expected_map
+from truearm.engine.fit.fit import Fit, Status, identify
+from truearm.engine.fit.models import FRAMES, MODELS, Model
+from truearm.engine.fit.variance_components import CovariancePart
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 MODEL: Mapping[str, Model] = {m.name: m for m in (FRAMES, *MODELS)}
 IRB120 = load_robot("irb120")

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.identification.judging.external_force import check_force
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.modeling.wrench import Wrench
-from truearm.notices import Notice
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import PERFECT
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import Notice
+from truearm.engine.diagnose.external_force import check_force
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.robot.wrench import Wrench
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import PERFECT
 
 LOW, HIGH = np.radians([[-90, 0, -80, -150, -90, -180], [90, 110, 70, 150, 90, 180]])
 SIDEWAYS = Wrench((0.0, 14.0, 0.0))

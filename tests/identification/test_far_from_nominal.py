@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.solving.rounds import Redundant
-from truearm.jobs.calibrate import calibrate
-from truearm.measurement.dataset import Dataset
-from truearm.notices import Notice
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import Notice
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.rounds import Redundant
 
 
 def noted(robot: str, data: Dataset, redundancy: Redundant = "prior") -> list[Notice]:

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.few_readings import FEW_READINGS, check_few_readings
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import named_model
-from truearm.identification.solving.problem import Problem
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.check import check
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
+from truearm.calibration.calibrate import calibrate
+from truearm.checking.check import check
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.models import named_model
+from truearm.engine.fit.problem import Problem
+from truearm.engine.robot.library import load_robot
 
 NOISE = 0.02e-3
 

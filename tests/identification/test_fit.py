@@ -9,18 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.simulated import campaign, more_of
 
-from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Fit, Status, identify
-from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import MODELS, Model
-from truearm.identification.solving.problem import Problem
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Payload
-from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
-from truearm.simulation.truths import truth_twin
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.fit.fit import Fit, Status, identify
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.models import MODELS, Model
+from truearm.engine.fit.problem import Problem
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
+from truearm.engine.twin.truths import truth_twin
 
 BY_NAME = {m.name: m for m in MODELS}
 GEOMETRIC = BY_NAME["geometric"]

@@ -7,10 +7,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from truearm.identification.choosing.folds import FOLDS, draws_of, folds_of, layout_of
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
+from truearm.engine.choosing.cross_validation import FOLDS, draws_of, folds_of, layout_of
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
 
 
 def dataset(joints: Array, *, ordered: bool = True) -> Dataset:

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from truearm.identification.judging.found_curves import FoundCurve, found_curves
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.effects.joint_curve import curve_names
-from truearm.results.curves import curve_lines, curves_summary
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.calibration.parts import curve_lines, curves_summary
+from truearm.engine.diagnose.curves import FoundCurve, found_curves
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects.joint_curve import curve_names
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 TURN = (-math.pi, math.pi)
 

@@ -7,12 +7,12 @@ import pytest
 from tests.arms import ARMS
 from tests.simulated import campaign
 
-from truearm.errors import InputError
-from truearm.identification.solving.fit import place
-from truearm.identification.start_values.frames import errors_of_placed, initial_frames, placed_errors
-from truearm.library import load_robot
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.transform import Transform, quaternion_from_rotation
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import place
+from truearm.engine.fit.frames import errors_of_placed, initial_frames, placed_errors
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation
 
 
 @pytest.mark.parametrize("name", ARMS)

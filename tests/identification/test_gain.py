@@ -9,10 +9,10 @@ import pytest
 from tests.simulated import campaign
 
 import truearm
-from truearm.identification.judging.gain import check_gain, signed_rank_probability
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import Errors
-from truearm.modeling.chain import Array
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import Errors
+from truearm.engine.diagnose.gain import check_gain, signed_rank_probability
+from truearm.engine.robot.chain import Array
 
 
 @pytest.mark.parametrize("seed", range(4))

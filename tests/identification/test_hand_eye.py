@@ -26,18 +26,18 @@ from tests.hand_eye import (
 )
 
 import truearm
-from truearm.identification.solving.fit import Status, identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.hand_eye import read_hand_eye
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array, Chain, Element
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rigid_motion
-from truearm.results.hand_eye import ImportedHandEye
+from truearm.board.import_hand_eye import ImportedHandEye, read_hand_eye
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import Status, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array, Chain, Element
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform, rigid_motion
 
 UR5E = load_robot("ur5e")
 GEOMETRIC = named_model("geometric")
@@ -178,7 +178,7 @@ def test_a_scale_that_is_not_known_exactly_is_a_parameter(tmp_path: Path) -> Non
 
 
 def test_the_scale_moves_readings_as_its_derivative_says() -> None:
-    from truearm.identification.solving.problem import Problem
+    from truearm.engine.fit.problem import Problem
 
     _, q, _, _ = campaign("camera", 0)
     robot = UR5E.with_frames(Transform((0.1, 0.2, 0.3)), {"tip": (0.1, 0.0, 0.2)}).with_scale(1e-3)

@@ -10,13 +10,13 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.tilting import JOINTS, TRUTH, tilting_katana
 
-from truearm.identification.inclinometers.inclination import inclination_derivatives, inclinations_of, link_ends
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.simulation.inclinometer import inclinations
-from truearm.simulation.twin import Twin
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.twin import Twin
+from truearm.inclinometers.fit import inclination_derivatives, inclinations_of, link_ends
+from truearm.inclinometers.pairs import inclinations
 
 RNG = np.random.default_rng
 

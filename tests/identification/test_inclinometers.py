@@ -9,19 +9,18 @@ import numpy as np
 import pytest
 from tests.tilting import DEGREE, RESOLUTION, TRUTH, tilting_katana
 
-from truearm.errors import InputError
-from truearm.identification.inclinometers.fit import TiltingFit, calibrate_tilting
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.inclinometer import InclinometerReadings, Pairs, deviation_of_change
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rotation_from_quaternion
-from truearm.planning.choosing.inclinometer import TiltingPlan, plan_tilting
-from truearm.simulation.inclinometer import compare, inclinations, measure_pairs
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.inclinations import InclinometerReadings, Pairs, deviation_of_change
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import rotation_from_quaternion
+from truearm.engine.twin.twin import Twin, measure
+from truearm.inclinometers.fit import TiltingFit, calibrate_tilting
+from truearm.inclinometers.pairs import TiltingPlan, compare, inclinations, measure_pairs, plan_tilting
 
 KATANA = load_robot("katana450")
 

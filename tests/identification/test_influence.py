@@ -5,15 +5,15 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from papers.katana.robot import NAMES, PERTURBATIONS
 from tests.katana import katana
 
-from truearm.errors import InputError
-from truearm.identification.solving.influence import Influence, influence
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
-from truearm.studies.katana.robot import NAMES, PERTURBATIONS
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
+from truearm.simulation.influences import Influence, influence
 
 HALF = math.radians(0.025)
 EIGHTY = math.radians(80)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.one_sided import check_one_sided
-from truearm.identification.judging.repeatability import repeatability
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.curves import check_one_sided
+from truearm.engine.diagnose.gain import repeatability
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
 
 BY_NAME = {model.name: model for model in MODELS}
 GEOMETRIC = BY_NAME["geometric"]

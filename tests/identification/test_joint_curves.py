@@ -11,24 +11,24 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
-from truearm.identification.judging.advice import check_fit
-from truearm.identification.judging.curve_range import check_curves
-from truearm.identification.judging.expected_error import expected_error
-from truearm.identification.judging.narrow_data import check_narrow_data
-from truearm.identification.solving.curve_stiffness import curve_variances, moments_without
-from truearm.identification.solving.fit import Fit, Status, identify
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.effects.joint_curve import curve_names, curve_waves
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import PERFECT, JointTruth
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.advice import check_fit
+from truearm.engine.diagnose.curves import check_curves
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.diagnose.narrow_data import check_narrow_data
+from truearm.engine.fit.curves import curve_variances, moments_without
+from truearm.engine.fit.fit import Fit, Status, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects.joint_curve import curve_names, curve_waves
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import PERFECT, JointTruth
 
 GEOMETRIC, ELASTIC = named_model("geometric"), named_model("elastic")
 CURVED = GEOMETRIC.also(["joint-curve"])

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.errors import InputError
-from truearm.identification.judging.advice import check_fit
-from truearm.identification.judging.expected_error import expected_error
-from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import MODELS, Model
-from truearm.library import load_robot
-from truearm.measurement.checks import check_data
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.parts import Payload
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.checks import check_data
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.advice import check_fit
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import MODELS, Model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.engine.twin.twin_joint import JointTruth
 
 MODEL = {model.name: model for model in MODELS}
 TOOL = Payload(2.7, (0.05, 0.025, 0.1))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.identification.choosing.linear_cross_validation import Extensions, LinearFit
-from truearm.modeling.chain import Array
+from truearm.engine.choosing.cross_validation import Extensions, LinearFit
+from truearm.engine.robot.chain import Array
 
 ROWS, COLUMNS, MORE, FOLDS = 60, 8, 5, 5
 

@@ -8,13 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from truearm.identification.solving.fit import Fit, Status, identify
-from truearm.identification.solving.losses import Loss, norms_of, robust_scale, weights
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset, IntArray
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import truth_twin
+from truearm.engine.data.dataset import Dataset, IntArray
+from truearm.engine.fit.fit import Fit, Status, identify
+from truearm.engine.fit.losses import Loss, norms_of, robust_scale, weights
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import truth_twin
 
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
 

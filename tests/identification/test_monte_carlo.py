@@ -6,18 +6,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from truearm.identification.judging.monte_carlo import MonteCarlo, monte_carlo
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.problem import Problem
-from truearm.identification.solving.solver import solve
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.solver import solve
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.fleets.series import MonteCarlo, monte_carlo
 
 BY_NAME = {m.name: m for m in MODELS}
 SIGMA = 0.05e-3

@@ -12,26 +12,25 @@ import pytest
 from tests.identification.test_arrival_lag import ON_A_TRACK
 from tests.simulated import campaign
 
-from truearm.identification.judging.curve_range import about_curves
-from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
-from truearm.identification.judging.next_steps import _after, _end, steps_after_check
-from truearm.identification.judging.off_configurations import off_configurations
-from truearm.identification.judging.unmodelled import explanation
-from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Status, identify
-from truearm.identification.solving.models import named_model
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.check import check
-from truearm.jobs.simulate import simulate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.parts import Payload
-from truearm.notices import Notice
-from truearm.results.calibration import Calibration
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
+from truearm.checking.check import check
+from truearm.engine.base.errors import Notice
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.curves import about_curves
+from truearm.engine.diagnose.next_step import MOST, NextStep, most_useful_first
+from truearm.engine.diagnose.next_steps import _after, _end, steps_after_check
+from truearm.engine.diagnose.off_configurations import off_configurations
+from truearm.engine.diagnose.unmodelled import LeftOver, explanation
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.fit.fit import Status, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import JointTruth
+from truearm.simulation.simulate import simulate
 
 NOISE, POSES = 0.02e-3, 60
 LOAD = Payload(2.0, (0.02, -0.01, 0.08))
@@ -375,7 +374,7 @@ def test_more_configurations_come_after_a_model_that_gains_far_more() -> None:
 def test_curves_that_leave_few_equations_are_no_lack_of_readings(monkeypatch: pytest.MonkeyPatch) -> None:
     data = elastic(poses=14)
     fit = identify(load_robot("irb120").with_payload(LOAD), data, named_model("elastic"))
-    monkeypatch.setattr("truearm.identification.judging.next_steps.has_curves", lambda _: True)
+    monkeypatch.setattr("truearm.engine.diagnose.curves.has_curves", lambda _: True)
     said = _end(LeftOver.of(fit, data)).message
     assert "The curves leave too few equations" in said
     assert "too few readings" not in said

@@ -10,22 +10,22 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.implausible import implausible
-from truearm.identification.judging.orientation_slips import orientation_slips
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.check import check
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.mapping_entries import AnglesEntry
-from truearm.measurement.readers.orientation_columns import quaternions_of_angles
-from truearm.modeling.orientations import turned_about
-from truearm.modeling.transform import (
+from truearm.calibration.calibrate import calibrate
+from truearm.checking.check import check
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.mapping import AnglesEntry
+from truearm.engine.data.readers.row_values import quaternions_of_angles
+from truearm.engine.diagnose.slip_trials import orientation_slips
+from truearm.engine.diagnose.wrong_robot import implausible
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import (
     quaternion_from_rotation,
     rotation_from_quaternion,
     rotation_from_vector,
     rotation_vector,
+    turned_about,
 )
 
 ROBOT = "irb120"

@@ -11,15 +11,15 @@ from tests.identification.test_two_sockets import NOMINAL
 from tests.identification.test_two_sockets import campaign as two_sockets
 from tests.simulated import campaign
 
-from truearm.identification.solving import likelihood, problem
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.problem import Problem
-from truearm.identification.solving.solver import solve
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit import likelihood, problem
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.solver import solve
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 MODEL = {model.name: model for model in MODELS}
 IRB120 = load_robot("irb120")

@@ -7,23 +7,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from papers.katana.robot import NAMES, PERTURBATIONS, UNITS
 from tests.katana import UNIT, drawn, katana, readings, values
 
-from truearm.errors import InputError
-from truearm.identification.solving.influence import influence
-from truearm.identification.solving.pose_by_pose import (
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.twin import Twin
+from truearm.simulation.influences import (
     Combination,
     PoseByPose,
+    influence,
     influence_based,
     least_squares,
     minimum_norm,
 )
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.simulation.twin import Twin
-from truearm.studies.katana.robot import NAMES, PERTURBATIONS, UNITS
 
 NOISE = 1e-5
 Method = Callable[..., PoseByPose]

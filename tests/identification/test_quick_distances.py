@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.identification.start_values.quick_distances import quick_misfit
-from truearm.jobs.check import check
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import truth_twin
+from truearm.checking.check import check
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.slips import quick_misfit
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import truth_twin
 
 ROBOT = load_robot("irb120")
 

@@ -8,14 +8,14 @@ import pytest
 from tests.arms import ARMS
 from tests.simulated import campaign, more_of
 
-from truearm.errors import InputError
-from truearm.identification.held import NOTHING_HELD, Held
-from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Fit, Status, identify
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.rounds import Redundant
-from truearm.library import load_robot
-from truearm.measurement.statistics import errors_of
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.fit.fit import Fit, Status, identify
+from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.rounds import Redundant
+from truearm.engine.robot.library import load_robot
 
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
 

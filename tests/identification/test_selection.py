@@ -11,30 +11,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.identification.choosing import chosen_fit
-from truearm.identification.choosing.candidates import SELECTABLE
-from truearm.identification.choosing.choice import Selection
-from truearm.identification.choosing.chosen_fit import check_choice, identify_chosen
-from truearm.identification.choosing.search import Gain, complete, with_bases, without
-from truearm.identification.choosing.selection import select
-from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Fit, Status, identify
-from truearm.identification.solving.models import MODELS
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.validate import validate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.effects import EFFECTS
-from truearm.modeling.parts import LinkMass, Payload
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import PERFECT, JointTruth
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import InputError
+from truearm.engine.choosing import chosen_fit
+from truearm.engine.choosing.candidates import SELECTABLE
+from truearm.engine.choosing.chosen_fit import check_choice, identify_chosen
+from truearm.engine.choosing.search import Gain, complete, with_bases, without
+from truearm.engine.choosing.selection import Selection, select
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.fit.fit import Fit, Status, identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import LinkMass, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import PERFECT, JointTruth
+from truearm.validation.validate import validate
 
 #: The module, whose name the job of the same name hides.
-calibrating = import_module("truearm.jobs.calibrate")
+calibrating = import_module("truearm.calibration.calibrate")
 NOISE = 2e-5
 ELASTIC = next(model for model in MODELS if model.name == "elastic")
 
@@ -191,7 +190,7 @@ def test_the_order_of_trials_makes_no_difference_where_there_are_too_many_to_try
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     data, every = with_play()
-    monkeypatch.setattr("truearm.identification.choosing.search._ALL", 1)
+    monkeypatch.setattr("truearm.engine.choosing.search._ALL", 1)
     assert select(arm(), data, candidates=FEW).model.effects == every.model.effects
 
 
@@ -431,7 +430,7 @@ def test_curves_whose_size_cannot_be_found_are_left_out(monkeypatch: pytest.Monk
     def without_maximum(*_: Any, **__: Any) -> Any:
         raise np.linalg.LinAlgError("Matrix is not positive definite")
 
-    monkeypatch.setattr("truearm.identification.choosing.candidates.curve_variances", without_maximum)
+    monkeypatch.setattr("truearm.engine.fit.curves.curve_variances", without_maximum)
     chosen = select(arm(), seen(twin_of(), 20, 8), candidates=("joint-curve",))
     assert "joint-curve" not in chosen.model.effects
     assert reason(chosen, "joint-curve") == "what is left over does not repeat with the joints' angles"
@@ -468,7 +467,7 @@ def test_curves_of_few_configurations_are_borne_out_by_fits(monkeypatch: pytest.
     twin = replace(plain, joints={n: replace(plain.joints.get(n, PERFECT), gear=gear) for n, gear in gears.items()})
     data = seen(twin, 60, 8)
     monkeypatch.setattr(  # as where the weights of the fit without curves hide most of what they gain
-        "truearm.identification.choosing.selection._Choice._errors_of_curves",
+        "truearm.engine.choosing.selection._Choice._errors_of_curves",
         lambda self, search, chosen: 0.999 * search.errors(search.best({*self.reasons, "joint-curve"})),
     )
     chosen = select(arm(), data, candidates=("joint-curve",))

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.judging.sigma import check_sigma
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import named_model
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.notices import Notice
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import Notice
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.arrivals import check_sigma
+from truearm.engine.diagnose.unmodelled import LeftOver
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
 
 
 def declaring(data: Dataset, factor: float) -> Dataset:

@@ -11,24 +11,21 @@ import pytest
 from numpy.typing import NDArray
 from tests.simulated import campaign
 
-from truearm.errors import InputError
-from truearm.identification.judging.simulated_calibrations import (
-    SimulatedCalibrations,
-    check_linear,
-    simulated_calibrations,
-)
-from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.rounds import Redundant
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.parameters import PLACES
-from truearm.results.simulated import simulated_lines
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.parts import simulated_lines
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations, check_linear, simulated_calibrations
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.rounds import Redundant
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import PLACES
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 ROBOT = load_robot("irb120")
 MODEL = {model.name: model for model in MODELS}

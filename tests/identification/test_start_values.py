@@ -7,23 +7,23 @@ from functools import cache
 
 import numpy as np
 import pytest
+from papers.katana.tilting import twin as tilting_twin
 
-from truearm.errors import InputError
-from truearm.identification.solving.fit import Status, identify
-from truearm.identification.solving.models import FRAMES, MODELS
-from truearm.identification.solving.redundancy import gauge_freedoms
-from truearm.identification.start_values.from_readings import start_from_readings, unanchored
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.simulation.devices import DEVICES, measured_with, named_device
-from truearm.simulation.devices.device import recorded
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
-from truearm.studies.katana.tilting import twin as tilting_twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import Status, identify
+from truearm.engine.fit.models import FRAMES, MODELS
+from truearm.engine.fit.problem import gauge_freedoms
+from truearm.engine.fit.start_values import start_from_readings, unanchored
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.devices import DEVICES, named_device
+from truearm.engine.twin.devices.device import measured_with, recorded
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
 
 NOMINAL = load_robot("irb120")
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]

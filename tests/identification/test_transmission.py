@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.identification.judging.transmission import check_transmission, periodic_errors
-from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import MODELS, named_model
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import PERFECT, JointTruth
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.models import MODELS, named_model
+from truearm.engine.fit.transmission import check_transmission, periodic_errors
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import PERFECT, JointTruth
 
 ELASTIC = next(model for model in MODELS if model.name == "elastic")
 

@@ -8,21 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.solving.fit import Status, identify
-from truearm.identification.solving.models import named_model
-from truearm.identification.solving.redundancy import gauge_freedoms
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rigid_motion
-from truearm.simulation.devices import in_view_of, measured_with, named_device
-from truearm.simulation.devices.device import Arm
-from truearm.simulation.devices.touching import TwoSockets
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.unmodelled import LeftOver
+from truearm.engine.fit.fit import Status, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.fit.problem import gauge_freedoms
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import rigid_motion
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import Arm, in_view_of, measured_with
+from truearm.engine.twin.devices.touching import TwoSockets
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
+from truearm.engine.twin.twin_joint import JointTruth
 
 TOOL = "0.5kg,0mm,0mm,60mm"
 #: About what strain wave gears with a torque sensor give way [rad/(N m)].

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from truearm.identification.judging.unmodelled import _judged, _Remainder
+from truearm.engine.diagnose.unmodelled import _judged, _Remainder
 
 
 def test_products_of_columns_and_of_rows_tell_the_same() -> None:

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from scipy.special import stdtrit
 
-from truearm.identification.solving.arrivals import Arrivals, Whitening
-from truearm.identification.solving.cluster_covariance import cluster_covariance
-from truearm.identification.solving.likelihood import Likelihood, Linearised, Moments
-from truearm.identification.solving.losses import Loss, pulls
-from truearm.identification.solving.variance_components import Components, variance_components
-from truearm.modeling.chain import Array
+from truearm.engine.fit.likelihood import Arrivals, Likelihood, Linearised, Moments, Whitening
+from truearm.engine.fit.losses import Loss, pulls
+from truearm.engine.fit.variance_components import Components, cluster_covariance, variance_components
+from truearm.engine.robot.chain import Array
 
 ARRIVALS, READINGS = 12, 5
 

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 from tests.lookalikes import PAIRS, campaign_of, sized
 
-from truearm.identification.judging.wrong_robot import Lengths, check_robot
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import named_model
-from truearm.identification.solving.rounds import Redundant
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.check import check
-from truearm.jobs.simulate import simulate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import read_csv
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.modeling.robot import Robot
-from truearm.notices import Notice
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.calibration.calibrate import calibrate
+from truearm.checking.check import check
+from truearm.engine.base.errors import Notice
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import read_csv
+from truearm.engine.diagnose.wrong_robot import Lengths, check_robot
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.models import named_model
+from truearm.engine.fit.rounds import Redundant
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.importing.files import read_matrices
+from truearm.simulation.simulate import simulate
 
 GEOMETRIC = named_model("geometric")
 UR10, UR10E = load_robot("ur10"), load_robot("ur10e")

@@ -7,17 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.identification.choosing.zones import Zones, identify_zones
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.base.errors import InputError
+from truearm.engine.choosing.zones import Zones, identify_zones
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 GEOMETRIC = next(model for model in MODELS if model.name == "geometric")
 

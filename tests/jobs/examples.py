@@ -18,17 +18,17 @@ from tests.ros_bags import joint_messages, recorded, target_messages, write_ros1
 from tests.simulated import campaign
 from tests.ur_controller import UR10_CONF
 
-from truearm.library import load_robot
-from truearm.measurement.hexapod.geometry import triangle
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.inverse import inverse
-from truearm.modeling.transform import IDENTITY
-from truearm.planning.hexapod.tool import with_cups
-from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
-from truearm.results.iso9283_simulation import FILES as SIMULATED_FILES
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.data.hexapod import triangle
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.hexapod.reachable import with_cups
+from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
+from truearm.iso9283.simulate.simulate import FILES as SIMULATED_FILES
 
 Arguments = dict[str, Any]
 
@@ -208,7 +208,7 @@ def _touches() -> Arguments:
 def _program(folder: Path) -> Path:
     path = folder / "plate.mod"
     if not path.exists():
-        path.write_text((files("truearm.examples") / "plate.mod").read_text())
+        path.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     return path
 
 

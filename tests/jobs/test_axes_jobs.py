@@ -16,13 +16,13 @@ from tests.jobs.examples import EXAMPLES
 
 import truearm
 from truearm import Dataset, InputError
-from truearm.manifest import MANIFEST
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.transform import IDENTITY
-from truearm.results.axis_calibration import AxisCalibration
-from truearm.results.tolerances import AllowedErrors, UsedTolerances
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.axis_circles.axes import AxisCalibration
+from truearm.engine.base.manifest import MANIFEST
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.validation.tolerances import AllowedErrors, UsedTolerances
 
 CENTRE = (0.85, 0.0, 0.6)
 

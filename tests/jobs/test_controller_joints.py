@@ -14,17 +14,18 @@ import pytest
 from tests.simulated import campaign
 
 import truearm
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement.controller_joints import in_controller_joints, in_model_joints
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.hexapod.touches import read_touches
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.chain import Array
-from truearm.modeling.controller import Controller, JointsOf
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.controller_joints import in_controller_joints, in_model_joints
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.controller import Controller, JointsOf
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
+from truearm.hexapod.sheet_reading import read_touches
 
 FANUC = "lrmate200ic"
 #: Its file says nothing of a controller.

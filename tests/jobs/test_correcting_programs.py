@@ -16,12 +16,13 @@ from tests.answered import compensate
 from tests.simulated import campaign
 
 import truearm
-from truearm import InputError, Robot, __version__, writing
-from truearm.compensation.corrected_targets import LEDGER
-from truearm.compensation.programs.marks import MARK
-from truearm.manifest import hash_of
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.results.program_correction import SimulatedRun
+from truearm import InputError, Robot, __version__
+from truearm.compensation.result import SimulatedRun
+from truearm.engine.base import writing
+from truearm.engine.base.manifest import hash_of
+from truearm.engine.programs.corrected_targets import LEDGER
+from truearm.engine.programs.program import MARK
+from truearm.engine.robot.robot_file.writing import robot_text
 
 
 def calibrated() -> Robot:
@@ -31,7 +32,7 @@ def calibrated() -> Robot:
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
     path = tmp_path / "plate.mod"
-    path.write_text((files("truearm.examples") / "plate.mod").read_text())
+    path.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     return path
 
 

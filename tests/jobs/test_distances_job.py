@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
 
 
 def seen(poses: int, seed: int, device: str | None = None) -> Dataset:

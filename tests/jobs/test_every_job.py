@@ -22,13 +22,13 @@ from tests.jobs.examples import EXAMPLES
 
 import truearm
 from truearm import JOBS
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.effects import EFFECTS
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.results.record import Record
-from truearm.simulation.devices import DEVICES
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.document.records import Record
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.devices import DEVICES
 
 ROOT = Path(__file__).parents[2]
 #: Jobs that take numbers, and are fast.
@@ -263,7 +263,7 @@ def records() -> list[type[Record]]:
     for module in pkgutil.walk_packages(truearm.__path__, "truearm."):
         if not module.name.endswith(("__main__", "python_template")):
             import_module(module.name)
-    import_module("truearm.studies.study")
+    import_module("papers.study")
 
     found, left = list[type[Record]](), [Record]
     while left:

@@ -11,14 +11,14 @@ import pytest
 from tests.simulated import campaign
 from typer.testing import CliRunner
 
-from truearm.cli import app
-from truearm.errors import InputError
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.check import check
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.excluded import Exclusion, exclusions_text, numbers_read, read_exclusions, without_readings
-from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.statistics import errors_of
+from truearm.calibration.calibrate import calibrate
+from truearm.checking.check import check
+from truearm.commands import app
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.excluded import Exclusion, exclusions_text, numbers_read, read_exclusions, without_readings
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.data.statistics import errors_of
 
 DATA = campaign("irb120", 24, 0.05e-3, 4)[1]
 #: Of 24 configurations with the seed 0.

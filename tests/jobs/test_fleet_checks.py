@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 import truearm
-from truearm.cli import main
-from truearm.errors import InputError
+from truearm.calibration.result import RESULT_FILES
+from truearm.commands import main
+from truearm.engine.base.errors import InputError
 from truearm.fleets.manifest import read_manifest
-from truearm.results.calibration import RESULT_FILES
-from truearm.results.fleet import Fleet
+from truearm.fleets.result import Fleet
 
 
 @pytest.fixture(scope="module")
@@ -250,7 +250,7 @@ def test_where_ctrl_c_stops_a_fleet_the_command_says_how_many_parts_are_on_disk(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("truearm.jobs.fleet._computed", stop)
+    monkeypatch.setattr("truearm.fleets.fleet._computed", stop)
     path = manifest(folder, ROBOTS)
     monkeypatch.setattr("sys.argv", ["truearm", "fleet", str(path), "--out", str(folder / "out"), "--workers", "1"])
     with pytest.raises(SystemExit) as ended:

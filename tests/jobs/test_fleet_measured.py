@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 import truearm
-from truearm.errors import InputError
+from truearm.calibration.result import RESULT_FILES
+from truearm.engine.base.errors import InputError
+from truearm.fleets import robots as fleet_robots
 from truearm.fleets.entries import RobotEntry
-from truearm.fleets.rows import Accuracy
-from truearm.jobs import fleet_robots
-from truearm.jobs.fleet_robots import calibrated_robot
-from truearm.results.calibration import RESULT_FILES
+from truearm.fleets.robots import calibrated_robot
+from truearm.fleets.series import Accuracy
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,11 @@ import pytest
 
 import truearm
 from truearm import InputError
-from truearm.measurement.hexapod.geometry import triangle
-from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet_reading import read_sheet
-from truearm.modeling.inverse import inverse
-from truearm.modeling.transform import Transform
-from truearm.planning.hexapod.tool import with_cups
+from truearm.engine.data.hexapod import poses, triangle
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.transform import Transform
+from truearm.hexapod.reachable import with_cups
+from truearm.hexapod.sheet_reading import read_sheet
 
 LEGS = (0.3,) * 6
 FIXTURE = (0.22, 0.0, 0.1, np.radians(-30.0))

@@ -7,23 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from papers.filled_sheet import filled_sheet, locked_cups
+from papers.simulated import ballbar
+from papers.tool_changer import ToolChanger
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.hexapod.geometry import Device
-from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet import PlannedRow
-from truearm.measurement.hexapod.world_frame import plain_frame
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rigid_motion
-from truearm.planning.hexapod.reachable import reachable_at_places
-from truearm.planning.hexapod.tool import with_cups
-from truearm.results.hexapod import HexapodPlan
-from truearm.simulation.hexapod.filled_sheet import filled_sheet, locked_cups
-from truearm.simulation.hexapod.simulated import ballbar
-from truearm.simulation.hexapod.tool_changer import ToolChanger
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.hexapod import Device, poses
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, rigid_motion
+from truearm.engine.twin.twin import Twin
+from truearm.hexapod.jobs import HexapodPlan
+from truearm.hexapod.places import plain_frame
+from truearm.hexapod.reachable import reachable_at_places, with_cups
+from truearm.hexapod.sheet import PlannedRow
 
 PLACES = (Transform((0.2268, 0.0, 0.3)), Transform((0.05, 0.25, 0.3), (np.cos(0.2), 0.0, 0.0, np.sin(0.2))))
 #: A bar whose range no error of the twin exceeds.

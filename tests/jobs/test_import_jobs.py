@@ -8,7 +8,7 @@ import pytest
 from tests.jobs.examples import EXAMPLES
 
 import truearm
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 
 
 def test_matrices_and_what_is_missing(tmp_path: Path) -> None:

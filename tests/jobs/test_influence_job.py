@@ -16,12 +16,12 @@ from numpy.testing import assert_allclose
 from tests.simulated import campaign
 
 import truearm
-from truearm.errors import InputError
-from truearm.identification.solving.pose_by_pose import PoseByPose, influence_based
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.robot import Robot
-from truearm.results.influence import InfluenceResult
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.simulation.influence import InfluenceResult
+from truearm.simulation.influences import PoseByPose, influence_based
 
 KATANA = load_robot("katana450")
 
@@ -128,7 +128,7 @@ def test_frames_of_the_file_are_held_where_the_readings_are_in_them() -> None:
 
 
 def test_poses_that_cannot_be_met_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    from truearm.jobs import influence as job
+    from truearm.simulation import influence as job
 
     def unmet(*given: Any, **options: Any) -> PoseByPose:
         made = influence_based(*given, **options)

@@ -15,26 +15,26 @@ from tests.performance_plan import small_plan
 
 import truearm
 from truearm import JOBS
-from truearm.errors import InputError
+from truearm.axis_circles.axes import AXIS_FILES
+from truearm.calibration.result import RESULT_FILES
+from truearm.compensation.path import MOTION
+from truearm.compensation.path import REPORT as PATH_REPORT
+from truearm.compensation.result import REPORT
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.manifest import MANIFEST, UNFINISHED
+from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.fleets.recorded import RECORD
-from truearm.jobs.measuring_begun import BEGUN
-from truearm.manifest import MANIFEST, UNFINISHED
-from truearm.measurement.measuring.reading_log import LOG
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
-from truearm.results.axis_calibration import AXIS_FILES
-from truearm.results.calibration import RESULT_FILES
-from truearm.results.fleet import FLEET_FILES
-from truearm.results.followed_path import MOTION
-from truearm.results.followed_path import REPORT as PATH_REPORT
-from truearm.results.influence import INFLUENCE_FILES
-from truearm.results.iso9283_evaluation import EVALUATION_FILES
-from truearm.results.iso9283_plan import PLAN_FILES
-from truearm.results.iso9283_simulation import FILES as SIMULATED_FILES
-from truearm.results.measured import DATA, PAGE
-from truearm.results.program_correction import REPORT
-from truearm.results.tilting import GEOMETRY, TILTING_FILES
-from truearm.results.validation import VALIDATION_FILES
+from truearm.fleets.result import FLEET_FILES
+from truearm.inclinometers.tilting import GEOMETRY, TILTING_FILES
+from truearm.iso9283.evaluate.evaluate import EVALUATION_FILES
+from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
+from truearm.iso9283.plan.result import PLAN_FILES
+from truearm.iso9283.simulate.simulate import FILES as SIMULATED_FILES
+from truearm.measuring.begun import BEGUN
+from truearm.measuring.reading_log import LOG
+from truearm.measuring.result import DATA, PAGE
+from truearm.simulation.influence import INFLUENCE_FILES
+from truearm.validation.validate import VALIDATION_FILES
 
 #: How a job refuses it; a program that is called as a record is no program to begin with.
 REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot language has files of this kind"

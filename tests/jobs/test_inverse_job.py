@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.modeling.transform import quaternion_from_rotation
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.transform import quaternion_from_rotation
 
 Q = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [-70.0, 30.0, 0.0, -20.0, 40.0, 0.0]])
 

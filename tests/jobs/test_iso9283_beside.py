@@ -13,12 +13,12 @@ from tests.jobs.examples import performance_files
 from tests.performance_plan import small_plan
 
 import truearm
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
-from truearm.reporting.iso9283_figures import pose_pictures
-from truearm.reporting.iso9283_path_figures import path_pictures
-from truearm.reporting.picture_page import Drawing
-from truearm.results.iso9283_evaluation import RESULT, Iso9283Evaluation
+from truearm.engine.document.page import Drawing
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.iso9283.evaluate.evaluate import RESULT, Iso9283Evaluation
+from truearm.iso9283.evaluate.figures import pose_pictures
+from truearm.iso9283.evaluate.report import path_pictures
+from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
 
 Arguments = dict[str, Any]
 

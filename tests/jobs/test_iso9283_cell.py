@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.jobs.iso9283_cell import StatedCell, stated_cell
-from truearm.planning.constraints.constraints import Constraints, read_constraints
-from truearm.planning.iso9283 import plan as planning
-from truearm.planning.iso9283.criteria import TESTS
-from truearm.planning.iso9283.plan import performance_plan
-from truearm.planning.poses.iso9283 import Cube
-from truearm.results.iso9283_plan import Iso9283Plan
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.constraints import Constraints, read_constraints
+from truearm.engine.motion.cube import Cube
+from truearm.iso9283.plan import choosing as planning
+from truearm.iso9283.plan.choosing import performance_plan
+from truearm.iso9283.plan.criteria import TESTS
+from truearm.iso9283.plan.programs import StatedCell, stated_cell
+from truearm.iso9283.plan.result import Iso9283Plan
 
 CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 CELL = "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"

@@ -19,17 +19,16 @@ from tests.jobs.examples import performance_files
 from tests.performance_plan import small_plan
 
 import truearm
-from truearm.errors import InputError
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
-from truearm.planning.iso9283.criteria import TEST_OF
-from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
-from truearm.results.iso9283_evaluation import Iso9283Evaluation
-from truearm.results.iso9283_notices import cycle_notices
-from truearm.results.iso9283_table import worst_places
-from truearm.simulation.truths import truth_twin
-from truearm.validation.iso9283.missing import missing_places
-from truearm.validation.iso9283.values import Conditions, Value
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
+from truearm.engine.twin.truths import truth_twin
+from truearm.iso9283.criteria.poses import missing_places
+from truearm.iso9283.criteria.rows import Conditions, Value
+from truearm.iso9283.evaluate.evaluate import Iso9283Evaluation
+from truearm.iso9283.evaluate.table import cycle_notices, worst_places
+from truearm.iso9283.plan.criteria import TEST_OF
+from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
 
 FILES = ("poses", "paths", "settling", "forces")
 Arguments = dict[str, Any]

@@ -16,11 +16,11 @@ from tests.jobs.examples import performance_files
 from tests.performance_plan import small_plan
 
 import truearm
-from truearm.errors import InputError
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
-from truearm.results.iso9283_evaluation import RESULT, Iso9283Evaluation
-from truearm.writing import write_files
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.writing import write_files
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.iso9283.evaluate.evaluate import RESULT, Iso9283Evaluation
+from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
 
 Arguments = dict[str, Any]
 Row = dict[str, str]
@@ -211,7 +211,7 @@ def test_a_plan_that_was_changed_by_hand_is_said(tmp_path: Path) -> None:
     (tmp_path / PLAN).write_text((tmp_path / PLAN).read_text().replace("limit_band: 0.1", "limit_band: 0.2"))
     (said,) = [one for one in truearm.iso9283_evaluate(tmp_path / PLAN, **given).warnings if one.code == "plan-changed"]
     assert said.level == "note"
-    (tmp_path / "truearm.manifest.json").write_text("no manifest")
+    (tmp_path / "truearm.engine.base.manifest.json").write_text("no manifest")
     assert "plan-changed" not in notices(truearm.iso9283_evaluate(tmp_path / PLAN, **given))
 
 

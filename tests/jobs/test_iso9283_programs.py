@@ -11,11 +11,10 @@ from typing import Any
 import pytest
 
 import truearm
-from truearm.compensation.iso9283.slow_run import SLOW_RUN
-from truearm.errors import InputError
-from truearm.modeling.controller import Controller
-from truearm.notices import Notice
-from truearm.results.iso9283_plan import Iso9283Plan
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.robot.controller import Controller
+from truearm.iso9283.plan.result import Iso9283Plan
+from truearm.iso9283.plan.routes import SLOW_RUN
 
 CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 

@@ -11,12 +11,12 @@ import pytest
 from tests.performance_plan import small_plan
 
 import truearm
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rotation_vector
-from truearm.results.iso9283_simulation import Iso9283Simulation
-from truearm.simulation.truths import truth_twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import rotation_vector
+from truearm.engine.twin.truths import truth_twin
+from truearm.iso9283.simulate.simulate import Iso9283Simulation
 
 TRUTH = "tracker-triangular"
 

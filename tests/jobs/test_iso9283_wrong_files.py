@@ -10,8 +10,8 @@ import pytest
 from tests.jobs.examples import performance_files
 
 import truearm
-from truearm.errors import InputError
-from truearm.planning.iso9283.plan_file import read_cube
+from truearm.engine.base.errors import InputError
+from truearm.iso9283.plan.plan_file import read_cube
 
 Arguments = dict[str, Any]
 

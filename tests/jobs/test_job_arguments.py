@@ -13,12 +13,12 @@ from tests.jobs.examples import EXAMPLES
 from tests.simulated import campaign
 
 import truearm
-from truearm.errors import InputError
-from truearm.identification.solving.bounds import Bounds
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.parameters import Parameter
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.robot.parameters import Parameter
+from truearm.engine.robot.transform import Transform
 
 DATA: Dataset = campaign("irb120", 20, 0.05e-3, 1)[1]
 EMPTY = replace(DATA, position=np.full_like(DATA.position, np.nan))

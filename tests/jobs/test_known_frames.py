@@ -15,29 +15,29 @@ from tests.known_frames import frames_of
 from tests.simulated import campaign
 from typer.testing import CliRunner
 
-from truearm.cli import app
-from truearm.compensation.cell import EMPTY_CELL
-from truearm.compensation.chosen_targets import Choice
-from truearm.compensation.fake_targets import matrices
-from truearm.compensation.gauge import best_agreement
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
+from truearm.commands import app
 from truearm.compensation.program_correction import corrected_programs
-from truearm.compensation.programs.program import Program, Source
-from truearm.compensation.programs.rapid import RAPID
-from truearm.errors import InputError
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import FRAMES, named_model
-from truearm.identification.solving.redundancy import gauge_freedoms
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.load_robot import load_robot
-from truearm.jobs.simulate import simulate
-from truearm.jobs.validate import validate
-from truearm.library import load_robot as library_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.robot import Robot
-from truearm.results.calibration import Calibration
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
+from truearm.engine.base.errors import InputError
+from truearm.engine.command.reading import load_robot
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import FRAMES, named_model
+from truearm.engine.fit.problem import gauge_freedoms
+from truearm.engine.programs.cell import EMPTY_CELL
+from truearm.engine.programs.chosen_targets import Choice
+from truearm.engine.programs.fake_targets import matrices
+from truearm.engine.programs.gauge import best_agreement
+from truearm.engine.programs.program import Program, Source
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.robot.library import load_robot as library_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.simulation.simulate import simulate
+from truearm.validation.validate import validate
 
 GEOMETRIC = named_model("geometric")
 
@@ -148,7 +148,7 @@ def test_the_base_stays_known_when_the_robot_is_placed_anew(tmp_path: Path) -> N
 def plate() -> Program:
     from importlib.resources import files
 
-    return RAPID.read([Source(Path("plate.mod"), (files("truearm.examples") / "plate.mod").read_text())])
+    return RAPID.read([Source(Path("plate.mod"), (files("truearm.starting.examples") / "plate.mod").read_text())])
 
 
 def test_no_base_and_no_flange_is_assumed_in_programs_where_they_were_held(tmp_path: Path) -> None:
@@ -232,7 +232,7 @@ def fixture_entries(robot: Robot) -> dict[str, Any]:
     entries = {}
     for fixture in robot.fixtures:
         kinematics = robot.fixture_kinematics(fixture.name)
-        from truearm.modeling.transform import Transform
+        from truearm.engine.robot.transform import Transform
 
         place = Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0])
         entries[fixture.name] = {

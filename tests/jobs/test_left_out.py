@@ -9,11 +9,11 @@ import pytest
 from tests.simulated import campaign
 from typer.testing import CliRunner
 
-from truearm.cli import app
-from truearm.errors import InputError
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.validate import validate
-from truearm.measurement.readers.canonical import csv_text
+from truearm.calibration.calibrate import calibrate
+from truearm.commands import app
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.validation.validate import validate
 
 DATA = campaign("irb120", 24, 0.05e-3, 4)[1]
 

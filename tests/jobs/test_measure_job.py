@@ -15,15 +15,16 @@ import pytest
 from tests.jobs.examples import MEASURED_PLAN
 
 import truearm
-from truearm.errors import InputError
-from truearm.jobs.measure import open_campaign, sight
-from truearm.jobs.measuring_begun import BEGUN
-from truearm.measurement.measuring.reading_log import LOG
-from truearm.measurement.measuring.readings import Reading
-from truearm.measurement.readers.canonical import read_csv
-from truearm.results.measured import DATA, PAGE
-from truearm.simulation.devices import DEVICES, Device
-from truearm.simulation.virtual_instrument import VIRTUAL, VirtualInstrument
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import read_csv
+from truearm.engine.twin.devices import DEVICES
+from truearm.engine.twin.devices.device import Device
+from truearm.measuring.begun import BEGUN
+from truearm.measuring.open_campaign import open_campaign, sight
+from truearm.measuring.reading_log import LOG
+from truearm.measuring.result import DATA, PAGE
+from truearm.measuring.session import Reading
+from truearm.measuring.virtual_instrument import VIRTUAL, VirtualInstrument
 
 MAPPING = """\
 truearm: truearm-mapping/1
@@ -80,7 +81,7 @@ def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(
     assert {*reasons} == {"beam-break", "not-settled", "scatter"}
     assert sum(reasons.values()) > 3
     assert [(notice.code, notice.level) for notice in found.warnings] == [("not-seen", "note"), ("not-said", "note")]
-    assert {p.name for p in tmp_path.iterdir()} == {BEGUN, DATA, LOG, PAGE, "truearm.manifest.json"}
+    assert {p.name for p in tmp_path.iterdir()} == {BEGUN, DATA, LOG, PAGE, "truearm.engine.base.manifest.json"}
     data = read_csv(tmp_path / DATA)
     assert data.sigma is not None
     assert set(data.sigma[data.has_reading].tolist()) == {VIRTUAL["tracker"].sigma}

@@ -11,10 +11,10 @@ import pytest
 from tests.simulated import campaign
 
 import truearm
-from truearm.errors import InputError
-from truearm.manifest import MANIFEST
-from truearm.measurement.readers.canonical import csv_text
-from truearm.planning.constraints.constraints import Constraints
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.manifest import MANIFEST
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.motion.constraints import Constraints
 
 RULES = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}, "moments": {2: "positive"}}
 

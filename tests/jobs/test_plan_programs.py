@@ -12,15 +12,14 @@ from tests.plan_tours import a_tour
 from tests.simulated import campaign
 
 import truearm
-from truearm.errors import InputError
-from truearm.jobs.plan_programs import program_wanted, refuse_other_programs, with_program
-from truearm.manifest import MANIFEST, hash_of
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.notices import Notice
-from truearm.planning.choosing.measurement_plan import device_candidates
-from truearm.results.plan import Plan
-from truearm.simulation.devices import named_device
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.manifest import MANIFEST, hash_of
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.devices import named_device
+from truearm.planning.choosing import device_candidates
+from truearm.planning.programs import program_wanted, refuse_other_programs, with_program
+from truearm.planning.result import Plan
 
 #: Enough for a plan, and quick.
 QUICK: dict[str, Any] = {"poses": 10, "candidates": 60, "clearance": 0.02, "seed": 1}

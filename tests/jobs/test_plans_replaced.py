@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.jobs.plans_replaced import plan_files_for, refuse_ways_of_another, replaced_notices
-from truearm.manifest import sets_in
-from truearm.writing import write_files
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.manifest import sets_in
+from truearm.engine.base.writing import write_files
+from truearm.engine.command.driving import plan_files_for, refuse_ways_of_another, replaced_notices
 
 QUICK: dict[str, Any] = {"poses": 10, "candidates": 60, "clearance": 0.0, "no_floor": True}
 FILES = ("plan.csv", "plan.html", "plan-ways.csv")

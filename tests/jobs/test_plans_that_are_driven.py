@@ -14,14 +14,14 @@ from tests.sampled_arm import sampled_room
 from tests.simulated import campaign
 
 import truearm
-from truearm.errors import InputError
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.planning.constraints.constraints import Constraints
-from truearm.planning.driving.cell import Cell, boxes_of
-from truearm.planning.driving.collisions import CollisionCheck
-from truearm.planning.driving.said_of_cells import cell_notices
-from truearm.results.plan import Plan
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cell import Cell, boxes_of
+from truearm.engine.motion.collisions import CollisionCheck
+from truearm.engine.motion.constraints import Constraints
+from truearm.engine.motion.touring import cell_notices
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.planning.result import Plan
 
 HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
 TABLE = {"table": {"x": [300, 700], "y": [-300, 300], "z": [-1000, 150]}}

@@ -13,11 +13,12 @@ from tests.simulated import campaign
 
 import truearm
 from truearm import InputError, Robot
-from truearm.modeling.formats.robot_file import robot_text, sealed
-from truearm.notices import Notice
-from truearm.reporting.program_report import program_html
-from truearm.results.program_correction import ProgramCorrection
-from truearm.results.robot_description import RobotDescription
+from truearm.compensation.report import program_html
+from truearm.compensation.result import ProgramCorrection
+from truearm.engine.base.errors import Notice
+from truearm.engine.robot.robot_file.seal import sealed
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.robot_files.show import RobotDescription
 
 NARROW = Notice("narrow-data", "Over the workspace it is worse.", "error")
 FAR = Notice("far-from-nominal", "Check that the nominal values are those of its controller.", "note")
@@ -33,7 +34,7 @@ def robot() -> Robot:
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
     path = tmp_path / "plate.mod"
-    path.write_text((files("truearm.examples") / "plate.mod").read_text())
+    path.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     return path
 
 

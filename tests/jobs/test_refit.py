@@ -13,18 +13,18 @@ import pytest
 from tests.simulated import campaign, more_of
 from typer.testing import CliRunner
 
-from truearm.cli import app
-from truearm.errors import InputError
-from truearm.identification.refit import refit
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.validate import validate
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rotation_from_vector
-from truearm.simulation.twin import Twin, measure
+from truearm.calibration.calibrate import calibrate
+from truearm.commands import app
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.refit import refit
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import rotation_from_vector
+from truearm.engine.twin.twin import Twin, measure
+from truearm.validation.validate import validate
 
 NOISE = 0.05e-3
 TURN = rotation_from_vector(np.array([0.1, -0.2, 0.7]))
@@ -178,7 +178,7 @@ def test_an_unknown_part_is_refused() -> None:
 
 def test_the_command_finds_what_moved(tmp_path: Path) -> None:
     _, robot, new = cell()
-    from truearm.modeling.formats.robot_file import robot_text
+    from truearm.engine.robot.robot_file.writing import robot_text
 
     (tmp_path / "robot.yaml").write_text(robot_text(robot))
     (tmp_path / "moved.csv").write_text(csv_text(replace(new, position=new.position + SHIFT)))

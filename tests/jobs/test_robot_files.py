@@ -9,7 +9,7 @@ import pytest
 
 import truearm
 from truearm import InputError
-from truearm.modeling.formats.robot_file import robot_text
+from truearm.engine.robot.robot_file.writing import robot_text
 
 
 def test_a_converted_robot_has_the_same_poses(tmp_path: Path) -> None:

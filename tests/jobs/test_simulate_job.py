@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import truth_twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.twin.truths import truth_twin
 
 
 def warming_up() -> Robot:

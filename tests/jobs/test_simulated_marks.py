@@ -16,12 +16,12 @@ from tests.simulated import campaign, more_of
 
 import truearm
 from truearm import JOBS
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.modeling.formats.robot_file import is_intact
-from truearm.modeling.robot import Robot
-from truearm.results.record import Record
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.document.records import Record
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.seal import is_intact
 
 #: Jobs that simulate themselves, in their examples.
 SIMULATING = {
@@ -108,7 +108,7 @@ SAYS = {
     ".src": r"SIMULATED: no real calibration",
 }
 #: Files that are of something else than data and robots: what was asked, and how it began.
-BESIDE = {"truearm.manifest.json", "record.json", "measuring.json"}
+BESIDE = {"truearm.engine.base.manifest.json", "record.json", "measuring.json"}
 
 
 def check_files(folder: Path, *, marked: bool) -> int:
@@ -273,7 +273,7 @@ def test_a_robot_keeps_the_mark_in_its_files(calibrated: tuple[Robot, Dataset], 
 def test_a_calibration_without_its_mark_is_not_as_it_was_written(
     calibrated: tuple[Robot, Dataset], tmp_path: Path
 ) -> None:
-    from truearm.modeling.formats.robot_file import robot_text
+    from truearm.engine.robot.robot_file.writing import robot_text
 
     file = tmp_path / "calibrated.yaml"
     file.write_text(robot_text(calibrated[0]))

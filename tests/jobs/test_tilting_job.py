@@ -15,15 +15,15 @@ import pytest
 from tests.tilting import TRUTH
 
 import truearm
-from truearm.errors import InputError
-from truearm.identification.inclinometers.fit import TiltingFit
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.inclinometer import Inclinations
-from truearm.measurement.readers.inclinations import inclinations_text
-from truearm.modeling.chain import Array
-from truearm.results.inclinometer_plan import InclinometerSimulation
-from truearm.results.tilting import Tilting
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.inclinations import Inclinations
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.inclinometers.fit import TiltingFit
+from truearm.inclinometers.pairs import InclinometerSimulation
+from truearm.inclinometers.reading import inclinations_text
+from truearm.inclinometers.tilting import Tilting
 
 KATANA = load_robot("katana450")
 
@@ -176,8 +176,8 @@ def test_an_instrument_that_sits_askew_is_told_and_taken_into_account() -> None:
 @cache
 def simulated_in_space() -> Array:
     """What three axes of each link read in the same postures."""
-    from truearm.simulation.inclinometer import inclinations as angles
-    from truearm.simulation.truths import truth_twin
+    from truearm.engine.twin.truths import truth_twin
+    from truearm.inclinometers.pairs import inclinations as angles
 
     twin, rng = truth_twin(KATANA, "tilting", np.random.default_rng(0)), np.random.default_rng(0)
     return angles(twin, inclinations().joints, 0.0, rng, wrench=inclinations().wrench)
@@ -255,7 +255,7 @@ def test_configurations_without_a_partner_are_told() -> None:
 
 
 def test_a_fit_that_does_not_converge_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    from truearm.jobs import tilting as job
+    from truearm.inclinometers import tilting as job
 
     def unsettled(*given: Any) -> TiltingFit:
         return replace(known, converged=False)

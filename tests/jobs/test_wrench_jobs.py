@@ -15,12 +15,12 @@ from tests.identification.test_external_force import HIGH, LOW, elastic_twin
 from typer.testing import CliRunner
 
 import truearm
-from truearm.cli import app
-from truearm.errors import InputError
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.robot import Robot
-from truearm.modeling.wrench import Wrench
-from truearm.simulation.twin import Twin, measure
+from truearm.commands import app
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.wrench import Wrench
+from truearm.engine.twin.twin import Twin, measure
 
 TEXT = "0N,8N,0N,0Nm,0Nm,0.5Nm"
 
@@ -37,10 +37,10 @@ def campaign() -> tuple[Twin, Robot]:
 
 @pytest.fixture
 def cell(campaign: tuple[Twin, Robot], tmp_path: Path) -> Path:
-    from truearm.modeling.formats.robot_file import robot_text
+    from truearm.engine.robot.robot_file.writing import robot_text
 
     (tmp_path / "calibrated.yaml").write_text(robot_text(campaign[1]))
-    (tmp_path / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text())
+    (tmp_path / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     return tmp_path
 
 
@@ -66,7 +66,7 @@ def test_the_target_goes_to_the_pose_under_the_force(campaign: tuple[Twin, Robot
 
 
 def test_the_force_acts_on_the_controllers_flange_where_poses_are_the_controllers(campaign: tuple[Twin, Robot]) -> None:
-    from truearm.modeling.transform import Transform
+    from truearm.engine.robot.transform import Transform
 
     _, robot = campaign
     flange = Transform((0.0, 0.0, 0.1), (0.5, 0.5, 0.5, 0.5))

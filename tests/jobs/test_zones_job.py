@@ -10,19 +10,20 @@ import pytest
 from tests.simulated import campaign, more_of
 from typer.testing import CliRunner
 
-from truearm.cli import app
-from truearm.errors import InputError
-from truearm.identification.choosing.zone_boxes import boxes_of, cut_boxes, divisions_for, flange_places, read_zones
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.inverse import inverse
-from truearm.jobs.validate import validate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.formats.robot_file import is_intact
-from truearm.results.calibration import Calibration
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.twin import Twin
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
+from truearm.commands import app
+from truearm.engine.base.errors import InputError
+from truearm.engine.choosing.zones import boxes_of, cut_boxes, divisions_for, flange_places, read_zones
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.seal import is_intact
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.twin import Twin
+from truearm.robot_files.inverse import inverse
+from truearm.validation.validate import validate
 
 HEAD = "truearm: truearm-zones/1\nunits: {length: mm}\n"
 
@@ -70,7 +71,7 @@ def test_what_is_kept_is_written_and_read(cut: tuple[Path, Calibration]) -> None
     assert run.zones is not None
     names = {path.name for path in (folder / "out").iterdir()}
     kept = [verdict.box.name for verdict in run.zones.kept]
-    assert names == {*run.files, "truearm.manifest.json"}
+    assert names == {*run.files, "truearm.engine.base.manifest.json"}
     assert {f"zone-{name}.yaml" for name in kept} < names
     found = json.loads((folder / "out" / "result.json").read_text())["zones"]
     assert found["kept"] == kept

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
 
 FOLDER = Path(__file__).with_name("outside")
 

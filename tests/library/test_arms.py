@@ -13,23 +13,19 @@ from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests.library import outside, outside_poses
 
-from truearm.errors import InputError
-from truearm.library import library, load_robot
-from truearm.modeling.controller import AS_THE_MODEL
-from truearm.modeling.formats.robot_file import (
-    RobotFile,
-    is_intact,
-    read_robot,
-    robot_from_file,
-    robot_text,
-    sealed,
-)
-from truearm.modeling.formats.urdf import read_urdf
-from truearm.modeling.formats.urdf_writing import urdf_text
-from truearm.modeling.parts import Reach
-from truearm.modeling.proof import Proof
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rotation_from_vector
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.controller import AS_THE_MODEL
+from truearm.engine.robot.library import library, load_robot
+from truearm.engine.robot.parts import Reach
+from truearm.engine.robot.proof import Proof
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot, robot_from_file
+from truearm.engine.robot.robot_file.schema import RobotFile
+from truearm.engine.robot.robot_file.seal import is_intact, sealed
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import rotation_from_vector
+from truearm.engine.robot.urdf import read_urdf
+from truearm.engine.robot.urdf_writing import urdf_text
 
 #: Arms whose geometry has no public URDF that it can be held against, and what it is held against instead.
 NO_URDF = {
@@ -245,7 +241,7 @@ def test_gofa_reaches_as_far_as_its_name_says() -> None:
     ],
 )
 def test_a_reach_that_is_none_is_refused(entry: str, said: str, tmp_path: Path) -> None:
-    text = (Path(str(files("truearm.library"))) / "irb120.yaml").read_text("utf-8")
+    text = (Path(str(files("truearm.engine.robot.library"))) / "irb120.yaml").read_text("utf-8")
     path = tmp_path / "arm.yaml"
     path.write_text(re.sub("(?m)^reach: .*$", f"reach: {entry}", text), "utf-8")
     with pytest.raises(InputError) as refusal:

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.library import close_names, library, load_robot
-from truearm.library.wider_limits import wider_limits_notices
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import close_names, library, load_robot
+from truearm.engine.robot.library.wider_limits import wider_limits_notices
 
 
 def test_the_library_has_arms_of_many_makers() -> None:

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
 
 HEADER = "configuration,joint_1 [deg],joint_2 [deg],target,x [mm],y [mm],z [mm]"
 PLAIN = f"""{HEADER}

@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
-from truearm.errors import InputError
-from truearm.measurement.circles import Circle, fit_circle
-from truearm.modeling.chain import Array
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.circles import Circle, fit_circle
+from truearm.engine.robot.chain import Array
 
 CENTRE = np.array([1.0, -2.0, 0.5])
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.readers.configurations import read_configurations, read_stops
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.configurations import read_configurations, read_stops
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 HEAD = "configuration,joint_1 [deg],joint_2 [mm],approach_1 [deg],approach_2 [mm],reads\n"
 

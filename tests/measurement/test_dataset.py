@@ -10,12 +10,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from truearm import calibrate, check
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
 
 NAN, INFINITY = float("nan"), float("inf")
 N = 6

@@ -15,11 +15,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from truearm.errors import InputError
-from truearm.measurement.drawn_circle.drawing import drawn_circle
-from truearm.measurement.drawn_circle.page import read_page
-from truearm.measurement.drawn_circle.scan import ScannedCircle, read_circle
-from truearm.modeling.chain import Array
+from truearm.drawn_circle.scan import ScannedCircle, drawn_circle, read_circle, read_page
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
 
 WIDTH, HEIGHT = 0.056, 0.052
 CENTRE = np.array([0.0271, 0.0262])
@@ -379,7 +377,7 @@ def test_too_few_or_too_many_sectors_are_refused(sectors: int, tmp_path: Path) -
 
 def test_the_image_libraries_are_loaded_when_a_page_is_read() -> None:
     script = (
-        "import sys, truearm.measurement.drawn_circle.scan, truearm.measurement.drawn_circle.drawing\n"
+        "import sys, truearm.drawn_circle.scan, truearm.drawn_circle.scan\n"
         "print([m for m in ('PIL', 'skimage', 'scipy.ndimage') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

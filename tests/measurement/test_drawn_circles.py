@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from truearm.errors import InputError
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
+from truearm.drawn_circle.import_circle import Page, read_drawn_circles
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text, read_csv
 
 HEADER = "configuration,joint_1 [deg],joint_2 [deg],angle [deg],height [mm]"
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
 
 DISTANCES = """configuration,joint_1 [deg],target,fixture,distance [mm]
 1,10.0,ball,cup,300.0

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from tests.fuzz.mutations import ODD
 
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.guessing.guess import guess_mapping
-from truearm.measurement.readers.table import read_table
-from truearm.units import as_number
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.units import as_number
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.table import read_table
+from truearm.importing.guess import guess_mapping
 
 #: How many tables; 2000 once in a while.
 COUNT: Final = int(os.environ.get("TRUEARM_FUZZED_TABLES", "250"))

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.readers.guessing.guess import guess_mapping
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.importing.guess import guess_mapping
 
 #: Semicolons, decimal commas, radians, joints last, another order of joints, and n/a.
 NEWCOMER = """\

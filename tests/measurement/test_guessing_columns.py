@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.readers.guessing.guess import guess_mapping
+from truearm.engine.base.errors import InputError
+from truearm.importing.guess import guess_mapping
 
 
 def guessed(folder: Path, more: str, cells: list[str], name: str = "label") -> str:
@@ -211,7 +211,7 @@ def test_a_guess_says_if_it_has_not_seen_all(tmp_path: Path, monkeypatch: pytest
     rows = ["Pose,J1,J2,X,Y,Z"] + [f"P{n},{n},{2 * n},1000,{n},30" for n in range(1, 500)]
     (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
     assert "looked at" not in guess_mapping(tmp_path / "table.csv").text
-    monkeypatch.setattr("truearm.measurement.readers.guessing.layouts._MOST_LINES", 450)
+    monkeypatch.setattr("truearm.importing.layouts._MOST_LINES", 450)
     assert "# Note: only the first 450 lines were looked at" in guess_mapping(tmp_path / "table.csv").text
 
 

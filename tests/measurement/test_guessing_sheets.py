@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.readers.guessing.guess import guess_mapping
+from truearm.engine.base.errors import InputError
+from truearm.importing.guess import guess_mapping
 
 
 def filled(sheet: Any, rows: int) -> Any:

@@ -12,9 +12,9 @@ from tests.hand_eye import PICTURED, PICTURED_TEXT, pictures
 from tests.jobs.examples import EXAMPLES
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.board.charuco import DICTIONARIES, Charuco
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
+from truearm.board.pictures import DICTIONARIES, Charuco
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
 
 
 def example(folder: Path, **other: Any) -> dict[str, Any]:

@@ -6,20 +6,27 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from papers.simulated import ballbar, measured_legs, measured_sides
 
-from truearm.errors import InputError
-from truearm.measurement.hexapod.geometry import DEVICE, Design, designs, triangle
-from truearm.measurement.hexapod.kinematics import leg_lengths, tool_cups, tripod
-from truearm.measurement.hexapod.poses import CUPS, assemblies, distance, distinct, near_equal, poses
-from truearm.measurement.hexapod.uncertainty import (
-    all_solutions,
-    cup_monte_carlo,
-    cup_uncertainty,
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.hexapod import (
+    CUPS,
+    DEVICE,
+    Design,
+    assemblies,
+    designs,
+    distance,
+    distinct,
+    leg_lengths,
+    near_equal,
+    poses,
+    tool_cups,
+    triangle,
+    tripod,
 )
-from truearm.measurement.hexapod.world_frame import world_frame
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import rigid_motion
-from truearm.simulation.hexapod.simulated import ballbar, measured_legs, measured_sides
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.transform import rigid_motion
+from truearm.hexapod.places import all_solutions, cup_monte_carlo, cup_uncertainty, world_frame
 
 #: Nubiola, section 3.2: the three groups of near pairs, from the closest.
 PRINTED = [

@@ -10,18 +10,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.hexapod.attachments import ChangerRepeatability, compared
-from truearm.measurement.hexapod.four_cups import TO_FOURTH, four_cups, legs_of_side, side_distances, side_frames
-from truearm.measurement.hexapod.geometry import DEVICE, side_names
-from truearm.measurement.hexapod.kinematics import leg_lengths
-from truearm.measurement.hexapod.poses import CUPS, poses
-from truearm.measurement.hexapod.sheet import CUP_DEVIATION, PlannedRow, Sheet, sheet_csv
-from truearm.measurement.hexapod.sheet_reading import read_sheet
-from truearm.measurement.hexapod.sheets_together import together
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import Joint
-from truearm.modeling.transform import rotation_from_quaternion
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.hexapod import CUPS, DEVICE, leg_lengths, poses, side_names
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.transform import rotation_from_quaternion
+from truearm.hexapod.sheet import (
+    CUP_DEVIATION,
+    TO_FOURTH,
+    ChangerRepeatability,
+    PlannedRow,
+    Sheet,
+    compared,
+    four_cups,
+    legs_of_side,
+    sheet_csv,
+    side_distances,
+    side_frames,
+    together,
+)
+from truearm.hexapod.sheet_reading import read_sheet
 
 POSES = poses()
 JOINTS = [Joint(f"axis_{n}", "revolute", {}) for n in range(1, 7)]

@@ -8,16 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from papers.simulated import ballbar, measured_legs, measured_sides
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement.hexapod.geometry import triangle
-from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet import PlannedRow, Sheet, sheet_csv
-from truearm.measurement.hexapod.sheet_reading import read_sheet
-from truearm.measurement.hexapod.touches import read_touches
-from truearm.modeling.parts import Joint
-from truearm.simulation.hexapod.simulated import ballbar, measured_legs, measured_sides
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.hexapod import poses, triangle
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint
+from truearm.hexapod.sheet import PlannedRow, Sheet, sheet_csv
+from truearm.hexapod.sheet_reading import read_sheet, read_touches
 
 JOINTS = [Joint(f"axis_{n}", "revolute", {}) for n in range(1, 7)]
 

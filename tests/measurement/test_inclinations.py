@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement.readers.inclinations import inclinations_text, read_inclinations
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
+from truearm.inclinometers.reading import inclinations_text, read_inclinations
 
 HEADER = "configuration,order,joint_1 [deg],joint_2 [deg],payload [g],link,sensor,x [deg],y [mrad],sigma [deg]"
 ROWS = """\

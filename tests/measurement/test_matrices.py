@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.matrices import read_matrices
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.importing.files import read_matrices
 
 JOINTS = "# made by hand\n10 20\n\n0\t0  # home\n-1.5e1 3\n"
 GOOD = "1 2 3\n0 0 0.0\n4 5 6\n"

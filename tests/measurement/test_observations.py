@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.identification.solving.problem import SETUP, Problem
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.observations import OBSERVATIONS, compared
-from truearm.modeling.chain import Array
-from truearm.modeling.parameters import FreeParameters
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.simulation.truths import joint_truths
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.observations import OBSERVATIONS, compared
+from truearm.engine.fit.problem import SETUP, Problem
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import FreeParameters
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.truths import joint_truths
+from truearm.engine.twin.twin import Twin
 
 COUNT = 7
 SIGMA = {"position": 2e-5, "orientation": 3e-4, "distance": 1e-6, "height": 5e-6}

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.readers.poses import read_poses
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.configurations import read_poses
 
 HEAD = "pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\n"
 ROW = "P1,300,0,500,1,0,0,0\n"

@@ -8,9 +8,9 @@ import pytest
 from tests.test_documents import ROOT, blocks
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.readers.presets import PRESETS, mapping_path
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.data.readers.presets import PRESETS, mapping_path
 
 JOINTS = """\
 configuration,axis_1 [deg],axis_2 [deg]

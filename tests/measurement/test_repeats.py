@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.repeats import repeated_joints
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.thinning import repeated_joints
 
 
 def test_joints_copied_many_times_are_found_without_comparing_every_pair(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,9 +10,9 @@ import pytest
 from tests.simulated import campaign
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion
 
 HEADINGS = "J1,J2,J3,J4,J5,J6,X,Y,Z,TX,TY,TZ\n"
 POINTS = HEADINGS + (

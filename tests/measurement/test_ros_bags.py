@@ -10,10 +10,10 @@ import pytest
 from tests.ros_bags import NAMES, STOPS, Message, joint_messages, recorded, target_messages, write_ros1, write_ros2
 
 import truearm
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement.bags.standstills import find_standstills, lost_messages, missed_pauses, seen_at
-from truearm.measurement.bags.streams import JointStream, TargetStream
+from truearm.bags.standstills import find_standstills, lost_messages, missed_pauses, seen_at
+from truearm.bags.streams import JointStream, TargetStream
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
 
 TIMES, JOINTS, SEEN, POSITIONS, TURNS = recorded()
 OF_JOINTS = joint_messages(TIMES, JOINTS)
@@ -59,7 +59,7 @@ def test_deviation_of_the_mean_counts_that_samples_are_alike() -> None:
         series[:, sample] = 0.8 * series[:, sample - 1] + rng.normal(0.0, 0.6e-4, (stops, 3))
     series = series[:, 100:]
     times = np.arange(stops * n, dtype=float) / 20.0
-    from truearm.measurement.bags.standstills import Standstill
+    from truearm.bags.standstills import Standstill
 
     stills = [Standstill(20.0 * i, 20.0 * i + 19.96, np.zeros(6), 0.0) for i in range(stops)]
     stream = TargetStream("tip", "/tip", times, series.reshape(-1, 3), None, "tracker", 0)

@@ -12,11 +12,11 @@ from typing import Any
 
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.readers.cells import column_letters
-from truearm.measurement.readers.table import read_table
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.data.readers.cells import column_letters
+from truearm.engine.data.readers.table import read_table
 
 openpyxl = pytest.importorskip("openpyxl")
 

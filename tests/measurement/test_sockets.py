@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm.errors import InputError
-from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text, read_csv
 
 ROWS = "configuration,joint_1 [deg],joint_2 [deg],socket\n1,10,20,left\n2,12,22,right\n3,15,25,left\n"
 

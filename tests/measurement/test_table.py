@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from truearm.errors import InputError
-from truearm.files import read_text
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.readers.table import read_table
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import read_text
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.readers.table import read_table
+from truearm.importing.files import read_matrices
 
 LONG = "pose,q1,q2,ball,X,Y,Z\na,10,20,one,1,2,3\na,10,20,two,4,5,6\nb,30,40,one,7,,9\n"
 MAP = """

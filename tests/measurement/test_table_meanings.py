@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from tests.measurement.test_table import LONG, MAP, read
 
-from truearm.errors import InputError
-from truearm.jobs.import_table import import_table
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.table import read_noting, read_table
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_vector
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.readers.table import read_noting, read_table
+from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_vector
+from truearm.importing.files import import_table
 
 ROWS = "pose,q1,q2,ball,X,Y,Z,a,b,c\np,1,2,t,1,2,3,{}\n"
 

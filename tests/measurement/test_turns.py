@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from truearm.library import load_robot
-from truearm.measurement.circles import fit_circle
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.turns import find_runs, turn_of
-from truearm.modeling.chain import Array
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.axis_circles.fit import find_runs, turn_of
+from truearm.engine.data.circles import fit_circle
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import JointTruth
 
 
 def campaign(joints: Array) -> Dataset:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from truearm.modeling.chain import Array, Chain, Element
+from truearm.engine.robot.chain import Array, Chain, Element
 
 _UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 

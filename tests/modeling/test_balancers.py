@@ -14,17 +14,19 @@ from numpy.testing import assert_allclose
 from tests.modeling.test_chain import random_frame, random_robot
 
 import truearm
-from truearm.errors import InputError
-from truearm.modeling.balancers import Anchor, Balancer
-from truearm.modeling.chain import Array, Chain, Element
-from truearm.modeling.conventions import CONVENTIONS, Convention
-from truearm.modeling.conversion import CONVERSIONS, converted
-from truearm.modeling.formats.export import exported
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.loads import joint_loads
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.balancers import Anchor, Balancer
+from truearm.engine.robot.chain import Array, Chain, Element
+from truearm.engine.robot.conventions import CONVENTIONS
+from truearm.engine.robot.conventions.convention import Convention
+from truearm.engine.robot.conversion import CONVERSIONS, converted
+from truearm.engine.robot.loads import joint_loads
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.twin.twin import Twin
+from truearm.robot_files.formats import exported
 
 
 def seesaw(balancer: Balancer) -> Robot:

@@ -11,15 +11,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 import truearm
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.loads import joint_loads
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import joint_truths
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.loads import joint_loads
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.twin.truths import joint_truths
+from truearm.engine.twin.twin import Twin
 
 G = 9.80665
 

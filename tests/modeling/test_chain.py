@@ -9,15 +9,17 @@ from numpy.testing import assert_allclose
 from tests.arms import ARMS
 from tests.modeling.pinocchio_oracle import PinocchioChain
 
-from truearm.library import load_robot
-from truearm.modeling.balancers import Anchor, Balancer
-from truearm.modeling.chain import Array, Chain, Element, Motion, together
-from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
-from truearm.modeling.effects import EFFECTS, Effect
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
-from truearm.modeling.robot_parameters import by_parameters_together, effect_rates
-from truearm.modeling.transform import Transform
+from truearm.engine.robot.balancers import Anchor, Balancer
+from truearm.engine.robot.chain import Array, Chain, Element, Motion, together
+from truearm.engine.robot.conventions import CONVENTIONS
+from truearm.engine.robot.conventions.convention import Convention, JointKind
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.effects.effect import Effect
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import by_parameters_together, effect_rates
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
 
 MOTIONS: tuple[Motion, ...] = get_args(Motion)
 CONFIGURATIONS = 7

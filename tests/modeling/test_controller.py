@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from truearm.errors import InputError
-from truearm.library import library, load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.controller import AS_THE_MODEL, Controller
-from truearm.modeling.conversion import CONVERSIONS, converted
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.formats.urdf import read_urdf
-from truearm.modeling.formats.urdf_writing import urdf_text
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.controller import AS_THE_MODEL, Controller
+from truearm.engine.robot.conversion import CONVERSIONS, converted
+from truearm.engine.robot.library import library, load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
+from truearm.engine.robot.urdf import read_urdf
+from truearm.engine.robot.urdf_writing import urdf_text
 
 FANUC = Controller(signs=(1, 1, -1, -1, -1, -1), couplings={3: {2: 1.0}})
 HALF = 0.7071067811865476
@@ -216,7 +217,7 @@ def test_round_trip(length: str, angle: str, tmp_path: Path) -> None:
 
 
 def test_the_examples_of_template_and_guide_are_entries(tmp_path: Path) -> None:
-    template = (files("truearm.examples") / "new_robot.yaml").read_text("utf-8")
+    template = (files("truearm.starting.examples") / "new_robot.yaml").read_text("utf-8")
     before, entry, after = template.partition("# controller:\n")
     commented = re.match(r"(?:#   .*\n)+", after)
     assert commented is not None

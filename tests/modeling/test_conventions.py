@@ -10,13 +10,16 @@ from numpy.testing import assert_allclose
 from scipy.linalg import expm
 from tests.modeling.test_chain import random_robot, random_unit
 
-from truearm.errors import InputError
-from truearm.modeling.chain import Array, Direction
-from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind, convention, parallel_joints_without_beta
-from truearm.modeling.conventions.cpc import published_direction, rotation_to, small_rotations
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array, Direction
+from truearm.engine.robot.conventions import CONVENTIONS, convention
+from truearm.engine.robot.conventions.convention import Convention, JointKind
+from truearm.engine.robot.conventions.cpc import published_direction, rotation_to, small_rotations
+from truearm.engine.robot.conventions.parallel import parallel_joints_without_beta
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
 
 BOTH: tuple[JointKind, ...] = ("revolute", "prismatic")
 

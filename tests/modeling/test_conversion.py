@@ -8,18 +8,19 @@ from numpy.testing import assert_allclose
 from tests.arms import ARMS
 from tests.modeling.test_chain import random_frame, random_robot
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array, Chain
-from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
-from truearm.modeling.conventions.cpc import published_direction
-from truearm.modeling.conversion import CONVERSIONS, converted
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.loads import joint_loads
-from truearm.modeling.parts import Joint, LinkMass, Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array, Chain
+from truearm.engine.robot.conventions import CONVENTIONS
+from truearm.engine.robot.conventions.convention import Convention, JointKind
+from truearm.engine.robot.conventions.cpc import published_direction
+from truearm.engine.robot.conversion import CONVERSIONS, converted
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.loads import joint_loads
+from truearm.engine.robot.parts import Joint, LinkMass, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.twin import Twin
 
 COMMON_NORMALS = ("standard-dh", "modified-dh", "s-model")
 TILTING = tuple(name for name in CONVERSIONS if name not in COMMON_NORMALS)

@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.conventions import JointKind
-from truearm.modeling.formats.dh_csv import dh_csv, read_dh_csv
-from truearm.modeling.formats.dh_table import DHConvention, DHTable, dh_table
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.conventions.convention import JointKind
+from truearm.engine.robot.dh_table import DHConvention, DHTable, dh_table
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.robot_files.formats import dh_csv, read_dh_csv
 
 FORMS: tuple[DHConvention, ...] = get_args(DHConvention)
 KINDS: tuple[JointKind, ...] = get_args(JointKind)

@@ -15,19 +15,21 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import truearm
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.balancers import Anchor, Balancer
-from truearm.modeling.effects import EFFECTS, NON_NEGATIVE, Effect
-from truearm.modeling.effects.backlash import SEATED
-from truearm.modeling.formats.export import exported
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.parts import LinkMass, Payload
-from truearm.modeling.postures import Postures, approach_of
-from truearm.modeling.robot import Robot
-from truearm.simulation.truths import joint_truths
-from truearm.simulation.twin import Twin
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.balancers import Anchor, Balancer
+from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
+from truearm.engine.robot.effects.backlash import SEATED
+from truearm.engine.robot.effects.effect import Effect
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import LinkMass, Payload
+from truearm.engine.robot.postures import Postures, approach_of
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.twin.truths import joint_truths
+from truearm.engine.twin.twin import Twin
+from truearm.engine.twin.twin_joint import JointTruth
+from truearm.robot_files.formats import exported
 
 #: All together; of clearance in one form.
 SPRING = Balancer("spring", Anchor(1, (-0.15, 0.05, 0.1)), Anchor(2, (0.2, 0.08, 0.03)), 400.0, 0.2, 1000.0)
@@ -247,7 +249,7 @@ def test_the_python_file_computes_it_or_says_that_it_does_not(effect: type[Effec
     assert effect.exportable == bool(np.abs(position - in_base.rigid.world_poses(q)[0]).max() > 1e-9)
 
 
-#: Modules outside of truearm.modeling.effects that name several effects, and why.
+#: Modules outside of truearm.engine.robot.effects that name several effects, and why.
 NAMED_ELSEWHERE = {
     "identification/solving/models.py": "a model is a choice of effects",
     "identification/inclinometers/fit.py": "so is the first stage of the method with inclinometers",

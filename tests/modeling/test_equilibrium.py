@@ -10,14 +10,14 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 from tests.modeling.test_effects import NAMES, loaded_arm
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.effects import EFFECTS
-from truearm.modeling.effects.backlash import SEATED
-from truearm.modeling.loads import joint_loads
-from truearm.modeling.parts import LinkMass, Payload
-from truearm.modeling.robot import Robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.effects.backlash import SEATED
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.loads import joint_loads
+from truearm.engine.robot.parts import LinkMass, Payload
+from truearm.engine.robot.robot import Robot
 
 
 @pytest.mark.parametrize("effects", [*((effect.name,) for effect in EFFECTS), NAMES], ids="+".join)

@@ -16,17 +16,17 @@ from numpy.testing import assert_allclose
 from tests.arms import ARMS
 from tests.modeling.test_chain import random_frame, random_robot
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.conventions import CONVENTIONS, Convention
-from truearm.modeling.formats import python_template
-from truearm.modeling.formats.dh_csv import read_dh_csv
-from truearm.modeling.formats.dh_table import TableConvention
-from truearm.modeling.formats.export import FORMATS, exported
-from truearm.modeling.parts import Joint, LinkMass, Payload, Tool
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.conventions import CONVENTIONS
+from truearm.engine.robot.conventions.convention import Convention
+from truearm.engine.robot.dh_table import TableConvention
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint, LinkMass, Payload, Tool
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY, Transform
+from truearm.robot_files import python_template
+from truearm.robot_files.formats import FORMATS, exported, read_dh_csv
 
 TABLES: Mapping[str, TableConvention] = {"dh": "standard-dh", "mdh": "modified-dh", "hayati": "hayati"}
 ELASTIC = ("compliance",)

@@ -11,17 +11,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.arms import ARMS
 from tests.modeling.test_effects import NAMES as EVERY_EFFECT
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.effects import EFFECTS
-from truearm.modeling.frames import FRAMES
-from truearm.modeling.inverse.solutions import PoseStatus
-from truearm.modeling.parameters import Parameter
-from truearm.modeling.parts import Joint, LinkMass, Payload
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rotation_vector
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.frames import FRAMES
+from truearm.engine.robot.inverse.pose_solver import PoseStatus
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import Parameter
+from truearm.engine.robot.parts import Joint, LinkMass, Payload
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, rotation_vector
 
 NAN, INFINITY = float("nan"), float("inf")
 #: Every effect that can be selected; of clearance the one form or the other.

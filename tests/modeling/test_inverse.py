@@ -12,17 +12,17 @@ from scipy.optimize import least_squares
 from tests.modeling.pinocchio_oracle import PinocchioChain
 from tests.modeling.test_effects import NAMES, loaded_arm
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.inverse import inverse
-from truearm.modeling.inverse.branches import BRANCHES, branch_rule
-from truearm.modeling.inverse.solutions import PoseStatus
-from truearm.modeling.parts import Joint, LinkMass, Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rotation_vector
-from truearm.simulation.truths import joint_truths
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.inverse.pose_solver import PoseStatus
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint, LinkMass, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, rotation_vector
+from truearm.engine.twin.truths import joint_truths
+from truearm.engine.twin.twin import Twin
 
 SIX = ["irb120", "irb1600", "lrmate200ic", "kr5", "puma560", "ur5", "ur10"]
 

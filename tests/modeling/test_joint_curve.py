@@ -13,14 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.effects.effect import LinearEffect
-from truearm.modeling.effects.joint_curve import HIGHEST, JointCurve, curve_names, curve_waves
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.inverse.kinematics import inverse
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.effects.effect import LinearEffect
+from truearm.engine.robot.effects.joint_curve import HIGHEST, JointCurve, curve_names, curve_waves
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
 
 
 def curved(seed: int, size: float = 1e-4, joints: tuple[int, ...] = (1, 2, 5)) -> Robot:

@@ -9,10 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.modeling.test_conventions import about, slid
 
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.conversion import converted
-from truearm.modeling.robot import Robot
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.conversion import converted
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
 
 #: Table 3: ebeta, egamma [deg], ex, ey, ez [mm].
 TABLE_3 = (

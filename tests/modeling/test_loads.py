@@ -10,15 +10,16 @@ from tests.arms import ARMS
 from tests.modeling.pinocchio_oracle import Body, PinocchioChain
 from tests.modeling.test_chain import random_frame, random_robot, random_unit
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array, Chain, Direction, Element, across, axis_of
-from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
-from truearm.modeling.loads import joint_loads
-from truearm.modeling.parts import GRAVITY, Joint, LinkMass, Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.simulation.twin_slides import carried, directions_at
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array, Chain, Direction, Element, across, axis_of
+from truearm.engine.robot.conventions import CONVENTIONS
+from truearm.engine.robot.conventions.convention import Convention, JointKind
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.loads import joint_loads
+from truearm.engine.robot.parts import GRAVITY, Joint, LinkMass, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.twin import carried, directions_at
 
 CONFIGURATIONS = 7
 WITH_MASSES = [name for name in ARMS if load_robot(name).masses]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from truearm.modeling.orientations import (
+from truearm.engine.robot.transform import (
     FIXED_XYZ_ANGLES,
     MOVING_XYZ_ANGLES,
     QUATERNION,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from truearm.errors import InputError
-from truearm.modeling.parts import Payload
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.parts import Payload
 
 
 @pytest.mark.parametrize(

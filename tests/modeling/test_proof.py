@@ -11,18 +11,20 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.errors import InputError
-from truearm.jobs.calibrate import calibrate
-from truearm.modeling.conversion import converted
-from truearm.modeling.formats.robot_file import arm_is_known, correlations, is_intact, read_robot, robot_text, sealed
-from truearm.modeling.formats.robot_file.correlations import correlations_text, factor_from
-from truearm.modeling.parameters import Parameter
-from truearm.modeling.parts import Payload
-from truearm.modeling.proof import Proof
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY
-from truearm.notices import Notice
-from truearm.results.calibration import Calibration
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.robot.conversion import converted
+from truearm.engine.robot.parameters import Parameter
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.proof import Proof
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file import curve_entry as correlations
+from truearm.engine.robot.robot_file.curve_entry import correlations_text, factor_from
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.seal import arm_is_known, is_intact, sealed
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import IDENTITY
 
 
 @pytest.fixture(scope="module")

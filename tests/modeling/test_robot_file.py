@@ -10,15 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.effects import EFFECTS
-from truearm.modeling.formats.robot_file import RobotFile, read_robot, robot_from_file, robot_text
-from truearm.modeling.parts import Payload, Tool
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.units import SHOWN_AS, to_si, written
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.units import SHOWN_AS, to_si, written
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload, Tool
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot, robot_from_file
+from truearm.engine.robot.robot_file.schema import RobotFile
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
 
 PLAIN = """\
 truearm: truearm-robot/1

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from truearm.errors import InputError
-from truearm.library import library, load_robot, urdf_source
-from truearm.modeling.chain import Array
-from truearm.modeling.conventions import parallel_joints_without_beta
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.formats.urdf_writing import urdf_text
-from truearm.modeling.robot import Robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.conventions.parallel import parallel_joints_without_beta
+from truearm.engine.robot.library import library, load_robot, urdf_source
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.urdf_writing import urdf_text
 
 
 def position(robot: Robot, degrees: list[float]) -> Array:

@@ -11,11 +11,12 @@ from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests import ur_controller as ur
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.formats.export import exported
-from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.formats.ur_kinematics import (
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.ur_kinematics import (
     controller_robot,
     mean_angle,
     mean_distance,
@@ -23,7 +24,7 @@ from truearm.modeling.formats.ur_kinematics import (
     refuse_far,
     with_kinematics,
 )
-from truearm.modeling.robot import Robot
+from truearm.robot_files.formats import exported
 
 JOINTS = np.random.default_rng(3).uniform(-np.pi, np.pi, (50, 6))
 #: An arm with the lengths of a UR5 as the ROS driver wrote it (a public repository; its hash is calib_1520...).

@@ -15,17 +15,20 @@ from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests.arms import ARMS
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array, Chain
-from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
-from truearm.modeling.formats.robot_file import RobotFile, read_robot, robot_from_file, robot_text
-from truearm.modeling.formats.urdf import calibrated_urdf, read_urdf
-from truearm.modeling.formats.urdf_tree import roll_pitch_yaw
-from truearm.modeling.formats.urdf_writing import urdf_text
-from truearm.modeling.parts import Joint, LinkMass
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array, Chain
+from truearm.engine.robot.conventions import CONVENTIONS
+from truearm.engine.robot.conventions.convention import Convention, JointKind
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint, LinkMass
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot, robot_from_file
+from truearm.engine.robot.robot_file.schema import RobotFile
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
+from truearm.engine.robot.urdf import calibrated_urdf, read_urdf
+from truearm.engine.robot.urdf_tree import roll_pitch_yaw
+from truearm.engine.robot.urdf_writing import urdf_text
 
 # A UR5 as ROS writes it: rounded right angles, a world link, a fixed tool0, and a sensor beside the chain.
 UR_LIKE = b"""<?xml version="1.0" ?>

@@ -13,17 +13,19 @@ from tests.modeling.pinocchio_oracle import PinocchioChain
 from tests.modeling.test_chain import random_frame, random_robot
 
 from truearm import InputError
-from truearm.jobs.export import export
-from truearm.library import load_robot
-from truearm.modeling.chain import Array, Chain
-from truearm.modeling.conventions import CONVENTIONS
-from truearm.modeling.equilibrium import joint_efforts
-from truearm.modeling.formats.robot_file import is_intact, read_robot, robot_text
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.modeling.wrench import WRENCH_FRAMES, Wrench, WrenchFrame
-from truearm.simulation.twin import Twin, measure, with_wrench_read
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.robot.chain import Array, Chain
+from truearm.engine.robot.conventions import CONVENTIONS
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.loads import joint_efforts
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.seal import is_intact
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
+from truearm.engine.robot.wrench import WRENCH_FRAMES, Wrench, WrenchFrame
+from truearm.engine.twin.twin import Twin, measure, with_wrench_read
+from truearm.engine.twin.twin_joint import JointTruth
+from truearm.robot_files.convert import export
 
 FORCE, MOMENT = (11.0, -7.0, 5.0), (0.6, -0.8, 1.1)
 
@@ -262,7 +264,7 @@ def test_the_rated_load_is_in_the_file_and_says_nothing_of_the_arm(tmp_path: Pat
 def calibrated() -> Robot:
     from tests.simulated import campaign
 
-    from truearm.jobs.calibrate import calibrate
+    from truearm.calibration.calibrate import calibrate
 
     return calibrate("irb120", campaign("irb120", 20, 0.05e-3, 1)[1], model="offsets").robot
 

@@ -9,19 +9,17 @@ import numpy as np
 import pytest
 from tests.sampled_arm import sampled_room
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.robot import Robot
-from truearm.planning.choosing.measurement_plan import with_targets
-from truearm.planning.constraints.segments import box_distance
-from truearm.planning.driving.arm_capsules import ArmCapsules
-from truearm.planning.driving.cell import Cell, KeepOut, stands
-from truearm.planning.driving.collisions import MARGIN, CollisionCheck
-from truearm.planning.driving.drawing import drawn_clear
-from truearm.planning.driving.home import checked_home, safe_configuration
-from truearm.planning.driving.joint_window import joint_window, on_principal_turn
-from truearm.planning.driving.touring import tour_of, unreached
-from truearm.planning.driving.ways import WayFinder, touched
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.arm_capsules import ArmCapsules
+from truearm.engine.motion.cell import Cell, KeepOut, box_distance, stands
+from truearm.engine.motion.collisions import MARGIN, CollisionCheck
+from truearm.engine.motion.constraints import joint_window, on_principal_turn
+from truearm.engine.motion.home import checked_home, safe_configuration
+from truearm.engine.motion.touring import tour_of, unreached
+from truearm.engine.motion.ways import WayFinder, drawn_clear, touched
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.planning.choosing import with_targets
 
 TABLE = KeepOut("table", np.array([0.3, -0.2, 0.0]), np.array([0.6, 0.2, 0.3]))
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.planning.constraints.clearance import smallest_clearance
-from truearm.planning.constraints.constraints import Constraints, allowed, read_constraints, refuse_clearance_of
-from truearm.simulation.truths import STATION, truth_twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cell import smallest_clearance
+from truearm.engine.motion.constraints import Constraints, allowed, read_constraints, refuse_clearance_of
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import STATION, truth_twin
 
 HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
 COUNT = 60
@@ -134,7 +134,7 @@ joints:
 
 
 def test_distances_of_links_by_brute_force(arm: Robot) -> None:
-    from truearm.planning.constraints.segments import segment_distance
+    from truearm.engine.motion.cell import segment_distance
 
     rng = np.random.default_rng(2)
     a, b, c, d = rng.normal(size=(4, 40, 3))

@@ -8,10 +8,18 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.modeling.chain import Array
-from truearm.planning.choosing.exchange import Candidates, exchanged, most_informative, most_informative_number
-from truearm.planning.choosing.observability import INDICES, O1, OfInterest, observability
+from truearm.engine.base.errors import InputError
+from truearm.engine.fit.design import (
+    INDICES,
+    O1,
+    Candidates,
+    OfInterest,
+    exchanged,
+    most_informative,
+    most_informative_number,
+    observability,
+)
+from truearm.engine.robot.chain import Array
 
 
 def told(rows: Array, chosen: list[int], known: Array, interest: int) -> float:

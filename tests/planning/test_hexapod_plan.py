@@ -7,31 +7,26 @@ from functools import reduce
 
 import numpy as np
 import pytest
+from papers.campaign import Campaign, touching, two_steps
+from papers.placements import identify_placements, in_one_frame
+from papers.session import joined
+from papers.simulated import ballbar
 from scipy.optimize import minimize
 
-from truearm.errors import InputError
-from truearm.identification.hexapod.campaign import Campaign, touching, two_steps
-from truearm.identification.hexapod.placements import identify_placements, in_one_frame
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.hexapod.geometry import DEVICE, triangle
-from truearm.measurement.hexapod.kinematics import leg_lengths
-from truearm.measurement.hexapod.poses import HexapodPose, poses
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.planning.constraints.segments import segment_distance
-from truearm.planning.hexapod.clearance import arm_links, clearance
-from truearm.planning.hexapod.reachable import Reachable, reachable
-from truearm.planning.hexapod.steps import steps_text
-from truearm.planning.hexapod.tool import with_cups
-from truearm.simulation.hexapod.session import joined
-from truearm.simulation.hexapod.simulated import ballbar
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.hexapod import DEVICE, HexapodPose, leg_lengths, poses, triangle
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.motion.cell import segment_distance
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import JointTruth
+from truearm.hexapod.reachable import Reachable, arm_links, clearance, reachable, steps_text, with_cups
 
 HALF = np.radians(-15.0)
 #: B1 of a fixture that stands before the robot, turned by -30 deg.

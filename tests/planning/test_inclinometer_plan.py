@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from tests.tilting import DEGREE, RESOLUTION
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement.inclinometer import deviation_of_change
-from truearm.modeling.chain import Array
-from truearm.planning.choosing.inclinometer import TiltingPlan, plan_tilting
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.inclinations import deviation_of_change
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.inclinometers.pairs import TiltingPlan, plan_tilting
 
 DEVIATION = deviation_of_change(RESOLUTION)
 
@@ -71,7 +71,7 @@ def test_chosen_pairs_tell_more_than_twice_as_many_at_random(monkeypatch: pytest
     def first_come(rows: Array, count: int, known: Array, interest: int) -> list[int]:
         return list(range(count))
 
-    monkeypatch.setattr("truearm.planning.choosing.inclinometer.most_informative", first_come)
+    monkeypatch.setattr("truearm.engine.fit.design.most_informative", first_come)
     assert volume(chosen) < volume(planned(inclined=48, posed=16))
 
 

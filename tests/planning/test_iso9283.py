@@ -8,13 +8,13 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.inverse import inverse
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
-from truearm.planning.poses.iso9283 import PLANES, Cube
-from truearm.planning.poses.largest_cube import largest_cube
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cube import PLANES, Cube
+from truearm.engine.motion.largest_cube import largest_cube
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
 
 CUBE = Cube((0.4, 0.1, 0.3), 0.2)
 

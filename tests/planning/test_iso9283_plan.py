@@ -11,14 +11,14 @@ import pytest
 from tests.performance_plan import small_plan
 
 import truearm
-from truearm.errors import InputError
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
-from truearm.planning.iso9283.plan import performance_plan
-from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text, read_cube, read_plan
-from truearm.planning.poses.iso9283 import Cube
-from truearm.planning.poses.tip import Tip
-from truearm.results.iso9283_plan import Iso9283Plan
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cube import Cube
+from truearm.engine.motion.joint_motion import Tip
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.iso9283.plan.choosing import performance_plan
+from truearm.iso9283.plan.criteria import CRITERIA, TEST_OF, TESTS
+from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text, read_cube, read_plan
+from truearm.iso9283.plan.result import Iso9283Plan
 
 CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 
@@ -222,7 +222,7 @@ def test_a_plan_file_that_cannot_be_used_is_refused(
 def test_the_largest_cube_is_that_of_the_robot_whichever_tests_are_planned(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = truearm.load_robot("irb120")
     found = Cube([0.3036, 0.0, 0.3036], 0.4239)  # AP alone would be planned in it
-    monkeypatch.setattr("truearm.planning.iso9283.plan.largest_cube", lambda *_, **__: found)
+    monkeypatch.setattr("truearm.engine.motion.largest_cube.largest_cube", lambda *_, **__: found)
     sides = {
         tests: performance_plan(robot, tests=tests, rated_load=3.0, rated_velocity=1.0).cube.side
         for tests in (("AP",), ("AT", "vAP"))

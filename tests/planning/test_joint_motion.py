@@ -11,18 +11,15 @@ import pytest
 from scipy.optimize import least_squares
 from tests.modeling.pinocchio_oracle import PinocchioChain
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.inverse.pose_solver import Orientation
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.paths.joint_motion import JointMotion, joint_motion
-from truearm.planning.paths.paths import Circle, Line
-from truearm.planning.paths.time_law import timed
-from truearm.planning.paths.trajectory import Trajectory
-from truearm.planning.poses.tip import Tip
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.joint_motion import JointMotion, Tip, joint_motion
+from truearm.engine.motion.paths import Circle, Line, Trajectory, timed
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.inverse.pose_solver import Orientation
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY, Transform
 
 TILTED = Transform((0.4, -0.2, 0.7), (0.8, 0.0, 0.6, 0.0))
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import Transform
-from truearm.planning.driving.arm_capsules import ArmCapsules
-from truearm.planning.driving.cell import KeepOut
-from truearm.planning.driving.lines_of_sight import BEAM, hidden
+from truearm.engine.motion.arm_capsules import ArmCapsules
+from truearm.engine.motion.cell import KeepOut
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform
+from truearm.measuring.lines_of_sight import BEAM, hidden
 
 BASE = Transform((2.0, 0.5, -0.4), (np.cos(0.2), 0.0, 0.0, np.sin(0.2)))
 ROBOT = load_robot("irb120").with_frames(BASE, {"tip": [0.0, 0.0, 0.1]})

@@ -9,12 +9,12 @@ import pytest
 from tests.sampled_arm import sampled_room
 
 from truearm import load_robot
-from truearm.planning.choosing.measurement_plan import with_targets
-from truearm.planning.driving.cell import Cell, KeepOut
-from truearm.planning.driving.collisions import CollisionCheck
-from truearm.planning.driving.joint_window import joint_window
-from truearm.planning.driving.links_beside import beside_notices, links_beside
-from truearm.planning.driving.nearest import nearest_on
+from truearm.engine.motion.arm_capsules import beside_notices, links_beside
+from truearm.engine.motion.cell import Cell, KeepOut
+from truearm.engine.motion.collisions import CollisionCheck
+from truearm.engine.motion.constraints import joint_window
+from truearm.engine.motion.touring import nearest_on
+from truearm.planning.choosing import with_targets
 
 #: Where upper arm and forearm truly lie along the axis of joint 2 [m]: ``offsets`` of physical_parameters.yaml in
 #: UniversalRobots/Universal_Robots_ROS2_Description; of the PUMA, the centre of gravity of the upper arm (Armstrong et

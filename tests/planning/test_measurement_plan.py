@@ -8,26 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.jobs.accuracy_goal import accuracy_goal
-from truearm.library import load_robot
-from truearm.planning.choosing import prediction
-from truearm.planning.choosing.measurement_plan import (
-    APPROACH,
-    MeasurementPlan,
-    plan_measurements,
-    random_candidates,
-    with_targets,
-)
-from truearm.planning.choosing.ordering import short_order
-from truearm.planning.choosing.prediction import predict
-from truearm.planning.choosing.sensitivity import sensitivity
-from truearm.planning.constraints.constraints import Constraints
-from truearm.results.plan import Plan
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.base.errors import InputError
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.motion.constraints import Constraints
+from truearm.engine.motion.ordering import short_order
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.planning import accuracy as prediction
+from truearm.planning.accuracy import accuracy_goal, predict, sensitivity
+from truearm.planning.choosing import APPROACH, MeasurementPlan, plan_measurements, random_candidates, with_targets
+from truearm.planning.result import Plan
 
 POLISHING = Path(__file__).parents[1] / "compensation" / "programs" / "samples" / "rapid" / "polish.mod"
 MODEL = {model.name: model for model in MODELS}

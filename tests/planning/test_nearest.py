@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from truearm import load_robot
-from truearm.modeling.robot import Robot
-from truearm.planning.choosing.measurement_plan import with_targets
-from truearm.planning.driving.cell import Cell, KeepOut
-from truearm.planning.driving.collisions import CollisionCheck
-from truearm.planning.driving.joint_window import joint_window
-from truearm.planning.driving.nearest import nearest_on
-from truearm.planning.driving.said_of_cells import cell_notices
+from truearm.engine.motion.cell import Cell, KeepOut
+from truearm.engine.motion.collisions import CollisionCheck
+from truearm.engine.motion.constraints import joint_window
+from truearm.engine.motion.touring import cell_notices, nearest_on
+from truearm.engine.robot.robot import Robot
+from truearm.planning.choosing import with_targets
 
 TABLE = KeepOut("table", np.array([0.3, -0.2, 0.0]), np.array([0.6, 0.2, 0.3]))
 BENCH = KeepOut("bench", np.array([-0.9, -0.9, -0.9]), np.array([0.9, 0.9, 0.0]))

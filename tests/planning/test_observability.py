@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.planning.choosing.observability import INDICES, Objective, OfInterest, OfPredictions, observability
+from truearm.engine.fit.design import INDICES, Objective, OfInterest, OfPredictions, observability
 
 
 def test_an_orthogonal_jacobian_in_closed_form() -> None:

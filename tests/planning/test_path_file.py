@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tests.jobs.examples import PATH
 
-from truearm.errors import InputError
-from truearm.planning.paths.path_file import PlannedPath, read_path
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.path_file import PlannedPath, read_path
 
 HEAD = """\
 truearm: truearm-path/1

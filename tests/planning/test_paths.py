@@ -10,10 +10,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from truearm.errors import InputError
-from truearm.modeling.chain import Array
-from truearm.planning.paths.paths import Circle, Hermite, Line, Path
-from truearm.planning.paths.time_law import TimeLaw, timed
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.paths import Circle, Hermite, Line, Path, TimeLaw, timed
+from truearm.engine.robot.chain import Array
 
 WAYPOINTS = np.array([[0.3, 0.0, 0.2], [0.4, 0.1, 0.25], [0.35, 0.25, 0.3], [0.2, 0.3, 0.2]])
 VELOCITIES = np.array([[0.1, 0.0, 0.0], [0.05, 0.15, 0.05], [-0.1, 0.1, 0.0], [-0.1, 0.0, -0.1]])

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from tests.modeling.pinocchio_oracle import PinocchioChain
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.transform import Transform
-from truearm.planning.choosing.ordering import all_moving_order, smallest_moves
-from truearm.planning.poses.iso9283 import PLANES, Cube
-from truearm.planning.poses.pose_plan import plan_poses
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cube import PLANES, Cube
+from truearm.engine.motion.largest_cube import plan_poses
+from truearm.engine.motion.ordering import all_moving_order, smallest_moves
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform
 
 ARMS = {
     "katana450": Cube((0.3, 0.0, 0.2), 0.25),

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.transform import rotation_vector
-from truearm.planning.poses.iso9283 import Cube
-from truearm.planning.poses.pose_sets import POSE_SETS, pose_set
-from truearm.planning.poses.seven_lines import DOWN
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cube import DOWN, Cube
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import rotation_vector
+from truearm.planning.pose_sets import POSE_SETS, pose_set
 
 ROBOT = load_robot("irb120")
 CUBE = Cube((0.35, 0.0, 0.35), 0.2)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.planning.choosing.reachable import Reachable, chosen_with_ways
-from truearm.planning.driving.cell import Cell, boxes_of
-from truearm.planning.driving.collisions import CollisionCheck
-from truearm.planning.driving.ways import WayFinder
-from truearm.simulation.truths import carrying_targets
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cell import Cell, boxes_of
+from truearm.engine.motion.collisions import CollisionCheck
+from truearm.engine.motion.ways import WayFinder
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import carrying_targets
+from truearm.planning.choosing import Reachable, chosen_with_ways
 
 HOME = np.deg2rad([90.0, 60, -30, 0, 0, 0])
 

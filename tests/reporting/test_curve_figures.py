@@ -9,19 +9,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from truearm.identification.judging.expected_error import expected_error
-from truearm.identification.judging.found_curves import FoundCurve
-from truearm.identification.solving.fit import identify, place
-from truearm.identification.solving.models import named_model
-from truearm.library import load_robot
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.reporting.curve_figures import curve_figure, curve_rows
-from truearm.reporting.drawing import DARK
-from truearm.reporting.report import Report, report_html
-from truearm.results.calibration import Calibration
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.calibration.figures import curve_figure, curve_rows
+from truearm.calibration.report import Report, report_html
+from truearm.calibration.result import Calibration
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.curves import FoundCurve
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.document.drawing import DARK
+from truearm.engine.fit.fit import identify, place
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 
 def curve(places: Array, deviation: float = 1.0) -> FoundCurve:

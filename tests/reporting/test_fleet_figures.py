@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from tests.fleets.simulated_series import campaign, rows
 
-from truearm.fleets.analysis.analysis import Analysis, analysed
-from truearm.fleets.rows import Accuracy
-from truearm.reporting.fleet_figures import fleet_figures
+from truearm.fleets.analysis import Analysis, analysed
+from truearm.fleets.figures import fleet_figures
+from truearm.fleets.series import Accuracy
 
 COUNT = len(campaign().own)
 

@@ -3,11 +3,11 @@ from __future__ import annotations
 import json
 
 import numpy as np
+from papers.katana.robot import NAMES, PERTURBATIONS
 from tests.katana import katana
 
-from truearm.identification.solving.influence import Influence, influence
-from truearm.reporting.influence_figures import influence_figure
-from truearm.studies.katana.robot import NAMES, PERTURBATIONS
+from truearm.simulation.influence_report import influence_figure
+from truearm.simulation.influences import Influence, influence
 
 
 def test_the_picture_shows_average_and_range_in_mm() -> None:

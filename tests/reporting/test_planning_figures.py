@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from truearm.library import load_robot
-from truearm.planning.paths.joint_motion import joint_motion
-from truearm.planning.paths.time_law import timed
-from truearm.planning.poses.iso9283 import PLANES, Cube
-from truearm.planning.poses.pose_plan import plan_poses
-from truearm.reporting.planning_figures import joint_trajectories, pose_cube
+from truearm.engine.document.planning_figures import joint_trajectories, pose_cube
+from truearm.engine.motion.cube import PLANES, Cube
+from truearm.engine.motion.joint_motion import joint_motion
+from truearm.engine.motion.largest_cube import plan_poses
+from truearm.engine.motion.paths import timed
+from truearm.engine.robot.library import load_robot
 
 ROBOT = load_robot("irb120")
 CUBE = Cube((0.35, 0.0, 0.4), 0.3)

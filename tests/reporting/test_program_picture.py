@@ -10,8 +10,8 @@ import pytest
 from tests.answered import compensate
 
 import truearm
-from truearm.reporting.program_report import _flat_view, path_figure
-from truearm.results.program_correction import ProgramCorrection
+from truearm.compensation.report import _flat_view, path_figure
+from truearm.compensation.result import ProgramCorrection
 
 GRID = np.array([[x, y, 0.0] for x in (0.0, 100.0, 200.0) for y in (0.0, 50.0)])
 
@@ -19,7 +19,7 @@ GRID = np.array([[x, y, 0.0] for x in (0.0, 100.0, 200.0) for y in (0.0, 50.0)])
 @pytest.fixture(scope="module")
 def plate(tmp_path_factory: pytest.TempPathFactory) -> ProgramCorrection:
     folder = tmp_path_factory.mktemp("plate")
-    (folder / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text())
+    (folder / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
     data = truearm.simulate("irb120", truth="random", poses=20, noise=5e-5, seed=1).data
     robot = truearm.calibrate("irb120", data, model="offsets").robot
     return compensate(

@@ -14,23 +14,22 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from truearm.identification.judging.expected_error import expected_error
-from truearm.identification.solving.fit import identify, place
-from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.rounds import Redundant
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, quaternion_from_rotation
-from truearm.notices import Notice
-from truearm.reporting.drawing import DARK, logarithmic_axis
-from truearm.reporting.numbers import deserved, significant, student_975
-from truearm.reporting.page import json_for_script
-from truearm.reporting.report import Report, report_html
-from truearm.results.calibration import Calibration
-from truearm.simulation.twin import Twin, measure
+from truearm.calibration.report import Report, report_html
+from truearm.calibration.result import Calibration
+from truearm.engine.base.errors import Notice
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.document.drawing import DARK, deserved, logarithmic_axis, significant, student_975
+from truearm.engine.document.page import json_for_script
+from truearm.engine.fit.fit import identify, place
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.rounds import Redundant
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation
+from truearm.engine.twin.twin import Twin, measure
 
 HOSTILE: Final = "</script><b>"
 MODEL_BY_NAME: Final = {model.name: model for model in MODELS}
@@ -180,7 +179,7 @@ def test_the_same_report_is_the_same_page() -> None:
 
 
 def test_plotly_itself_is_not_imported() -> None:
-    code = "import sys, truearm.reporting.report; sys.exit('plotly.graph_objects' in sys.modules)"
+    code = "import sys, truearm.calibration.report; sys.exit('plotly.graph_objects' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

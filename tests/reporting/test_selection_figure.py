@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from truearm.identification.choosing.choice import Candidate, Selection
-from truearm.identification.choosing.search import Gain
-from truearm.identification.solving.models import named_model
-from truearm.reporting.selection_figure import candidates_figure, choice_sentence
+from truearm.calibration.figures import candidates_figure, choice_sentence
+from truearm.engine.choosing.search import Gain
+from truearm.engine.choosing.selection import Candidate, Selection
+from truearm.engine.fit.models import named_model
 
 
 def selection() -> Selection:

@@ -13,8 +13,8 @@ import pytest
 from tests.simulated import campaign
 
 import truearm
-from truearm.measurement.statistics import errors_of
-from truearm.results.calibration import Calibration
+from truearm.calibration.result import Calibration
+from truearm.engine.data.statistics import errors_of
 
 
 @cache

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from truearm.measurement.dataset import IntArray
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.simulation.devices.hexapod_poses import HexapodPoses
+from truearm.engine.data.dataset import IntArray
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.devices.lengths import HexapodPoses
 
 Reachable = tuple[Array, IntArray, IntArray, Array]
 

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.library import load_robot
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
-from truearm.simulation import gear_errors
-from truearm.simulation.gear_errors import DRAWN
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin import twin_joint as gear_errors
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
+from truearm.engine.twin.twin_joint import DRAWN, JointTruth
 
 TURN = np.linspace(-math.pi, math.pi, 7200, endpoint=False)
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from truearm.library import load_robot
-from truearm.modeling.parts import Joint, Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.simulation.inclinometer import inclinations
-from truearm.simulation.twin import Twin
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Joint, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.twin import Twin
+from truearm.engine.twin.twin_joint import JointTruth
+from truearm.inclinometers.pairs import inclinations
 
 RNG = np.random.default_rng
 

@@ -13,22 +13,25 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement import inclinometer
-from truearm.modeling.chain import Array
-from truearm.modeling.effects import EFFECTS, Effect
-from truearm.modeling.effects.gain import Gain
-from truearm.modeling.parameters import Parameter
-from truearm.modeling.parts import GRAVITY, Joint, LinkMass, Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.simulation import twin as twin_module
-from truearm.simulation import twin_body, twin_joint
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import joint_truths, truth_twin
-from truearm.simulation.twin import Conditions, Posture, Twin, directions, measure
-from truearm.simulation.twin_joint import Contact, JointTruth
+from truearm.engine.base.errors import InputError
+from truearm.engine.data import inclinations as inclinometer
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.effects.effect import Effect
+from truearm.engine.robot.effects.gain import Gain
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import Parameter
+from truearm.engine.robot.parts import GRAVITY, Joint, LinkMass, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin import twin as twin_body
+from truearm.engine.twin import twin as twin_module
+from truearm.engine.twin import twin_joint
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import joint_truths, truth_twin
+from truearm.engine.twin.twin import Conditions, Posture, Twin, directions, measure
+from truearm.engine.twin.twin_joint import Contact, JointTruth
 
 G = 9.80665
 RNG = np.random.default_rng  # noise is zero in most of these tests
@@ -167,7 +170,9 @@ def test_axes_of_a_joint_in_any_direction() -> None:
 def test_the_twin_goes_a_way_of_its_own(module: ModuleType) -> None:
     assert module.__file__ is not None
     imports = [n for n in ast.walk(ast.parse(Path(module.__file__).read_text())) if isinstance(n, ast.ImportFrom)]
-    names = {alias.name for n in imports if n.module and n.module.startswith("truearm.modeling") for alias in n.names}
+    names = {
+        alias.name for n in imports if n.module and n.module.startswith("truearm.engine.robot") for alias in n.names
+    }
     assert names <= {"Array", "Element", "LinkMass", "Postures", "Robot", "Wrench"}  # data, and nothing that computes
 
 
@@ -474,7 +479,7 @@ def test_an_effect_that_the_twin_does_not_compute_is_refused(monkeypatch: pytest
         def parameters(self) -> tuple[Parameter, ...]:
             return (self.parameter("wobble_1", "rad", 1e-3),)
 
-    monkeypatch.setattr("truearm.modeling.robot_data.EFFECTS", (Wobble,))
+    monkeypatch.setattr("truearm.engine.robot.effects.EFFECTS", (Wobble,))
     with pytest.raises(InputError, match=r"does not compute this joint effect; got 'wobble_1'"):
         joint_truths(replace(load_robot("irb120"), effect_names=("wobble",)))
 

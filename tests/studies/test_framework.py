@@ -13,16 +13,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from papers import STUDIES, Entry, run_study
+from papers.regions import IRB120
+from papers.seeds import Seed, median_of, over_seeds, seeds_done_by
+from papers.study import Picture, Row, Study, Table, number
+from papers.verdicts import VERDICTS, Comparison
 
 import truearm
-from truearm.errors import InputError
-from truearm.executing.workers import Given
-from truearm.reporting.drawing import axis, figure
-from truearm.studies import STUDIES, Entry, run_study
-from truearm.studies.regions import IRB120
-from truearm.studies.seeds import Seed, median_of, over_seeds, seeds_done_by
-from truearm.studies.study import Picture, Row, Study, Table, number
-from truearm.studies.verdicts import VERDICTS, Comparison
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.workers import Given
+from truearm.engine.document.drawing import axis, figure
 
 HOSTILE = "</script><b>"
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import pytest
-
-from truearm.studies import hexapod_device, irb120_hexapod
-from truearm.studies.study import Study
+from papers import hexapod_device, irb120_hexapod
+from papers.study import Study
 
 
 def silent(_: str) -> None:

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from papers.irb120_devices import study
+from papers.irb120_devices.setups import SETUPS, shares, twin_of, visible_configurations
+from papers.irb120_devices.twin import Truth, driven, running_out
+from papers.study import Row, Study
 
-from truearm.simulation.devices import named_device
-from truearm.simulation.truths import truth_twin
-from truearm.studies.irb120_devices import study
-from truearm.studies.irb120_devices.setups import SETUPS, shares, twin_of, visible_configurations
-from truearm.studies.irb120_devices.twin import Truth, driven, running_out
-from truearm.studies.study import Row, Study
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.truths import truth_twin
 
 
 @pytest.fixture(scope="module")

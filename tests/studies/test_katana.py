@@ -7,16 +7,16 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from papers.katana.pose_errors import pose_errors, tip_poses, true_poses, zxz
+from papers.katana.printed import TABLE_3_2, TABLE_3_3, column_of_4_6
+from papers.katana.robot import NAMES, TIP, Published, deviations, katana, published
+from papers.katana.tilting import TILTING, compliance, twin, with_tilting
+from papers.katana_influence import study as influence_study
+from papers.katana_tilting import study as tilting_study
+from papers.katana_trajectory import study as trajectory_study
+from papers.study import Study
 
-from truearm.simulation.twin import Twin
-from truearm.studies.katana.pose_errors import pose_errors, tip_poses, true_poses, zxz
-from truearm.studies.katana.printed import TABLE_3_2, TABLE_3_3, column_of_4_6
-from truearm.studies.katana.robot import NAMES, TIP, Published, deviations, katana, published
-from truearm.studies.katana.tilting import TILTING, compliance, twin, with_tilting
-from truearm.studies.katana_influence import study as influence_study
-from truearm.studies.katana_tilting import study as tilting_study
-from truearm.studies.katana_trajectory import study as trajectory_study
-from truearm.studies.study import Study
+from truearm.engine.twin.twin import Twin
 
 
 def turn(axis: str, angle: float) -> np.ndarray:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from papers.katana.robot import katana
+from papers.katana_devices import study
+from papers.katana_devices.page import OnPage
+from papers.katana_devices.run import together
+from papers.katana_devices.setup import USED, Counts
+from papers.study import Study
 
-from truearm.measurement.observations import compared
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.twin import Twin
-from truearm.studies.katana.robot import katana
-from truearm.studies.katana_devices import study
-from truearm.studies.katana_devices.page import OnPage
-from truearm.studies.katana_devices.run import together
-from truearm.studies.katana_devices.setup import USED, Counts
-from truearm.studies.study import Study
+from truearm.engine.data.observations import compared
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.twin import Twin
 
 
 @pytest.fixture(scope="module")

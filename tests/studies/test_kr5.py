@@ -1,8 +1,7 @@
 from __future__ import annotations
 
 import pytest
-
-from truearm.studies.kr5_gdt import study
+from papers.kr5_gdt import study
 
 
 def test_kr5() -> None:

@@ -4,11 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.validate import validate
-from truearm.studies.li_table import study
-from truearm.studies.li_table.arm import (
+from papers.li_table import study
+from papers.li_table.arm import (
     BEYOND,
     PLACE,
     arm,
@@ -21,9 +18,12 @@ from truearm.studies.li_table.arm import (
     truth,
     verification,
 )
-from truearm.studies.li_table.run import Followed, Following
-from truearm.studies.li_table.tables import METHOD_WORDS, SURFACE_WORDS
-from truearm.studies.study import Row, Study, Table
+from papers.li_table.run import Followed, Following
+from papers.li_table.tables import METHOD_WORDS, SURFACE_WORDS
+from papers.study import Row, Study, Table
+
+from truearm.calibration.calibrate import calibrate
+from truearm.validation.validate import validate
 
 THEIRS, UNBOUNDED = METHOD_WORDS["distances"], METHOD_WORDS["unbounded"]
 TOGETHER = SURFACE_WORDS["together"]

@@ -5,13 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from truearm.measurement.hexapod.geometry import triangle
-from truearm.modeling.transform import Transform
-from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
-from truearm.studies.lrmate_hexapod import study
-from truearm.studies.lrmate_hexapod.identification import (
+from papers.lrmate_hexapod import study
+from papers.lrmate_hexapod.identification import (
     NAMES,
     Cups,
     Following,
@@ -19,9 +14,14 @@ from truearm.studies.lrmate_hexapod.identification import (
     identified_holding,
     rebased,
 )
-from truearm.studies.lrmate_hexapod.judgement import allowed_configurations, held_out, judged
-from truearm.studies.lrmate_hexapod.robot import FIXTURE, REFERENCE, invented_twin, nominal_robot, touches
-from truearm.studies.study import Study, Table
+from papers.lrmate_hexapod.judgement import allowed_configurations, held_out, judged
+from papers.lrmate_hexapod.robot import FIXTURE, REFERENCE, invented_twin, nominal_robot, touches
+from papers.study import Study, Table
+
+from truearm.engine.data.hexapod import triangle
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import JointTruth
 
 
 @pytest.fixture(scope="module")

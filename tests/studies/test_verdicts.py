@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pytest
-
-from truearm.studies.verdicts import Claim, Comparison, Verdict
+from papers.verdicts import Claim, Comparison, Verdict
 
 
 @pytest.mark.parametrize(

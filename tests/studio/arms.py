@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from truearm.modeling.conventions import JointKind
-from truearm.modeling.parts import Joint
-from truearm.modeling.robot import Robot
+from truearm.engine.robot.conventions.convention import JointKind
+from truearm.engine.robot.parts import Joint
+from truearm.engine.robot.robot import Robot
 
 Row = dict[str, float]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 from truearm.studio.window import Window
 
 

@@ -9,7 +9,7 @@ from tests.studio.conftest import Serving
 from tests.studio.talking import UPGRADE, alive, answer, get, own, window
 from websockets.exceptions import InvalidStatus
 
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 from truearm.studio import access as module
 from truearm.studio.access import Access, is_loopback, listening_socket
 

@@ -10,7 +10,7 @@ from tests.simulated import campaign
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, below
 
-from truearm.measurement.readers.canonical import csv_text
+from truearm.engine.data.readers.canonical import csv_text
 from truearm.studio.pages.calibrate import CalibratePage
 from truearm.studio.window import Window
 

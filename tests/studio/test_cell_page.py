@@ -12,13 +12,13 @@ from tests.studio.conftest import Serving
 from tests.studio.pressing import below
 from tests.studio.typing_in import typed
 
-from truearm.errors import InputError
-from truearm.files import read_yaml
-from truearm.library import load_robot
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.proof import Proof
-from truearm.modeling.transform import Transform
-from truearm.planning.constraints.constraints import Constraints, keep_out
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import read_yaml
+from truearm.engine.motion.constraints import Constraints, keep_out
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.proof import Proof
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
 from truearm.studio.cell_places import Thing, file_for_places, placed_text, things_of, with_base, with_thing
 from truearm.studio.cell_rules import changed_rules, read_rules, with_box, with_length, without_box
 from truearm.studio.pages.cell import CellPage

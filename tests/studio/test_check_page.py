@@ -12,13 +12,12 @@ from tests.simulated import campaign
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, notices
 
-from truearm.errors import InputError
-from truearm.jobs import following
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.notices import Notice
+from truearm.calibration import calibrate as following
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.studio.checked import Checked
 from truearm.studio.pages.calibrate import CalibratePage
 from truearm.studio.pages.check import CheckPage

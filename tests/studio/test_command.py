@@ -77,7 +77,7 @@ def test_a_demonstration_that_was_changed_is_opened_as_it_is(tmp_path: Path) -> 
 def test_without_the_extra_it_says_what_to_install(
     truearm: Truearm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys.modules["truearm.cli.studio"], "find_spec", lambda _: None)
+    monkeypatch.setattr(sys.modules["truearm.studio.command_studio"], "find_spec", lambda _: None)
     run = truearm("studio", tmp_path / "new", "--no-open")
     assert run.code == 2
     assert "the studio needs the extra truearm[studio]. Install it: pip install 'truearm[studio]'." in run.err
@@ -110,7 +110,7 @@ def test_it_says_where_it_is_and_what_is_exposed_and_ends_with_ctrl_c(tmp_path: 
 @pytest.mark.parametrize("words", [["--help"], ["studio", "--help"], ["robots"], ["show", "irb120"]])
 def test_nothing_of_the_studio_is_imported_without_it(words: list[str]) -> None:
     script = (
-        f"import sys\nfrom truearm.cli import main\nsys.argv = ['truearm', *{words}]\n"
+        f"import sys\nfrom truearm.commands import main\nsys.argv = ['truearm', *{words}]\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         "print([m for m in sys.modules if m.startswith(('viser', 'websockets', 'truearm.studio'))])"
     )

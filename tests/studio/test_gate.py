@@ -32,9 +32,9 @@ from tests.studio.talking import (
     working,
 )
 
-from truearm.library import load_robot
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.transform import Transform
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
 from truearm.studio import gate as module
 from truearm.studio.access import Access, listening_socket
 from truearm.studio.gate import Gate, start_server

@@ -14,14 +14,13 @@ from tests.studio.arms import SCARA
 from tests.studio.conftest import Serving
 from tests.studio.pressing import below
 
-from truearm.errors import InputError
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.plan import plan
-from truearm.jobs.simulate import simulate
-from truearm.library import load_robot
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
-from truearm.notices import Notice
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
+from truearm.planning.plan import plan
+from truearm.simulation.simulate import simulate
 from truearm.studio import words
 from truearm.studio.arrows import Arrows, coloured, error_arrows
 from truearm.studio.pages.jog import JogPage

@@ -9,9 +9,9 @@ from tests.studio.pressing import below
 from tests.studio.test_jog_page import act, eventually
 from tests.studio.typing_in import typed
 
-from truearm.errors import InputError
-from truearm.jobs.path import path as job
-from truearm.library import load_robot
+from truearm.compensation.path import path as job
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.path_points import entries_of, in_words, new_path, path_text, with_section, without_last
 from truearm.studio.serving import Studio
@@ -84,7 +84,7 @@ def test_a_path_is_made_where_the_tip_is_drawn_and_played(studio: Studio, page: 
 
 
 def test_a_calibrated_arm_plays_its_corrected_motion(studio: Studio, page: JogPage) -> None:
-    from truearm.modeling.formats.robot_file import robot_text
+    from truearm.engine.robot.robot_file.writing import robot_text
 
     robot = load_robot("irb120").with_frames(load_robot("irb120").base, {"1": (0.0, 0.0, 0.1)})
     (studio.window.project.folder / "result").mkdir()

@@ -10,9 +10,9 @@ from tests.studio.arms import GANTRY, SCARA
 from tests.studio.conftest import Serving
 from tests.studio.test_jog_page import act
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.parts import Payload
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
 from truearm.studio.jogging import Jogging
 from truearm.studio.load_arrows import load_arrows, reached_points
 from truearm.studio.pages.jog import JogPage

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from tests.studio.arms import GANTRY, POINT, SCARA
 
-from truearm.errors import InputError
-from truearm.jobs.inverse import inverse
-from truearm.library import load_robot
-from truearm.modeling.inverse.solutions import PoseStatus
-from truearm.modeling.transform import Transform, rotation_vector
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.inverse.pose_solver import PoseStatus
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform, rotation_vector
+from truearm.robot_files.inverse import inverse
 from truearm.studio.jogging import Jogging
 
 Q = np.deg2rad([10.0, 20.0, -15.0, 30.0, 40.0, -50.0])

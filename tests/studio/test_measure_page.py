@@ -17,13 +17,13 @@ from tests.jobs.examples import MEASURED_PLAN
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, below
 
-from truearm.errors import InputError
-from truearm.jobs.measure import open_campaign
-from truearm.library import load_robot
-from truearm.measurement.measuring.readings import REASONS
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.transform import Transform
-from truearm.reporting.measure_figures import drift_figure, quality_figure
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import Transform
+from truearm.measuring.open_campaign import open_campaign
+from truearm.measuring.report import drift_figure, quality_figure
+from truearm.measuring.session import REASONS
 from truearm.studio.measure_fields import MeasureFields, measure_arguments, measure_command
 from truearm.studio.measuring import ASIDE, Measuring
 from truearm.studio.pages.jog import JogPage
@@ -31,7 +31,7 @@ from truearm.studio.pages.measure import MeasurePage
 from truearm.studio.serving import Studio
 from truearm.studio.window import Window
 
-FILES = ("measuring.json", "readings.csv", "measurements.csv", "measure.html", "truearm.manifest.json")
+FILES = ("measuring.json", "readings.csv", "measurements.csv", "measure.html", "truearm.engine.base.manifest.json")
 ARM: dict[str, Any] = {
     "plan": "plan.csv",
     "device": "measurement-arm",

@@ -13,17 +13,17 @@ from tests.performance_plan import small_plan
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, notices
 
-from truearm.jobs.iso9283_evaluate import iso9283_evaluate
-from truearm.jobs.iso9283_simulate import iso9283_simulate
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text, read_plan
-from truearm.results.iso9283_table import conditions_summary, values_of, worst_places
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.iso9283.evaluate.comparison import read_result
+from truearm.iso9283.evaluate.evaluate import iso9283_evaluate
+from truearm.iso9283.evaluate.table import conditions_summary, values_of, worst_places
+from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text, read_plan
+from truearm.iso9283.simulate.simulate import iso9283_simulate
 from truearm.studio.cube_in_space import cube_in_space
 from truearm.studio.pages.choices import NONE
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.performance import PerformancePage
 from truearm.studio.window import Window
-from truearm.validation.iso9283.result_file import read_result
 
 
 @pytest.fixture(scope="module")

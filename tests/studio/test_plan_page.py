@@ -19,10 +19,10 @@ from tests.studio.pressing import at_once, below
 from tests.studio.test_jog_page import act, eventually
 from tests.studio.typing_in import typed as type_in
 
-from truearm.errors import InputError
-from truearm.jobs.plan import plan
-from truearm.library import load_robot
-from truearm.modeling.formats.robot_file import robot_text
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.planning.plan import plan
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.plan import PlanPage
 from truearm.studio.plan_fields import PlanFields, plan_arguments
@@ -328,7 +328,7 @@ def test_a_plan_that_the_command_has_written_is_compared_as_well(
     window.edit(plan={"poses": "8", "candidates": 41})
     assert "was made with candidates 40. Chosen now: candidates 41." in told(page)
 
-    manifest, table = folder / "truearm.manifest.json", folder / "plan.csv"
+    manifest, table = folder / "truearm.engine.base.manifest.json", folder / "plan.csv"
     record, text = manifest.read_text(), table.read_text()
     content = json.loads(record)
     del content["sets"][0]["inputs"]
@@ -393,7 +393,7 @@ def test_a_cell_file_is_given_for_what_it_has(
     }
     head = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
     (folder / "cell.yaml").write_text(head + "".join(has[part] for part in parts))
-    (folder / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text("utf-8"))
+    (folder / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text("utf-8"))
     window.edit(cell="cell.yaml", plan={"poses": "20", "candidates": 60, "accurate_at": "plate.mod"})
     page = page_of(studio)
     act(page._run)

@@ -21,11 +21,11 @@ from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, below, notices
 from tests.studio.typing_in import typed
 
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.compensate import compensate
-from truearm.jobs.export import export
-from truearm.jobs.import_ur_kinematics import import_ur_kinematics
-from truearm.library import load_robot
+from truearm.calibration.calibrate import calibrate
+from truearm.compensation.compensate import compensate
+from truearm.engine.robot.library import load_robot
+from truearm.robot_files.convert import export
+from truearm.robot_files.import_ur_kinematics import import_ur_kinematics
 from truearm.studio.drawn_program import corrected_program
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.programs import ProgramsPage
@@ -46,7 +46,7 @@ def project(place: Path) -> Path:
     """Make a project with a program, whose correction needs nothing more than a result."""
     folder = place / "project"
     folder.mkdir()
-    (folder / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text("utf-8"))
+    (folder / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text("utf-8"))
     (folder / "truearm-studio.yaml").write_text(
         "truearm: truearm-studio/1\nrobot: irb120\nprogram: plate.mod\ntaught: [none]\ncontroller_kinematics: nominal\n"
     )

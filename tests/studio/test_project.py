@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 from tests.killing import killed, leftovers, operations
 
-from truearm.errors import InputError
-from truearm.files import confined_reads, read_bytes, read_yaml
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import confined_reads, read_bytes, read_yaml
+from truearm.engine.base.writing import remove_known, write_text_over
 from truearm.studio.project import PROJECT_FILE, Project, open_project
 from truearm.studio.settings import Settings
-from truearm.writing import remove_known, write_text_over
 
 
 @pytest.fixture
@@ -202,7 +202,7 @@ def test_what_another_program_writes_between_looking_and_writing_is_not_overwrit
         return called
 
     with monkeypatch.context() as there:
-        there.setattr("truearm.studio.project.write_text_over", late(write_text_over))
+        there.setattr("truearm.engine.base.writing.write_text_over", late(write_text_over))
         with pytest.raises(InputError, match="another program has changed this file"):
             project.edit({"list.csv": "mine\n"}, exclude="list.csv")
     project.undo()
@@ -210,7 +210,7 @@ def test_what_another_program_writes_between_looking_and_writing_is_not_overwrit
     file.unlink()
     project.edit({"list.csv": "mine\n"}, exclude="list.csv")
     with monkeypatch.context() as there:
-        there.setattr("truearm.studio.project.remove_known", late(remove_known))
+        there.setattr("truearm.engine.base.writing.remove_known", late(remove_known))
         with pytest.raises(InputError, match="another program has changed this file"):
             project.undo()
     assert (file.read_bytes(), project.settings.exclude) == (theirs, "list.csv")
@@ -238,7 +238,7 @@ def test_of_two_files_of_an_edit_both_are_written_or_none(project: Project, monk
             path.write_text("theirs\n")
         write_text_over(path, *arguments)
 
-    monkeypatch.setattr("truearm.studio.project.write_text_over", late)
+    monkeypatch.setattr("truearm.engine.base.writing.write_text_over", late)
     with pytest.raises(InputError, match="another program has changed this file"):
         project.edit({"a.csv": "two\n", "b.csv": "two\n"})
     assert (project.folder / "a.csv").read_text() == "one\n"
@@ -285,7 +285,7 @@ def test_files_taken_in_replace_nothing(project: Project) -> None:
         ".hidden",
         "",
         PROJECT_FILE,
-        "truearm.manifest.json",
+        "truearm.engine.base.manifest.json",
         "a\nb",
         "x\\y",
     ):
@@ -305,7 +305,8 @@ def test_a_file_too_large_is_not_taken_in(project: Project, monkeypatch: pytest.
 def test_of_two_that_edit_at_the_same_time_one_is_told_and_none_is_overwritten(project: Project) -> None:
     """Each edit counts on from what it has read: were one overwritten, a number would be missing in the end."""
     script = (
-        "import sys\nfrom truearm.errors import InputError\nfrom truearm.studio.project import open_project\n"
+        "import sys\nfrom truearm.engine.base.errors import InputError\n"
+        "from truearm.studio.project import open_project\n"
         "project, done = open_project(sys.argv[1]), 0\n"
         "while done < 20:\n"
         "    try:\n        done += project.edit(seed=project.settings.seed + 1)\n"

@@ -11,11 +11,11 @@ from tests.simulated import campaign
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, below, notices
 
-from truearm.jobs.calibrate import calibrate
-from truearm.library import load_robot
-from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.same_arm import fitted_from
+from truearm.calibration.calibrate import calibrate
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import fitted_from
+from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.studio.cell_places import Thing, place_of, with_base, with_thing
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.programs import ProgramsPage

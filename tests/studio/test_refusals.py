@@ -15,7 +15,7 @@ from tests.studio.talking import element, eventually, window, working
 from tests.studio.test_uploads import upload
 from tests.studio.typing_in import typed
 
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 from truearm.studio.pages.calibrate import CalibratePage
 from truearm.studio.pages.cell import CellPage
 from truearm.studio.pages.check import CheckPage

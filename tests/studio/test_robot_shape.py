@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tests.studio.arms import GANTRY, ODD, SCARA
 
-from truearm.library import library, load_robot
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rotation_from_quaternion
+from truearm.engine.robot.library import library, load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, rotation_from_quaternion
 from truearm.studio.joint_layout import THICKNESS, layout
 from truearm.studio.robot_shape import RobotShape, link_poses, robot_shape
 from truearm.studio.solids import Mesh, ball, box, drum, together, tube

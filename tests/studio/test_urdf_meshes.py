@@ -12,9 +12,9 @@ from tests.studio.conftest import Serving
 from tests.studio.test_jog_page import act
 from tests.studio.typing_in import typed
 
-from truearm.errors import InputError
-from truearm.files import confined_reads
-from truearm.library import load_robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import confined_reads
+from truearm.engine.robot.library import load_robot
 from truearm.studio.jogging import Jogging
 from truearm.studio.pages.cell import CellPage
 from truearm.studio.pages.jog import JogPage

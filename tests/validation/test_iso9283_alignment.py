@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.planning.poses.iso9283 import Cube
-from truearm.validation.iso9283.alignment import best_fit, read_alignment, refuse_implausible
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cube import Cube
+from truearm.iso9283.criteria.alignment import best_fit, read_alignment, refuse_implausible
 
 FILE = {
     "truearm": "truearm-alignment/1",

@@ -6,14 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from truearm.modeling.chain import Array
-from truearm.results.iso9283_notices import row_notices
-from truearm.validation.iso9283.alignment import Alignment
-from truearm.validation.iso9283.alike_cycles import alike_cycles
-from truearm.validation.iso9283.evaluation import Evaluation
-from truearm.validation.iso9283.pose_rows import Cycles
-from truearm.validation.iso9283.values import Instrument
-from truearm.validation.iso9283.wild_rows import unusual_rows
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.alignment import Alignment
+from truearm.iso9283.criteria.rows import Cycles, Instrument
+from truearm.iso9283.criteria.wild_rows import alike_cycles, unusual_rows
+from truearm.iso9283.evaluate.evaluation import Evaluation
+from truearm.iso9283.evaluate.table import row_notices
 
 
 def group(points: Array, pose: str = "P1", test: str = "AP") -> Cycles:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.modeling.chain import Array
-from truearm.validation.iso9283.intervals import (
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.intervals import (
     Interval,
+    largest_difference,
     mean_interval,
+    norm_interval,
     repeatability_interval,
     spread_interval,
 )
-from truearm.validation.iso9283.inverted_tests import largest_difference, norm_interval
 
 CYCLES, CAMPAIGNS = 30, 200
 #: 95 % less two and a half times what 200 campaigns leave open.

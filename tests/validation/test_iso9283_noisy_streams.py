@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from tests.moving_tip import ACROSS, ALONG, CENTRE, HERE, plan_of, samples_of, the, times
 
-from truearm.measurement.performance.records import Samples
-from truearm.validation.iso9283.corners import corner_values
-from truearm.validation.iso9283.settling import settling_values
-from truearm.validation.iso9283.tops import largest_top, top_of
-from truearm.validation.iso9283.values import Instrument
-from truearm.validation.iso9283.weaving import weaving_values
+from truearm.iso9283.criteria.corners import corner_values, weaving_values
+from truearm.iso9283.criteria.rows import Instrument
+from truearm.iso9283.criteria.settling import settling_values
+from truearm.iso9283.criteria.streams import largest_top, top_of
+from truearm.iso9283.plan.records import Samples
 
 PLAN = plan_of()
 

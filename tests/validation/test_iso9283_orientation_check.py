@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
-from truearm.validation.iso9283.orientation_check import refuse_far_orientations
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
+from truearm.iso9283.criteria.rows import refuse_far_orientations
 
 N = 40
 TURN = rotation_from_vector(np.array([0.3, -1.2, 0.8]))

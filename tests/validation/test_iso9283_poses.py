@@ -10,23 +10,20 @@ from itertools import product
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement.performance.records import AttainedPoses, Names, Pushes
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import Transform, rotation_from_vector
-from truearm.planning.iso9283.planned import PerformancePlan, PlannedPose, PlannedTest
-from truearm.planning.poses.iso9283 import Cube
-from truearm.validation.iso9283.alignment import Alignment
-from truearm.validation.iso9283.compliance import GRAVITY, evaluate_pushes
-from truearm.validation.iso9283.drift import groups_of
-from truearm.validation.iso9283.intervals import repeatability
-from truearm.validation.iso9283.inverted_tests import norm_interval
-from truearm.validation.iso9283.other_cube import other_cube
-from truearm.validation.iso9283.pose_rows import best_fit_of, cycles_of
-from truearm.validation.iso9283.poses import PoseCloud, evaluate
-from truearm.validation.iso9283.values import Instrument, Value
-from truearm.validation.iso9283.wild_pushes import wild_pushes
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.cube import Cube
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform, rotation_from_vector
+from truearm.iso9283.criteria.alignment import Alignment
+from truearm.iso9283.criteria.compliance import GRAVITY, evaluate_pushes, wild_pushes
+from truearm.iso9283.criteria.drift import groups_of
+from truearm.iso9283.criteria.intervals import norm_interval, repeatability
+from truearm.iso9283.criteria.poses import PoseCloud, evaluate
+from truearm.iso9283.criteria.rows import Instrument, Value, best_fit_of, cycles_of
+from truearm.iso9283.evaluate.doubts import other_cube
+from truearm.iso9283.plan.criteria import PerformancePlan, PlannedPose, PlannedTest
+from truearm.iso9283.plan.records import AttainedPoses, Names, Pushes
 
 CUBE = Cube((0.5, 0.0, 0.5), 0.4)
 POINTS = CUBE.plane("C1-C2-C7-C8").measuring_points

@@ -9,25 +9,22 @@ import numpy as np
 import pytest
 from tests.moving_tip import ALONG, CENTRE, HERE, along, duration_of, plan_of, ramp, samples_of, the, times
 
-from truearm.errors import InputError
-from truearm.measurement.performance.records import Samples
-from truearm.measurement.performance.resolution import resolution_of
-from truearm.measurement.readers.performance_poses import read_attained_poses
-from truearm.measurement.readers.performance_samples import read_settling_samples
-from truearm.modeling.chain import Array
-from truearm.notices import Notice
-from truearm.planning.iso9283.way import Way
-from truearm.validation.iso9283.alignment import Alignment
-from truearm.validation.iso9283.clock import clock_of
-from truearm.validation.iso9283.corners import corner_values
-from truearm.validation.iso9283.evaluation import Evaluation
-from truearm.validation.iso9283.said_of_rounding import said_of_rounding
-from truearm.validation.iso9283.said_of_streams import said_of_streams
-from truearm.validation.iso9283.settling import settling_values
-from truearm.validation.iso9283.unusual_samples import unusual_samples
-from truearm.validation.iso9283.values import Instrument
-from truearm.validation.iso9283.velocity import velocity_values
-from truearm.validation.iso9283.wild_samples import refuse_wild, wild_steps
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.alignment import Alignment
+from truearm.iso9283.criteria.corners import corner_values
+from truearm.iso9283.criteria.rows import Instrument
+from truearm.iso9283.criteria.runs import refuse_wild, wild_steps
+from truearm.iso9283.criteria.settling import settling_values
+from truearm.iso9283.criteria.streams import clock_of
+from truearm.iso9283.criteria.velocity import velocity_values
+from truearm.iso9283.evaluate.doubts import unusual_samples
+from truearm.iso9283.evaluate.evaluation import Evaluation
+from truearm.iso9283.evaluate.reading import read_attained_poses
+from truearm.iso9283.evaluate.samples import read_settling_samples
+from truearm.iso9283.evaluate.told import said_of_rounding, said_of_streams
+from truearm.iso9283.plan.criteria import Way
+from truearm.iso9283.plan.records import Samples, resolution_of
 
 PLAN = plan_of()
 FAST = plan_of(velocity=1.0)

@@ -14,22 +14,20 @@ import pytest
 from numpy.typing import NDArray
 from tests.performance_plan import small_plan
 
-from truearm.errors import InputError
-from truearm.measurement.performance.records import AttainedPoses, Names
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import (
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.transform import (
     Transform,
     quaternion_from_rotation,
     rotation_from_quaternion,
     rotation_from_vector,
 )
-from truearm.planning.iso9283.planned import PerformancePlan
-from truearm.validation.iso9283.alignment import Alignment
-from truearm.validation.iso9283.copied import refuse_copied_poses
-from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
-from truearm.validation.iso9283.pose_rows import cycles_of
-from truearm.validation.iso9283.values import Instrument
-from truearm.validation.iso9283.wild_rows import UnusualRows, unusual_rows
+from truearm.iso9283.criteria.alignment import Alignment
+from truearm.iso9283.criteria.rows import Instrument, cycles_of, refuse_copied_poses
+from truearm.iso9283.criteria.wild_rows import UnusualRows, unusual_rows
+from truearm.iso9283.evaluate.evaluation import Evaluation, Measurements, evaluated
+from truearm.iso9283.plan.criteria import PerformancePlan
+from truearm.iso9283.plan.records import AttainedPoses, Names
 
 Rows = NDArray[np.intp]
 TIE = Alignment("base-features", Transform(), 1e-5, 1e-5)

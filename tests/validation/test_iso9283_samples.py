@@ -22,20 +22,18 @@ from tests.moving_tip import (
     times,
 )
 
-from truearm.errors import InputError
-from truearm.measurement.performance.records import Samples
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import rotation_from_vector
-from truearm.planning.iso9283.planned import PerformancePlan
-from truearm.planning.iso9283.way import Way
-from truearm.validation.iso9283.corners import corner_values
-from truearm.validation.iso9283.paths import path_values
-from truearm.validation.iso9283.runs import in_base
-from truearm.validation.iso9283.settling import settling_values
-from truearm.validation.iso9283.synchronise import _apart
-from truearm.validation.iso9283.values import Instrument
-from truearm.validation.iso9283.velocity import velocity_values
-from truearm.validation.iso9283.weaving import weaving_values
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.transform import rotation_from_vector
+from truearm.iso9283.criteria.corners import corner_values, weaving_values
+from truearm.iso9283.criteria.paths import path_values
+from truearm.iso9283.criteria.rows import Instrument
+from truearm.iso9283.criteria.runs import in_base
+from truearm.iso9283.criteria.settling import settling_values
+from truearm.iso9283.criteria.streams import _apart
+from truearm.iso9283.criteria.velocity import velocity_values
+from truearm.iso9283.plan.criteria import PerformancePlan, Way
+from truearm.iso9283.plan.records import Samples
 
 PLAN = plan_of()
 V = PLAN.rated_velocity

@@ -22,24 +22,22 @@ from tests.moving_tip import (
     times,
 )
 
-from truearm.errors import InputError
-from truearm.measurement.performance.records import Samples
-from truearm.modeling.chain import Array
-from truearm.notices import Notice
-from truearm.planning.iso9283.way import Way
-from truearm.results.iso9283_evaluation import value_summary
-from truearm.results.iso9283_notices import copied_notices
-from truearm.validation.iso9283.alignment import Alignment
-from truearm.validation.iso9283.copied import copied_blocks
-from truearm.validation.iso9283.corners import corner_values
-from truearm.validation.iso9283.evaluation import Evaluation
-from truearm.validation.iso9283.paths import path_values
-from truearm.validation.iso9283.runs import runs_of
-from truearm.validation.iso9283.said_of_streams import said_of_streams
-from truearm.validation.iso9283.settling import settling_values
-from truearm.validation.iso9283.unusual_samples import unusual_samples
-from truearm.validation.iso9283.values import Instrument
-from truearm.validation.iso9283.velocity import velocity_values
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.alignment import Alignment
+from truearm.iso9283.criteria.corners import corner_values
+from truearm.iso9283.criteria.paths import path_values
+from truearm.iso9283.criteria.rows import Instrument, copied_blocks
+from truearm.iso9283.criteria.runs import runs_of
+from truearm.iso9283.criteria.settling import settling_values
+from truearm.iso9283.criteria.velocity import velocity_values
+from truearm.iso9283.evaluate.doubts import unusual_samples
+from truearm.iso9283.evaluate.evaluate import value_summary
+from truearm.iso9283.evaluate.evaluation import Evaluation
+from truearm.iso9283.evaluate.table import copied_notices
+from truearm.iso9283.evaluate.told import said_of_streams
+from truearm.iso9283.plan.criteria import Way
+from truearm.iso9283.plan.records import Samples
 
 PLAN = plan_of()
 V = PLAN.rated_velocity

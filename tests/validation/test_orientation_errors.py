@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_vector
-from truearm.results.validation_parts import orientation_lines, orientation_summary
-from truearm.validation.orientation_errors import orientation_errors, zxz_angles
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation, rotation_from_vector
+from truearm.validation.region import orientation_errors, orientation_lines, orientation_summary, zxz_angles
 
 
 def about(axis: str, angle: Array) -> Array:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
-from truearm.errors import InputError
-from truearm.modeling.chain import Array
-from truearm.validation.pair_distances import pair_distances
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.validation.distances import pair_distances
 
 
 def points(n: int, seed: int) -> tuple[Array, Array]:
@@ -67,7 +67,7 @@ def test_close_points_and_large_errors_are_as_right_as_others(size: float) -> No
 def test_results_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     predicted, measured = points(900, 7)
     two = pair_distances(predicted, measured)
-    monkeypatch.setattr("truearm.validation.pair_distances._THREADS", 1)
+    monkeypatch.setattr("truearm.validation.distances._THREADS", 1)
     one = pair_distances(predicted, measured)
     assert (one.mean, one.deviation, one.maximum, one.positive) == (two.mean, two.deviation, two.maximum, two.positive)
     assert (one.counts == two.counts).all()

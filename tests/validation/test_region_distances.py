@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.errors import InputError
-from truearm.jobs.calibrate import calibrate
-from truearm.jobs.validate import measure_farther, validate
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.formats.robot_file import is_intact
-from truearm.modeling.proof import MOST_MEASURED, Proof
-from truearm.modeling.robot import Robot
-from truearm.results.calibration import Calibration
-from truearm.results.validation_parts import distance_lines, distance_summary
-from truearm.validation.region_distances import RegionDistances, region_distances
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.result import Calibration
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.proof import MOST_MEASURED, Proof
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.seal import is_intact
+from truearm.validation.region import RegionDistances, distance_lines, distance_summary, region_distances
+from truearm.validation.validate import measure_farther, validate
 
 
 @pytest.fixture(scope="module")

@@ -10,19 +10,14 @@ import pytest
 from numpy.typing import NDArray
 from tests.performance_plan import DOWN, small_plan
 
-from truearm.errors import InputError
-from truearm.measurement.performance.records import Samples
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import IDENTITY, rotation_vector
-from truearm.planning.iso9283.planned import PerformancePlan
-from truearm.planning.iso9283.way import TURNS
-from truearm.simulation.moving.arm import DRIVES, WARMING, Drives
-from truearm.simulation.moving.servo import Servo
-from truearm.simulation.truths import truth_twin
-from truearm.validation.iso9283.controller_commands import ZONE
-from truearm.validation.iso9283.simulated import simulated_campaign
-from truearm.validation.iso9283.simulated_cell import TrueRobot
-from truearm.validation.iso9283.simulated_readings import SimulatedCampaign, Tracker
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.transform import IDENTITY, rotation_vector
+from truearm.engine.twin.truths import truth_twin
+from truearm.iso9283.plan.criteria import TURNS, PerformancePlan
+from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.simulate.cell import SimulatedCampaign, Tracker, TrueRobot, simulated_campaign
+from truearm.iso9283.simulate.moving_arm import DRIVES, WARMING, ZONE, Drives, Servo
 
 #: Of poses several, which are quick; of streams, which are not, two of one test and one of all others.
 CYCLES = {"AP": 3, "vAP": 2, "AD": 2, "dAP": 4, "E": 2}

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from papers.pose_accuracy import pose_errors, repeatability
 from scipy.spatial.transform import Rotation
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY
-from truearm.simulation.twin import Twin
-from truearm.validation.pose_accuracy import pose_errors, repeatability
-from truearm.validation.sphere_test import sphere_test
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.twin import Twin
+from truearm.validation.sphere import sphere_test
 
 
 @pytest.fixture(scope="module")

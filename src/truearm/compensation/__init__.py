@@ -1,1 +1,1 @@
-"""What to command so that the real robot goes where the program says."""
+"""Programs and paths corrected for the calibrated robot: `truearm compensate`, `truearm path`."""

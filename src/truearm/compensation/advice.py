@@ -9,18 +9,15 @@ from typing import Final
 
 import numpy as np
 
-from truearm.compensation.chosen_targets import ALONE
-from truearm.compensation.correction import Correction
-from truearm.compensation.gauge import turns_between
-from truearm.compensation.kept_targets import LARGEST_STEP, LIKELY
-from truearm.compensation.measured_region import beyond_measured
-from truearm.compensation.program_correction import CorrectedPrograms
-from truearm.compensation.split import MOST_SEGMENTS, ProgramSplit
-from truearm.modeling.chain import Array
-from truearm.modeling.parts import NO_PAYLOAD
-from truearm.modeling.robot import Robot
-from truearm.notices import Notice
-from truearm.shown import counted, listed
+from truearm.compensation.limit import beyond_measured
+from truearm.compensation.program_correction import MOST_SEGMENTS, CorrectedPrograms, ProgramSplit
+from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.programs.chosen_targets import ALONE
+from truearm.engine.programs.correction import LARGEST_STEP, LIKELY, Correction
+from truearm.engine.programs.gauge import turns_between
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.parts import NO_PAYLOAD
+from truearm.engine.robot.robot import Robot
 
 #: Orientations are alike that differ by less [rad].
 _TURNED: Final = 0.01

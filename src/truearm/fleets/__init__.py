@@ -1,1 +1,1 @@
-"""Many robots of a series: what is asked of them, and what was found of each."""
+"""Many robots, simulated or measured: `truearm fleet`."""

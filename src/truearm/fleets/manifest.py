@@ -1,42 +1,97 @@
-"""What is asked of a fleet: robots that were measured, or an experiment with simulated ones.
-
-Robots that were measured, in the file or in a table with one row each::
-
-    truearm: truearm-fleet/1
-    robots:
-      - {name: cell-1, robot: ur5, data: cell-1.csv, options: {model: geometric, train: 40}}
-      - {name: cell-2, robot: ur5, data: cell-2.csv, of: "20195500123", date: 2026-03-01}
-    chunk: 4
-
-An experiment::
-
-    truearm: truearm-fleet/1
-    units: {length: mm}
-    experiment: {robot: irb120, count: 10000, configurations: 20, targets: 1, noise: 0.05, seed: 1}
-
-Files are named from the folder that the manifest is in.
-"""
+"""An experiment prepared: its robot with targets, and the configurations at which robots are measured and judged."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
+import numpy as np
 from pydantic import BaseModel, Field, PlainValidator
 
-from truearm.errors import InputError, name_place, refusals_at
-from truearm.files import read_bytes, read_yaml
-from truearm.fleets.series import ExperimentEntry
-from truearm.limits import refuse_beyond
-from truearm.modeling.formats.entries import STRICT, NotNegative
-from truearm.units import sized_si
+from truearm.engine.base.errors import InputError, name_parameter, name_place, refusals_at
+from truearm.engine.base.files import read_bytes, read_yaml
+from truearm.engine.base.limits import refuse_beyond
+from truearm.engine.base.units import sized_si
+from truearm.engine.data.controller_joints import in_model_joints
+from truearm.engine.data.readers.canonical import read_csv
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.entries import STRICT, NotNegative
+from truearm.engine.twin.truths import carrying_targets
+from truearm.fleets.series import Experiment, ExperimentEntry
 
-if TYPE_CHECKING:  # what a calibration can be asked for takes long to import, and an experiment needs none of it
+if TYPE_CHECKING:
     from truearm.fleets.entries import RobotEntry
+
+
+def experiment(asked: ExperimentEntry, where: str = "experiment") -> Experiment:
+    """Prepare an experiment; refusals name `where` it stands.
+
+    Raises:
+        InputError: For a robot or configurations that cannot be read, a model that is not known, and targets that are
+            not there.
+    """
+    with _refusals_at(f"{where}.robot"):
+        nominal = load_robot(asked.robot)
+    with _refusals_at(f"{where}.model"):
+        model = named_model(asked.model)
+    known = carrying_targets(nominal)
+    places = {target.name: tuple(known.values[target.parameter(axis)] for axis in "xyz") for target in known.targets}
+    if asked.targets > len(places):
+        raise InputError(
+            f"{nominal.name} has fewer targets",
+            parameter="manifest",
+            where=f"{where}.targets",
+            came=asked.targets,
+            allowed=f"1 to {len(places)}",
+        )
+    robot = known.with_frames(known.base, dict([*places.items()][: asked.targets]))
+    rng = np.random.default_rng(np.random.SeedSequence(asked.seed, spawn_key=(0,)))
+    held_out = robot.random_configurations(asked.held_out, rng)
+    if isinstance(asked.configurations, int):
+        joints = robot.random_configurations(asked.configurations, rng)
+    else:
+        with _refusals_at(f"{where}.configurations"):
+            joints = in_model_joints(robot, read_csv(asked.configurations)).joints
+    with _refusals_at(f"{where}.model"):
+        model.free(model.prepared(robot))
+    return Experiment(asked, robot, joints, held_out)
+
+
+@contextmanager
+def _refusals_at(place: str) -> Iterator[None]:
+    """Let refusals of what an entry of the manifest holds name it."""
+    try:
+        yield
+    except InputError as error:
+        name_parameter(error, "manifest")
+        if error.where is None:
+            name_place(error, place)
+        raise
+
+
+# What is asked of a fleet: robots that were measured, or an experiment with simulated ones.
+#
+# Robots that were measured, in the file or in a table with one row each::
+#
+#     truearm: truearm-fleet/1
+#     robots:
+#       - {name: cell-1, robot: ur5, data: cell-1.csv, options: {model: geometric, train: 40}}
+#       - {name: cell-2, robot: ur5, data: cell-2.csv, of: "20195500123", date: 2026-03-01}
+#     chunk: 4
+#
+# An experiment::
+#
+#     truearm: truearm-fleet/1
+#     units: {length: mm}
+#     experiment: {robot: irb120, count: 10000, configurations: 20, targets: 1, noise: 0.05, seed: 1}
+#
+# Files are named from the folder that the manifest is in.
 
 SCHEMA: Final = "truearm-fleet/1"
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal, NotRequired
 from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter
 from typing_extensions import TypedDict
 
-from truearm.units import SHOWN_AS
+from truearm.engine.base.units import SHOWN_AS
 
 _STRICT: Final = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 #: No length, angle or rate of a robot is larger (SI): squares of it are finite.
@@ -108,7 +108,7 @@ def head_of(line: bytes) -> dict[str, Any]:
 
 
 def said_of(line: bytes) -> dict[str, Any]:
-    """Return the first line of a part as :func:`truearm.fleets.rows.part_text` makes it, or raise ValueError."""
+    """Return the first line of a part as :func:`truearm.fleets.series.part_text` makes it, or raise ValueError."""
     return dict(_SAID.validate_json(line))
 
 

@@ -19,14 +19,13 @@ from typing import Any, Final
 
 from pydantic_core import from_json
 
-from truearm import __version__
-from truearm.errors import InputError
-from truearm.files import exists, read_bytes, read_text, reason_of
+from truearm.engine.base.errors import InputError, counted, listed
+from truearm.engine.base.files import exists, read_bytes, read_text, reason_of
+from truearm.engine.base.version import __version__
+from truearm.engine.base.writing import write_text
 from truearm.fleets.manifest import Manifest
 from truearm.fleets.part_schema import head_of, rows_of, said_of
-from truearm.fleets.rows import Row
-from truearm.shown import counted, listed
-from truearm.writing import write_text
+from truearm.fleets.series import Row
 
 RECORD: Final = "record.json"
 PARTS: Final = "parts"
@@ -269,7 +268,7 @@ class Recorded:
         """Write a part that is done, as a whole or not at all.
 
         Args:
-            text: As of :func:`truearm.fleets.rows.part_text`.
+            text: As of :func:`truearm.fleets.series.part_text`.
 
         Raises:
             ValueError: If it is not what belongs to the robots of this part: then nothing is written.

@@ -1,1 +1,1 @@
-"""Which poses to measure and which way to go: the cube of ISO 9283, its poses, paths, time laws, joint motions."""
+"""What to measure, and how it is driven: `truearm plan`, `truearm poses`."""

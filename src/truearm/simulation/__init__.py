@@ -1,1 +1,1 @@
-"""The digital twin, truths for it, and instruments that measure it."""
+"""Simulated measurements, and the influence of parameters: `truearm simulate`, `truearm influence`."""

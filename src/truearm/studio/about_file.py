@@ -8,11 +8,11 @@ from io import StringIO
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.errors import InputError
-from truearm.files import exists, read_text, read_yaml
-from truearm.measurement.measuring.about import AboutFile, about_of
-from truearm.schemas import validated
-from truearm.units import from_si, sized_si
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists, read_text, read_yaml
+from truearm.engine.base.schemas import validated
+from truearm.engine.base.units import from_si, sized_si
+from truearm.measuring.reading_log import AboutFile, about_of
 
 Change = Callable[[Any, str], None]
 _NEW: Final = "truearm: truearm-about/1\nunits: {length: mm, temperature: degC, pressure: hPa, humidity: percent}\n"
@@ -29,7 +29,7 @@ class _Entry:
     is_length: bool = False
 
 
-#: By the names of :class:`truearm.measurement.measuring.about.About`.
+#: By the names of :class:`truearm.measuring.reading_log.About`.
 ENTRIES: Final[dict[str, _Entry]] = {
     "instrument": _Entry("instrument", "name"),
     "instrument_serial": _Entry("instrument", "serial"),

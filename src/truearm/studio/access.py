@@ -16,8 +16,7 @@ from urllib.parse import parse_qs, urlsplit
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from truearm.errors import InputError
-from truearm.printable import printable, shortened
+from truearm.engine.base.errors import InputError, printable, shortened
 
 #: So many windows are open at once.
 _WINDOWS: Final = 16

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.arrays import finite_number
-from truearm.errors import InputError
-from truearm.modeling.chain import Array
+from truearm.engine.base.arrays import finite_number
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
 
 #: How much errors may be magnified.
 FACTORS: Final = (1.0, 2000.0)

@@ -9,14 +9,15 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.modeling.fixtures import FixtureKind
-from truearm.modeling.formats.robot_file import RobotFile, robot_from_file, robot_text
-from truearm.modeling.orientations import FIXED_XYZ_ANGLES
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.schemas import validated
-from truearm.units import sized_si
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.schemas import validated
+from truearm.engine.base.units import sized_si
+from truearm.engine.robot.parts import FixtureKind
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.reading import robot_from_file
+from truearm.engine.robot.robot_file.schema import RobotFile
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.transform import FIXED_XYZ_ANGLES, Transform
 
 Numbers = tuple[float, float, float]
 #: What can stand somewhere: on the flange what is measured, in the instrument's frame what is measured against.

@@ -11,15 +11,15 @@ from io import StringIO
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.errors import InputError, refusals_at
-from truearm.files import exists, read_text, read_yaml
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.planning.constraints.constraints import Constraints, keep_out
-from truearm.planning.driving.cell import Cell, boxes_of
-from truearm.planning.driving.collisions import CollisionCheck
-from truearm.schemas import validated
-from truearm.units import as_number, from_si, sized_si, to_si
+from truearm.engine.base.errors import InputError, refusals_at
+from truearm.engine.base.files import exists, read_text, read_yaml
+from truearm.engine.base.schemas import validated
+from truearm.engine.base.units import as_number, from_si, sized_si, to_si
+from truearm.engine.motion.cell import Cell, boxes_of
+from truearm.engine.motion.collisions import CollisionCheck
+from truearm.engine.motion.constraints import Constraints, keep_out
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
 
 #: What a new file begins with.
 _NEW: Final = "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"

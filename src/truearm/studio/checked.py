@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
-from truearm.files import confined_reads
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.excluded import Exclusion, Read, numbers_read
-from truearm.modeling.chain import Array
-from truearm.notices import Notice, worst_first
+from truearm.engine.base.errors import InputError, Notice, worst_first
+from truearm.engine.base.files import confined_reads
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.excluded import Exclusion, Read, numbers_read
+from truearm.engine.robot.chain import Array
 from truearm.studio.tasks import Outcome, Progress
 
 #: The nominal robot is placed by so many configurations at most: to draw points, more are not needed.
@@ -53,8 +52,8 @@ class Checked:
 
 def checked(folder: Path, robot: str, data: str, exclude: str | None, progress: Progress) -> Checked:
     """Say what is wrong with measurements: :func:`truearm.check`."""
-    from truearm.jobs.check import check
-    from truearm.jobs.load_data import load_data
+    from truearm.checking.check import check
+    from truearm.engine.command.reading import load_data
 
     os.chdir(folder)
     progress("comparing the readings with the robot")
@@ -107,8 +106,8 @@ def with_exclusions(
 
 def _base(robot: str, data: Dataset) -> tuple[Array, Array] | None:
     """Return rotation and translation of the robot's base in the world, found by the readings; None if they do not."""
-    from truearm.identification.solving.fit import place
-    from truearm.library import load_robot
+    from truearm.engine.fit.fit import place
+    from truearm.engine.robot.library import load_robot
 
     some = np.unique(np.linspace(0, data.configurations - 1, min(data.configurations, _PLACED_BY)).round().astype(int))
     try:

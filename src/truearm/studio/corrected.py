@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from truearm.compensation.cell import Answers, CellFile, read_answers
-from truearm.compensation.program_files import CorrectionRecord, ProgramFile, correction_record, program_files
-from truearm.errors import InputError, Words
-from truearm.files import exists, read_bytes, read_text, read_yaml
-from truearm.manifest import hash_of, sets_in
-from truearm.modeling.formats.controller_entry import STATED, controller_summary
-from truearm.modeling.robot import Robot
-from truearm.modeling.wrench import Wrench
-from truearm.results.program_correction import REPORT
+from truearm.compensation.result import REPORT
+from truearm.engine.base.errors import InputError, Words
+from truearm.engine.base.files import exists, read_bytes, read_text, read_yaml
+from truearm.engine.base.manifest import hash_of, sets_in
+from truearm.engine.programs.cell import Answers, CellFile, read_answers
+from truearm.engine.programs.program_files import CorrectionRecord, ProgramFile, correction_record, program_files
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.entries import STATED, controller_summary
+from truearm.engine.robot.wrench import Wrench
 from truearm.studio.project import Project
 from truearm.studio.settings import Settings
 

@@ -8,14 +8,12 @@ from typing import Final, Protocol, TypeVar
 
 import numpy as np
 
-from truearm.modeling.chain import Array
-from truearm.planning.iso9283.planned import PerformancePlan
-from truearm.planning.iso9283.way import Way
-from truearm.planning.poses.iso9283 import Cube
-from truearm.results.iso9283_table import conditions_of, velocity_words
-from truearm.validation.iso9283.comparable import PlanOfResult, plan_summary
-from truearm.validation.iso9283.result_file import ResultFile
-from truearm.validation.iso9283.values import Conditions
+from truearm.engine.motion.cube import Cube
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.rows import Conditions
+from truearm.iso9283.evaluate.comparison import PlanOfResult, ResultFile, plan_summary
+from truearm.iso9283.evaluate.table import conditions_of, velocity_words
+from truearm.iso9283.plan.criteria import PerformancePlan, Way
 
 #: Corners of the cube that an edge joins, as C1 to C8 are numbered.
 _EDGES: Final = np.array(

@@ -10,10 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from truearm.compensation.programs.program import Program
-from truearm.files import confined_reads
-from truearm.modeling.chain import Array
-from truearm.modeling.wrench import WrenchFrame
+from truearm.engine.base.files import confined_reads
+from truearm.engine.programs.program import Program
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.wrench import WrenchFrame
 from truearm.studio.corrected import CellPart, cell_parts
 from truearm.studio.tasks import Outcome, Progress, compensate_command
 
@@ -45,10 +45,10 @@ class DrawnProgram:
 
 def read_program(folder: Path, robot: str, program: str, progress: Progress) -> DrawnProgram:
     """Read a program, and find where the nominal robot goes with it."""
-    from truearm.compensation.correction import way_through
     from truearm.compensation.program_correction import commanded_tips
-    from truearm.compensation.program_files import program_files, read_programs
-    from truearm.library import load_robot
+    from truearm.engine.programs.correction import way_through
+    from truearm.engine.programs.program_files import program_files, read_programs
+    from truearm.engine.robot.library import load_robot
 
     os.chdir(folder)
     progress("reading the program")
@@ -75,11 +75,11 @@ def corrected_program(
     progress: Progress,
 ) -> DrawnProgram:
     """Correct a program and write it, :func:`truearm.compensate`, and find where the real robot goes with it."""
-    from truearm.compensation.cell import Cell, read_frames, read_tools
-    from truearm.compensation.correction import way_through
+    from truearm.compensation.compensate import compensate
     from truearm.compensation.program_correction import commanded
-    from truearm.compensation.program_files import language_called
-    from truearm.jobs.compensate import compensate
+    from truearm.engine.programs.cell import Cell, read_frames, read_tools
+    from truearm.engine.programs.correction import way_through
+    from truearm.engine.programs.program_files import language_called
 
     os.chdir(folder)
     with confined_reads(folder):

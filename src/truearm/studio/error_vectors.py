@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.files import confined_reads
-from truearm.measurement.statistics import Errors, errors_of
-from truearm.modeling.chain import Array
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import confined_reads
+from truearm.engine.data.statistics import Errors, errors_of
+from truearm.engine.robot.chain import Array
 from truearm.studio.tasks import Progress
 
 #: Figures of the result and of these vectors are the same within [mm].
@@ -48,8 +48,8 @@ def error_vectors(folder: Path, robot: str, data: str, result: str, progress: Pr
         InputError: If the result is of other measurements, they were split otherwise, or it is of another robot: the
             errors would not be those of its figures.
     """
-    from truearm.jobs.calibrate import calibrate
-    from truearm.library import load_robot
+    from truearm.calibration.calibrate import calibrate
+    from truearm.engine.robot.library import load_robot
 
     os.chdir(folder)
     with confined_reads(folder):

@@ -8,17 +8,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.errors import InputError
-from truearm.files import read_bytes
-from truearm.manifest import hash_of
-from truearm.modeling.robot import Robot
-from truearm.modeling.same_arm import fitted_from
-from truearm.notices import Notice
-from truearm.planning.iso9283.plan_file import read_plan
-from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.files import read_bytes
+from truearm.engine.base.manifest import hash_of
+from truearm.engine.robot.robot import Robot, fitted_from
+from truearm.iso9283.evaluate.comparison import ReadFile, ResultFile
+from truearm.iso9283.plan.criteria import PerformancePlan
+from truearm.iso9283.plan.plan_file import read_plan
 from truearm.studio.cube_in_space import is_of_plan
 from truearm.studio.project import Project, stamp_of
-from truearm.validation.iso9283.result_file import ReadFile, ResultFile
 
 #: What was measured, and how it was evaluated.
 _MEASURED: Final = ("poses", "paths", "settling", "forces")

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any, Final
 
-from truearm.jobs.following import FitStep
-from truearm.reporting.drawing import AFTER, BEFORE, axis, figure, logarithmic_axis
+from truearm.calibration.calibrate import FitStep
+from truearm.engine.document.drawing import AFTER, BEFORE, axis, figure, logarithmic_axis
 
 #: Axes go beyond the values by this factor.
 _ROOM: Final = 1.2

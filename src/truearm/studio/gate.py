@@ -27,7 +27,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from truearm.printable import printable, shortened
+from truearm.engine.base.errors import printable, shortened
 from truearm.studio.access import Access
 from truearm.studio.first_page import complete
 from truearm.studio.uploads import Uploads

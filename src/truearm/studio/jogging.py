@@ -8,22 +8,20 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.jobs.inverse import inverse
-from truearm.modeling.chain import Array
-from truearm.modeling.controller import Controller, JointsOf
-from truearm.modeling.formats.joint_columns import counting
-from truearm.modeling.frames import Frame, frame_and_tip
-from truearm.modeling.inverse.branches import branch_rule
-from truearm.modeling.inverse.candidates import REACHED, Candidates
-from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
-from truearm.modeling.inverse.pose_solver import Orientation, PoseTask
-from truearm.modeling.inverse.solutions import PoseStatus
-from truearm.modeling.orientations import FIXED_XYZ_ANGLES
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY
-from truearm.units import from_si, to_si
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.units import from_si, to_si
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.controller import Controller, JointsOf
+from truearm.engine.robot.frames import Frame, frame_and_tip
+from truearm.engine.robot.inverse.branch_search import REACHED, Candidates
+from truearm.engine.robot.inverse.branches import branch_rule
+from truearm.engine.robot.inverse.kinematics import NEAR_SINGULAR, reach
+from truearm.engine.robot.inverse.pose_solver import Orientation, PoseStatus, PoseTask
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import FIXED_XYZ_ANGLES, IDENTITY
+from truearm.engine.robot.urdf_writing import counting
+from truearm.robot_files.inverse import inverse
 
 #: In whose axes a pose is given: those of the base, of the instrument, of the controller's base, or of the tip as it
 #: stands now.

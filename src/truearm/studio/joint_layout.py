@@ -15,8 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from truearm.modeling.chain import Array, Chain, axis_of
-from truearm.modeling.robot import Robot
+from truearm.engine.robot.chain import Array, Chain, axis_of
+from truearm.engine.robot.robot import Robot
 
 #: Radius of a drum at the base and at the flange, by the length of the arm along its links.
 THICKNESS: Final = (0.058, 0.034)

@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.modeling.chain import Array
-from truearm.modeling.loads import has_weight, joint_loads
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.loads import has_weight, joint_loads
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
 from truearm.studio.arrows import Arrows, coloured
 
 #: Length of the longest arrow, by the length of the arm.
@@ -22,8 +22,8 @@ _REACHED: Final = 4000
 def load_arrows(robot: Robot, at: Postures, length: float) -> tuple[Arrows, list[str]]:
     """Return the moments of the load about the joint axes at one posture, of prismatic joints forces along them.
 
-    A positive one turns the joint forward, as of :func:`truearm.modeling.loads.joint_loads`: an arrow along the axis,
-    right-handed; a negative one against it.
+    A positive one turns the joint forward, as of :func:`truearm.engine.robot.loads.joint_loads`: an arrow along the
+    axis, right-handed; a negative one against it.
 
     Args:
         robot, at: With what it carries, and where it stands, bent as it is.

@@ -8,10 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.jobs.split import train_count
-from truearm.modeling.robot import Robot
-from truearm.shown import counted
+from truearm.engine.base.errors import InputError, counted
+from truearm.engine.command.split import train_count
+from truearm.engine.robot.robot import Robot
 from truearm.studio.settings import Settings
 
 #: How the history of a result says what :func:`truearm.calibrate` was asked for.

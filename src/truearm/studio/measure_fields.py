@@ -7,10 +7,9 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from truearm.errors import InputError
-from truearm.measurement.measuring.readings import MOST_SAMPLES
-from truearm.measurement.measuring.session import LONGEST_ROUND
-from truearm.units import sized_si, to_si
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.units import sized_si, to_si
+from truearm.measuring.session import LONGEST_ROUND, MOST_SAMPLES
 
 _Text = Annotated[str, Field(min_length=1)]
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

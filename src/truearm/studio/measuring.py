@@ -9,16 +9,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.jobs.open_campaign import OpenCampaign, open_campaign, sight
-from truearm.measurement.measuring.listening import HOST, Listener
-from truearm.measurement.measuring.readings import REASONS
-from truearm.measurement.measuring.session import Entry
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.notices import Notice
-from truearm.results.measured import DATA, GOES_ON, Measured
-from truearm.shown import counted, listed
+from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.measuring.open_campaign import OpenCampaign, open_campaign, sight
+from truearm.measuring.result import DATA, GOES_ON, Measured
+from truearm.measuring.session import REASONS, Entry
+from truearm.measuring.sources import HOST, Listener
 from truearm.studio.arrows import coloured
 from truearm.studio.measure_fields import MeasureFields, measure_arguments, measure_command
 from truearm.studio.project import Project

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from truearm.notices import Notice
+from truearm.engine.base.errors import Notice
 from truearm.studio import words
 from truearm.studio.project import PROJECT_FILE, ChangedFile, Project
 

@@ -13,12 +13,12 @@ import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedSeq
 
-from truearm.errors import InputError
-from truearm.files import confined_reads
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.planning.paths.path_file import SCHEMA, PathFile
-from truearm.schemas import validated
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import confined_reads
+from truearm.engine.base.schemas import validated
+from truearm.engine.motion.path_file import SCHEMA, PathFile
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
 from truearm.studio.recorded import Motion
 from truearm.studio.tasks import Outcome, Progress
 
@@ -134,7 +134,7 @@ def played_path(folder: Path, robot: Robot, file: str, seed: Array, progress: Pr
             positions.
         seed: Joint positions near which it begins ``(joints,)`` [rad or m].
     """
-    from truearm.jobs.path import path as job
+    from truearm.compensation.path import path as job
 
     os.chdir(folder)
     progress("following the path")

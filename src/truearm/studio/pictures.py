@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.files import exists, read_text
+from truearm.engine.base.files import exists, read_text
 from truearm.studio.window import Window
 
 #: Where a report has the data of its pictures.
@@ -48,7 +48,7 @@ class Picture:
         """
         import plotly.graph_objects as go
 
-        from truearm.reporting.drawing import DARK
+        from truearm.engine.document.drawing import DARK
 
         if self._window.project.settings.dark:
             drawn = _recoloured(drawn, DARK)

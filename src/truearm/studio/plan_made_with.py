@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from truearm.errors import InputError
-from truearm.files import exists, read_bytes
-from truearm.jobs.plan_inputs import plan_inputs
-from truearm.manifest import hash_of, sets_in
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists, read_bytes
+from truearm.engine.base.manifest import hash_of, sets_in
+from truearm.planning.plan import plan_inputs
 from truearm.studio import words
 from truearm.studio.plan_fields import UNSAID
 from truearm.studio.planned import asked_by, cell_places

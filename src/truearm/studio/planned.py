@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.files import confined_reads
-from truearm.modeling.chain import Array
+from truearm.engine.base.files import confined_reads
+from truearm.engine.robot.chain import Array
 from truearm.studio.corrected import cell_parts
 from truearm.studio.plan_fields import PlanFields, plan_arguments
 from truearm.studio.tasks import Outcome, Progress, option_words
@@ -52,8 +52,8 @@ def planned(
         fields: What the page says.
         cell, constraints, payload: Of the project.
     """
-    from truearm.jobs.plan import plan
-    from truearm.jobs.texts import read_poses
+    from truearm.engine.command.arguments import read_poses
+    from truearm.planning.plan import plan
 
     os.chdir(folder)
     poses = fields.poses.strip()

@@ -11,15 +11,14 @@ from filecmp import cmp
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal
 
-from truearm.errors import InputError, refusals_at, refusals_of
-from truearm.files import exists, path_argument, read_bytes, read_text, read_yaml
-from truearm.limits import refuse_beyond
-from truearm.manifest import MANIFEST, hash_of
-from truearm.printable import is_one_line
-from truearm.schemas import validated
+from truearm.engine.base.errors import InputError, is_one_line, refusals_at, refusals_of
+from truearm.engine.base.files import exists, path_argument, read_bytes, read_text, read_yaml
+from truearm.engine.base.limits import refuse_beyond
+from truearm.engine.base.manifest import MANIFEST, hash_of
+from truearm.engine.base.schemas import validated
+from truearm.engine.base.writing import put_back_old, put_in_place, remove_known, writable_folder, write_text_over
 from truearm.studio.settings import Settings
 from truearm.studio.uploads import clear_uploads
-from truearm.writing import put_back_old, put_in_place, remove_known, writable_folder, write_text_over
 
 #: What makes a folder a project.
 PROJECT_FILE: Final = "truearm-studio.yaml"
@@ -109,7 +108,7 @@ class Project:
 
     def robot_source(self) -> str | Path:
         """Return the robot's library id, or the path of its file in the folder."""
-        from truearm.library import library
+        from truearm.engine.robot.library import library
 
         name = self.settings.robot
         return name if name in library() else self.path(name, "robot")
@@ -383,7 +382,7 @@ def refuse_no_project(path: Path) -> bool:
 
 def _check_paths(project: Project, settings: Settings) -> None:
     """Refuse settings that lead out of the folder."""
-    from truearm.library import library
+    from truearm.engine.robot.library import library
 
     for name in _PATHS:
         value = getattr(settings, name)

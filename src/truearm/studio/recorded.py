@@ -13,15 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.files import read_text
-from truearm.measurement.readers.canonical import refuse_other_separators
-from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
-from truearm.modeling.chain import Array
-from truearm.modeling.controller import JointsOf
-from truearm.modeling.formats.joint_columns import JOINT_COLUMN, counting, joint_cells, joint_headings, joint_names
-from truearm.modeling.robot import Robot
-from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import read_text
+from truearm.engine.base.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
+from truearm.engine.data.readers.canonical import refuse_other_separators
+from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cells
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.controller import JointsOf
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.urdf_writing import JOINT_COLUMN, counting, joint_cells, joint_headings, joint_names
 
 #: The columns of labels that lists of configurations have, the better first.
 _LABELS: Final = ("configuration", "pose")

@@ -14,10 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from truearm.modeling.chain import Array
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import quaternion_from_rotation
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import quaternion_from_rotation
 from truearm.studio.joint_layout import LINK_SHARE, Layout, layout
 from truearm.studio.solids import Mesh, ball, box, drum, frame_about, together, tube
 

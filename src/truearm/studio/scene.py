@@ -12,12 +12,12 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from truearm.modeling.chain import Array
-from truearm.modeling.fixtures import Fixture
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, quaternion_from_rotation
-from truearm.printable import printable
+from truearm.engine.base.errors import printable
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.parts import Fixture
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform, quaternion_from_rotation
 from truearm.studio.arrows import Arrows
 from truearm.studio.robot_shape import link_poses, robot_shape
 from truearm.studio.solids import Mesh, frame_about

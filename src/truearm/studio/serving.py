@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.errors import InputError
-from truearm.files import exists
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists
 from truearm.studio.access import Access, is_loopback, listening_socket, new_token
 from truearm.studio.gate import Gate, start_server
 from truearm.studio.page import Page
@@ -87,7 +87,7 @@ def serve(
         project: Project = open_project(folder, DEMONSTRATION if demo else None)
         # Where it was filled before, it is opened as it is now: what was changed since stays.
         if demo and not exists(project.folder / DEMONSTRATION["cell"]):
-            from truearm.jobs.demo import demo as job
+            from truearm.starting.demo import demo as job
 
             job(project.folder, progress=progress)
             project.look()

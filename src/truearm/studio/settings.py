@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from truearm.modeling.wrench import WrenchFrame
+from truearm.engine.robot.wrench import WrenchFrame
 from truearm.studio.measure_fields import MeasureFields
 from truearm.studio.plan_fields import PlanFields
 

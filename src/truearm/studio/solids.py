@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.modeling.chain import Array
+from truearm.engine.robot.chain import Array
 
 Faces = NDArray[np.int32]
 #: Corners of a circle.

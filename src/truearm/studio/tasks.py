@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.errors import InputError
-from truearm.files import confined_reads
-from truearm.notices import Notice
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.files import confined_reads
 from truearm.studio.corrected import CellPart
 
 Progress = Callable[[str], None]
@@ -48,8 +47,8 @@ def calibrate(
     options
         Of the job, by its names of parameters; None where nothing is said.
     """
-    from truearm.jobs.calibrate import calibrate as job
-    from truearm.results.standing import ResultKeptError
+    from truearm.calibration.calibrate import calibrate as job
+    from truearm.calibration.parts import ResultKeptError
 
     os.chdir(folder)
     given = {name: value for name, value in options.items() if value is not None}

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from truearm.files import confined_reads
-from truearm.simulated import with_mark, without_mark
+from truearm.engine.base.files import confined_reads
+from truearm.engine.base.units import with_mark, without_mark
 from truearm.studio.tasks import Outcome, Progress, option_words
 
 
@@ -22,7 +22,7 @@ def plan_tests(folder: Path, robot: str, out: str, progress: Progress, **options
     Args:
         options: Of the job, by its names of parameters; None where nothing is said.
     """
-    from truearm.jobs.iso9283_plan import iso9283_plan
+    from truearm.iso9283.plan.plan import iso9283_plan
 
     os.chdir(folder)
     progress("finding poses and paths")
@@ -35,7 +35,7 @@ def plan_tests(folder: Path, robot: str, out: str, progress: Progress, **options
 
 def simulate_tests(folder: Path, robot: str, plan: str, out: str, progress: Progress, **options: Any) -> Outcome:
     """Simulate the tests of a plan: :func:`truearm.iso9283_simulate`."""
-    from truearm.jobs.iso9283_simulate import iso9283_simulate
+    from truearm.iso9283.simulate.simulate import iso9283_simulate
 
     os.chdir(folder)
     given = _given(options)
@@ -47,7 +47,7 @@ def simulate_tests(folder: Path, robot: str, plan: str, out: str, progress: Prog
 
 def evaluate_tests(folder: Path, plan: str, out: str, progress: Progress, **options: Any) -> Outcome:
     """Evaluate what was measured: :func:`truearm.iso9283_evaluate`; the table is in what it wrote."""
-    from truearm.jobs.iso9283_evaluate import iso9283_evaluate
+    from truearm.iso9283.evaluate.evaluate import iso9283_evaluate
 
     os.chdir(folder)
     given = _given(options)

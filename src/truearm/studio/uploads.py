@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Final
 
-from truearm.files import reason_of
-from truearm.limits import limit
+from truearm.engine.base.files import reason_of
+from truearm.engine.base.limits import limit
 
 #: So many files are taken in at once.
 _AT_ONCE: Final = 4

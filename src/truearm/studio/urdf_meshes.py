@@ -14,11 +14,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.files import exists, read_bytes
-from truearm.library import load_robot, urdf_source
-from truearm.limits import refuse_beyond
-from truearm.modeling.formats.urdf_tree import Tag, Tree, child_tag, numbers, origin, placement, read_tree
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists, read_bytes
+from truearm.engine.base.limits import refuse_beyond
+from truearm.engine.robot.library import load_robot, urdf_source
+from truearm.engine.robot.urdf_tree import Tag, Tree, child_tag, numbers, origin, placement, read_tree
 from truearm.studio.solids import Mesh, ball, box, drum, together
 
 #: What meshes are read, by the ends of their names.

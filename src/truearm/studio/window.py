@@ -11,13 +11,12 @@ from typing import Any, Final
 
 import viser
 
-from truearm.errors import InputError
-from truearm.files import confined_reads, exists
-from truearm.library import load_robot
-from truearm.modeling.parts import Payload
-from truearm.modeling.robot import Robot
-from truearm.modeling.same_arm import fitted_from
-from truearm.notices import Notice
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.files import confined_reads, exists
+from truearm.engine.base.writing import put_back_old
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot, fitted_from
 from truearm.studio import words
 from truearm.studio.gate import Gate
 from truearm.studio.other_programs import OtherPrograms
@@ -29,7 +28,6 @@ from truearm.studio.uploads import Upload
 from truearm.studio.values import fits
 from truearm.studio.windows import Windows
 from truearm.studio.work import Work, unforeseen
-from truearm.writing import put_back_old
 
 #: So much of what was said stays to be read.
 _TOLD: Final = 40

@@ -18,8 +18,8 @@ from viser._messages import (
 )
 from websockets.asyncio.server import ServerConnection
 
-from truearm.files import read_bytes
-from truearm.notices import Notice
+from truearm.engine.base.errors import Notice
+from truearm.engine.base.files import read_bytes
 from truearm.studio import words
 from truearm.studio.gate import Gate
 from truearm.studio.uploads import Upload

@@ -10,9 +10,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Final
 
-from truearm.errors import InputError, with_parameters
-from truearm.notices import Notice, worst_first
-from truearm.printable import printable, with_short_words
+from truearm.engine.base.errors import InputError, Notice, printable, with_parameters, with_short_words, worst_first
 
 #: Colours that can be read on white and on dark grey.
 _COLOURS: Final = {"note": "#4682b4", "warning": "#c77700", "error": "#d6453d"}

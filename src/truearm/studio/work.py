@@ -12,7 +12,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, Final
 
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 
 #: New processes import what they need: this one has threads and a server, which a copy of it would not.
 _PROCESSES: Final = multiprocessing.get_context("spawn")

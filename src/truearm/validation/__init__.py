@@ -1,1 +1,1 @@
-"""Proofs of accuracy beyond the errors of single readings."""
+"""A robot judged on other data: `truearm validate`, `distances`, `sphere`, `lines`, `tolerance`."""

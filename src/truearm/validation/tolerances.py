@@ -1,22 +1,30 @@
-"""Tolerances of a joint's assembly from its errors, errors from tolerances, and what they do at the flange.
-
-Source: KR5 paper, sections 2.3 and 4.3. A hole of depth l whose far end may lie delta aside of its place lets the axis
-lean by ``atan(delta / l)`` (equation 8): perpendicularity if the axis is square to its datum, parallelism if it goes
-along it. Towards mu, from x to y, it leans by ``egamma = -atan(delta sin(mu) / l)`` and ``ebeta = atan(delta cos(mu)
-cos(egamma) / l)`` (9 and 10, which print them for ``Ry Rx`` and without the sign; equation 5 has ``Rx Ry``).
-"""
+"""What joint errors use of their tolerances, or what tolerances may do at the flange."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
+from truearm.engine.base.errors import InputError, refusals_of
+from truearm.engine.base.units import Marked
+from truearm.engine.command.arguments import lengths_argument, robot_argument
+from truearm.engine.document.records import Record
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.conversion import converted
+from truearm.engine.robot.robot import Robot
+from truearm.validation.lines import CONVENTION, design
+
+# Tolerances of a joint's assembly from its errors, errors from tolerances, and what they do at the flange.
+#
+# Source: KR5 paper, sections 2.3 and 4.3. A hole of depth l whose far end may lie delta aside of its place lets the
+# axis lean by ``atan(delta / l)`` (equation 8): perpendicularity if the axis is square to its datum, parallelism if it
+# goes along it. Towards mu, from x to y, it leans by ``egamma = -atan(delta sin(mu) / l)`` and ``ebeta = atan(delta
+# cos(mu) cos(egamma) / l)`` (9 and 10, which print them for ``Ry Rx`` and without the sign; equation 5 has ``Rx Ry``).
 
 
 @dataclass(frozen=True)
@@ -99,3 +107,130 @@ def flange_error(robot: Robot, leans: Sequence[float], positions: Sequence[float
             float(np.sqrt((leaning**2).sum(axis=0) + (shifts**2).sum()).max()),
         ),
     )
+
+
+# What joint errors use of their tolerances, and what tolerances may do at the flange.
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class UsedTolerances(Record):
+    """What the errors of a robot's joints use of their tolerances."""
+
+    robot: str  #: Its name.
+    depths: tuple[float, ...]  #: Of the joints' holes [m].
+    joints: tuple[Tolerance, ...]  #: What each joint uses.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm and deg."""
+        rows = [
+            {
+                "joint": number,
+                "depth_mm": depth * 1e3,
+                "lean_mm": used.delta * 1e3,
+                "towards_deg": math.degrees(used.towards),
+                "position_mm": [v * 1e3 for v in used.position],
+            }
+            for number, (depth, used) in enumerate(zip(self.depths, self.joints, strict=True), 1)
+        ]
+        return {"robot": self.robot, "joints": rows}
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        text = ["joint  depth [mm]  lean [mm]  towards [deg]  position x, y, z [mm]"]
+        for row in self.summary()["joints"]:
+            place = ", ".join(f"{v:.4f}" for v in row["position_mm"])
+            figures = f"{row['depth_mm']:<11.1f} {row['lean_mm']:<10.4f} {row['towards_deg']:<14.1f}"
+            text.append(f"{row['joint']:<6} {figures} {place}")
+        return text
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AllowedErrors(Record):
+    """The largest error of the flange's position that tolerances allow."""
+
+    robot: str  #: Its name.
+    configurations: int  #: How many were looked at.
+    angles: tuple[float, ...]  #: Largest angle of each joint's axis [rad].
+    errors: FlangeError  #: What the tolerances may do at the flange [m].
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm and deg."""
+        leaning, place = self.errors.leaning.tolist(), self.errors.position.tolist()
+        worst, root = self.errors.together
+        return {
+            "robot": self.robot,
+            "configurations": self.configurations,
+            "joints": [
+                {"joint": i, "angle_deg": math.degrees(t), "by_lean_mm": a * 1e3, "by_position_mm": b * 1e3}
+                for i, (t, a, b) in enumerate(zip(self.angles, leaning, place, strict=True), 1)
+            ],
+            "together": {"worst_mm": worst * 1e3, "root_of_squares_mm": root * 1e3},
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        said = self.summary()
+        text = [f"Largest error of the flange's position over {self.configurations} configurations:"]
+        text += [
+            f"  joint {e['joint']}: {e['by_lean_mm']:.4f} mm by leaning {e['angle_deg']:.4f} deg,"
+            f" {e['by_position_mm']:.4f} mm by place"
+            for e in said["joints"]
+        ]
+        worst, root = said["together"].values()
+        return [*text, f"  all at their worst {worst:.3f} mm, root of the sum of squares {root:.3f} mm"]
+
+
+#: Configurations at which the flange is looked at, drawn from the robot's limits.
+_CONFIGURATIONS: Final = 2000
+
+
+def tolerance(
+    robot: Robot | str | Path,
+    depth: float | Sequence[float],
+    *,
+    lean: float | Sequence[float] | None = None,
+    position: float | Sequence[float] | None = None,
+) -> UsedTolerances | AllowedErrors:
+    """Say what joint errors use of their tolerances, or what tolerances may do at the flange.
+
+    Parameters
+    ----------
+    robot
+        A robot, or what :func:`truearm.load_robot` takes. Without `lean` and `position` it must have joint errors, as
+        ``truearm.axes`` writes them.
+    depth
+        Of each joint's hole [m]: one number for all joints, or one each.
+    lean
+        Perpendicularity or parallelism that is allowed [m], one number or one a joint.
+    position
+        Radius about its place within which a joint may lie [m], half of the drawing's diameter: one number or one a
+        joint.
+
+    Returns
+    -------
+    found
+        With `lean` or `position` the largest flange error that they allow, else the tolerances that the robot's own
+        errors use.
+
+    Raises
+    ------
+    InputError
+        If the robot has other joints than revolute ones, or no joint errors, or a length is none.
+    """
+    robot = robot_argument(robot)
+    count = len(robot.joints)
+    depths = tuple(checked_depth(d) for d in lengths_argument(depth, "depth", count, one_for_all=True))
+    if lean is None and position is None:
+        with refusals_of("robot"):
+            design(robot)  # refuses robots without joint errors
+        return UsedTolerances(robot.name, depths, joint_tolerances(robot, depths), robot.simulated_from)
+    leans = lengths_argument(0.0 if lean is None else lean, "lean", count, 0.0, one_for_all=True)
+    positions = lengths_argument(0.0 if position is None else position, "position", count, 0.0, one_for_all=True)
+    with refusals_of("robot"):
+        errors = robot if robot.convention_name == CONVENTION else converted(robot, CONVENTION)
+    q = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
+    angles = tuple(errors_of_tolerance(a, 0.0, d)[0] for a, d in zip(leans, depths, strict=True))
+    found = flange_error(errors, angles, positions, q)
+    return AllowedErrors(robot.name, len(q), angles, found, robot.simulated_from)

@@ -14,16 +14,25 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from truearm import __version__
-from truearm.compensation.program_files import edited, language_called
-from truearm.compensation.program_poses import edits_of, numbers_of, pose_numbers, poses_of
-from truearm.compensation.programs import LANGUAGES
-from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
-from truearm.compensation.programs.marks import MARK, correction_comment
-from truearm.compensation.programs.numbers import NUMBER
-from truearm.compensation.programs.program import Edit, Language, Program, ProgramTarget, Source, Split
-from truearm.errors import InputError
-from truearm.modeling.orientations import QUATERNION
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.version import __version__
+from truearm.engine.programs import LANGUAGES
+from truearm.engine.programs.program import (
+    BYTE_ORDER_MARK,
+    MARK,
+    NUMBER,
+    Edit,
+    Language,
+    Lines,
+    Program,
+    ProgramTarget,
+    Source,
+    Split,
+    correction_comment,
+)
+from truearm.engine.programs.program_files import edited, language_called
+from truearm.engine.programs.program_poses import edits_of, numbers_of, pose_numbers, poses_of
+from truearm.engine.robot.transform import QUATERNION
 
 SAMPLES = Path(__file__).parent / "samples"
 splitting = pytest.mark.parametrize("language", [one for one in LANGUAGES if one.split], ids=lambda one: one.name)

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.programs.fanuc_ls import FANUC_LS
-from truearm.compensation.programs.fanuc_ls.configuration import configuration
-from truearm.compensation.programs.program import Configuration, Program, Skipped, Source, Split
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.fanuc_ls import FANUC_LS
+from truearm.engine.programs.fanuc_ls.text import configuration
+from truearm.engine.programs.program import Configuration, Program, Skipped, Source, Split
+from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.robot.library import load_robot
 
 SAMPLES = Path(__file__).parent / "samples" / "fanuc_ls"
 HALF = (-pi, pi)

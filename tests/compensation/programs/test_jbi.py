@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from truearm.compensation.programs.jbi import JBI
-from truearm.compensation.programs.program import Configuration, Edit, Program, Source, Split
-from truearm.errors import InputError
-from truearm.modeling.orientations import FIXED_XYZ_ANGLES
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.jbi import JBI
+from truearm.engine.programs.program import Configuration, Edit, Program, Source, Split
+from truearm.engine.robot.transform import FIXED_XYZ_ANGLES
 
 SAMPLES = Path(__file__).parent / "samples" / "jbi"
 

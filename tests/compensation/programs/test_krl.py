@@ -16,10 +16,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from truearm.compensation.programs import LANGUAGES
-from truearm.compensation.programs.krl import KRL
-from truearm.compensation.programs.program import ANY_POSTURE, Edit, Program, ProgramTarget, Source, Split
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs import LANGUAGES
+from truearm.engine.programs.krl import KRL
+from truearm.engine.programs.program import ANY_POSTURE, Edit, Program, ProgramTarget, Source, Split
 
 SAMPLES = Path(__file__).parent / "samples" / "krl"
 CELL = ("cell/cell.src", "cell/cell.dat", "cell/$config.dat")

@@ -8,19 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.cell import Cell, read_tools
-from truearm.compensation.corrected_path import CorrectedPath, correct_path
-from truearm.compensation.path_program import path_program
+from truearm.compensation.corrected_path import CorrectedPath, correct_path, path_program
 from truearm.compensation.program_correction import commanded
-from truearm.compensation.program_files import program_files
-from truearm.compensation.programs import BY_NAME
-from truearm.compensation.programs.marks import MARK
-from truearm.compensation.programs.new_program import NewProgram
-from truearm.compensation.programs.program import Program, Source
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.robot import Robot
-from truearm.planning.paths.path_file import read_path
+from truearm.engine.base.errors import InputError
+from truearm.engine.motion.path_file import read_path
+from truearm.engine.programs import BY_NAME
+from truearm.engine.programs.cell import Cell, read_tools
+from truearm.engine.programs.new_program import NewProgram
+from truearm.engine.programs.program import MARK, Program, Source
+from truearm.engine.programs.program_files import program_files
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
 
 PATH = """\
 truearm: truearm-path/1

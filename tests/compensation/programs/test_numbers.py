@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from truearm.compensation.programs.numbers import decimals_of, rewritten
+from truearm.engine.programs.program import decimals_of, rewritten
 
 
 @pytest.mark.parametrize(

@@ -21,14 +21,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from truearm.compensation.programs.numbers import rewritten
-from truearm.compensation.programs.program import ANY_POSTURE, Edit, Program, Source, Split
-from truearm.compensation.programs.rapid import RAPID
-from truearm.compensation.programs.rapid.data import configuration
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.inverse.branches import BRANCHES, branch_rule
-from truearm.modeling.transform import Transform
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.program import ANY_POSTURE, Edit, Program, Source, Split, rewritten
+from truearm.engine.programs.rapid import RAPID
+from truearm.engine.programs.rapid.data import configuration
+from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform
 
 SAMPLES = Path(__file__).parent / "samples" / "rapid"
 NO_AXES = "[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]"

@@ -17,11 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from truearm.compensation.program_poses import poses_of
-from truearm.compensation.programs import LANGUAGES
-from truearm.compensation.programs.program import Edit, Program, Skipped, Source, Split
-from truearm.compensation.programs.urscript import URSCRIPT
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs import LANGUAGES
+from truearm.engine.programs.program import Edit, Program, Skipped, Source, Split
+from truearm.engine.programs.program_poses import poses_of
+from truearm.engine.programs.urscript import URSCRIPT
 
 SAMPLES = Path(__file__).parent / "samples" / "urscript"
 TCP = "set_tcp(p[0, 0, 0.1, 0, 0, 0])\n"

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.programs.program import Configuration, Program, Source
-from truearm.compensation.programs.val3 import VAL3
-from truearm.errors import InputError
-from truearm.modeling.orientations import MOVING_XYZ_ANGLES
+from truearm.engine.base.errors import InputError
+from truearm.engine.programs.program import Configuration, Program, Source
+from truearm.engine.programs.val3 import VAL3
+from truearm.engine.robot.transform import MOVING_XYZ_ANGLES
 
 SAMPLES = Path(__file__).parent / "samples" / "val3"
 CELL = ("cell/cell.dtx", "cell/start.pgx", "cell/pick.pgx", "cell/cell.pjx")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.measuring.about import About, read_about
+from truearm.engine.base.errors import InputError
+from truearm.measuring.reading_log import About, read_about
 
 WHOLE = """\
 truearm: truearm-about/1

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.measuring.campaign import Campaign
-from truearm.measurement.measuring.listening import HOST, LONGEST_LINE, MOST_CONNECTIONS, MOST_LINES, Listener
-from truearm.measurement.measuring.readings import Quality
-from truearm.measurement.measuring.session import Session
+from truearm.engine.base.errors import InputError
+from truearm.measuring.campaign import Campaign
+from truearm.measuring.session import Quality, Session
+from truearm.measuring.sources import HOST, LONGEST_LINE, MOST_CONNECTIONS, MOST_LINES, Listener
 
 TOKEN = "a-token-of-the-tests"
 
@@ -171,7 +170,7 @@ def test_too_many_connections_and_silent_ones_are_ended(port: Port, monkeypatch:
     silent = [port.connect(None) for _ in range(MOST_CONNECTIONS)]
     more = port.connect()
     assert heard(more) == "refused too many connections\n"
-    monkeypatch.setattr("truearm.measurement.measuring.listening.PATIENCE", 0.0)
+    monkeypatch.setattr("truearm.measuring.sources.PATIENCE", 0.0)
     port.turn()
     assert all(heard(stream) == "" for stream in silent)
     monkeypatch.undo()

@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.measuring.campaign import session_notices
-from truearm.measurement.measuring.kept_readings import kept_readings, stated_sigma
-from truearm.measurement.measuring.nest_drift import nest_drift
-from truearm.measurement.measuring.readings import REASONS, Quality, Reading, dwell_figures
-from truearm.measurement.measuring.session import Entry, Session
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.readers.rows import Configurations
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.readers.rows import Configurations
+from truearm.measuring.campaign import nest_drift, session_notices
+from truearm.measuring.kept_readings import kept_readings, stated_sigma
+from truearm.measuring.session import REASONS, Entry, Quality, Reading, Session, dwell_figures
 
 LABELS = ("P1", "P2", "P3", "P4")
 QUALITY = Quality(deviation=3e-5, settling=5e-5, samples=5)

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from tests.killing import killed, operations
 
-from truearm.errors import InputError
-from truearm.measurement.measuring.reading_log import LOG, ReadingLog
-from truearm.measurement.measuring.readings import REASONS, Reading
-from truearm.measurement.measuring.session import Entry
+from truearm.engine.base.errors import InputError
+from truearm.measuring.reading_log import LOG, ReadingLog
+from truearm.measuring.session import REASONS, Entry, Reading
 
 
 def entry(number: int, *, reason: str = "") -> Entry:

@@ -10,11 +10,10 @@ from typing import Any
 
 import pytest
 
-from truearm.errors import InputError
-from truearm.measurement.measuring.campaign import Campaign
-from truearm.measurement.measuring.readings import Quality
-from truearm.measurement.measuring.session import Session
-from truearm.measurement.measuring.watched_folder import WatchedFolder
+from truearm.engine.base.errors import InputError
+from truearm.measuring.campaign import Campaign
+from truearm.measuring.session import Quality, Session
+from truearm.measuring.watched_folder import WatchedFolder
 
 LABELS = ("P1", "P2", "P3")
 MAPPING = """\

@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.identification.solving.fit import identify, place
-from truearm.identification.solving.models import MODELS
-from truearm.library import load_robot
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform
-from truearm.simulation.devices.calibration_table import CalibrationTable, rectangular_grid
-from truearm.simulation.twin import Twin, directions, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.base.errors import InputError
+from truearm.engine.fit.fit import identify, place
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY, Transform
+from truearm.engine.twin.devices.calibration_table import CalibrationTable, rectangular_grid
+from truearm.engine.twin.twin import Twin, directions, measure
+from truearm.engine.twin.twin_joint import JointTruth
 
 GRID = rectangular_grid(4, 3, 0.04)
 PLACE = Transform((0.3, 0.02, 0.15))

@@ -8,20 +8,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from papers.katana.robot import katana, published
 
-from truearm.errors import InputError
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.redundancy import gauge_freedoms
-from truearm.identification.start_values.from_readings import start_from_readings
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.modeling.transform import Transform
-from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.devices.pencil import DRAWN_CIRCLE
-from truearm.simulation.twin import Twin
-from truearm.studies.katana.robot import katana, published
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.problem import gauge_freedoms
+from truearm.engine.fit.start_values import start_from_readings
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.devices.pencil import DRAWN_CIRCLE
+from truearm.engine.twin.twin import Twin
 
 GEOMETRIC = next(model for model in MODELS if model.name == "geometric")
 STANDS = Transform((1.0, -0.4, 0.3), (0.8, 0.0, 0.6, 0.0))

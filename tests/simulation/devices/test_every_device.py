@@ -10,20 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.identification.solving.fit import Status, identify
-from truearm.identification.solving.models import MODELS
-from truearm.identification.solving.redundancy import gauge_freedoms
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.measurement.statistics import errors_of
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
-from truearm.simulation.devices import DEVICES, measured_with, named_device
-from truearm.simulation.truths import joint_truths, truth_twin
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import Status, identify
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.problem import gauge_freedoms
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.devices import DEVICES, named_device
+from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.truths import joint_truths, truth_twin
+from truearm.engine.twin.twin import Twin
 
 GEOMETRIC, ELASTIC = ({m.name: m for m in MODELS}[name] for name in ("geometric", "elastic"))
 NAMES = [device.name for device in DEVICES]

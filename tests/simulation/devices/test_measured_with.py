@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from truearm.library import load_robot
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.robot import Robot
-from truearm.simulation.devices.device import Arm, Device, measured_with
-from truearm.simulation.devices.lengths import BALLBAR
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.devices.device import Arm, Device, measured_with
+from truearm.engine.twin.devices.lengths import BALLBAR
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 
 @dataclass(frozen=True)

@@ -7,24 +7,22 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from papers.fourth_cup import with_fourth
+from papers.session import SetUp, cups_dataset, joined, measure_poses
+from papers.simulated import ballbar
+from papers.tool_changer import ToolChanger
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.measurement.hexapod.four_cups import SIDES_OF_FOUR, four_cups, side_frames
-from truearm.measurement.hexapod.geometry import DEVICE, Device, triangle
-from truearm.measurement.hexapod.poses import CUPS, poses
-from truearm.measurement.hexapod.sheet import PlannedRow
-from truearm.measurement.hexapod.world_frame import plain_frame
-from truearm.modeling.chain import Array
-from truearm.modeling.inverse import inverse
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform
-from truearm.simulation.hexapod.fourth_cup import with_fourth
-from truearm.simulation.hexapod.session import SetUp, cups_dataset, joined, measure_poses
-from truearm.simulation.hexapod.simulated import ballbar
-from truearm.simulation.hexapod.tool_changer import ToolChanger
-from truearm.simulation.twin import Twin
-from truearm.simulation.twin_joint import JointTruth
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.hexapod import CUPS, DEVICE, Device, poses, triangle
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY, Transform
+from truearm.engine.twin.twin import Twin
+from truearm.engine.twin.twin_joint import JointTruth
+from truearm.hexapod.places import plain_frame
+from truearm.hexapod.sheet import SIDES_OF_FOUR, PlannedRow, four_cups, side_frames
 
 EXACT = Device(sigma=0.0)
 FIXTURE = Transform((0.2, -0.15, 0.1))

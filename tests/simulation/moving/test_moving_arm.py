@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.library import load_robot
-from truearm.modeling.parts import Payload
-from truearm.modeling.transform import IDENTITY, Transform, homogeneous
-from truearm.simulation.moving.arm import DRIVES, WARMING, MovingArm, last_moves
-from truearm.simulation.moving.stiffness import drawn_compliance
-from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import Twin
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.transform import IDENTITY, Transform, homogeneous
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin
+from truearm.iso9283.simulate.moving_arm import DRIVES, WARMING, MovingArm, drawn_compliance, last_moves
 
 ROBOT = load_robot("irb120")
 TIP = Transform((0.05, 0.02, 0.1))

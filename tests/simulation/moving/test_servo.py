@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
-from truearm.simulation.moving.servo import Servo
+from truearm.engine.base.errors import InputError
+from truearm.iso9283.simulate.moving_arm import Servo
 
 STEP = 2e-3
 

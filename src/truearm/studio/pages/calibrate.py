@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from typing import Any, ClassVar, Final
 
-from truearm.errors import InputError
-from truearm.files import exists, read_text
-from truearm.identification.choosing.choice import AUTO
-from truearm.identification.solving.losses import LOSSES
-from truearm.identification.solving.models import FRAMES, MODELS
-from truearm.jobs.following import FitStep
-from truearm.notices import Notice
+from truearm.calibration.calibrate import FitStep
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.files import exists, read_text
+from truearm.engine.choosing.selection import AUTO
+from truearm.engine.fit.losses import LOSSES
+from truearm.engine.fit.models import FRAMES, MODELS
 from truearm.studio import words
 from truearm.studio.fit_course import fit_course
 from truearm.studio.pages.check import choose_measurements, data_of

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
-from truearm.errors import InputError
-from truearm.jobs.plan_notices import load_notices
-from truearm.jobs.show import show
-from truearm.library import library
-from truearm.modeling.parts import Payload
-from truearm.notices import Notice
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.robot.library import library
+from truearm.engine.robot.parts import Payload
+from truearm.planning.programs import load_notices
+from truearm.robot_files.show import show
 from truearm.studio import words
 from truearm.studio.cell_rules import CellRules
 from truearm.studio.pages.cell_boxes import CellBoxes

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
-from truearm.errors import InputError
-from truearm.files import exists, read_text
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists, read_text
 from truearm.studio import words
 from truearm.studio.cell_rules import CellRules, changed_rules, read_rules, with_box, with_length, without_box
 from truearm.studio.pages.choices import NONE, chosen, offer

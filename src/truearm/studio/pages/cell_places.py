@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from truearm.errors import InputError
-from truearm.files import exists, read_text
-from truearm.library import load_robot, urdf_source
-from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.robot import Robot
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists, read_text
+from truearm.engine.robot.library import load_robot, urdf_source
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.studio import words
 from truearm.studio.cell_places import (
     THINGS,

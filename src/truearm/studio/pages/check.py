@@ -7,12 +7,10 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.files import exists, read_text
-from truearm.measurement.excluded import Exclusion, exclusions_text, read_exclusions
-from truearm.modeling.chain import Array
-from truearm.notices import Notice
-from truearm.shown import counted
+from truearm.engine.base.errors import InputError, Notice, counted
+from truearm.engine.base.files import exists, read_text
+from truearm.engine.data.excluded import Exclusion, exclusions_text, read_exclusions
+from truearm.engine.robot.chain import Array
 from truearm.studio import words
 from truearm.studio.checked import Checked, checked, with_exclusions
 from truearm.studio.pages.choices import NONE, chosen, offer

@@ -6,17 +6,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.files import exists
-from truearm.modeling.chain import Array
-from truearm.planning.iso9283.plan_file import read_plan
-from truearm.results.iso9283_evaluation import RESULT
+from truearm.engine.base.files import exists
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.evaluate.comparison import read_result
+from truearm.iso9283.evaluate.evaluate import RESULT
+from truearm.iso9283.plan.plan_file import read_plan
 from truearm.studio import words
 from truearm.studio.arrows import FACTORS, coloured, error_arrows
 from truearm.studio.cube_in_space import CubeInSpace, cube_in_space, is_of_plan
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.scene import Scene
 from truearm.studio.window import Window
-from truearm.validation.iso9283.result_file import read_result
 
 #: Of paths whose errors are not known, and of the cube's edges.
 _PATH: Final = np.array([150, 150, 160], np.uint8)

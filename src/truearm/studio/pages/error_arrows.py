@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from truearm.errors import InputError
-from truearm.files import exists
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists
 from truearm.studio import words
 from truearm.studio.arrows import FACTORS, error_arrows
 from truearm.studio.error_vectors import ErrorVectors, error_vectors

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.units import as_number
 from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.window import Window
-from truearm.units import as_number
 
 
 class Fields:

@@ -11,12 +11,11 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.files import exists, read_bytes
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
-from truearm.notices import Notice
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.files import exists, read_bytes
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.studio import words
 from truearm.studio.jogging import Branch, JogFrame, Jogging
 from truearm.studio.pages.jog_path import JogPath

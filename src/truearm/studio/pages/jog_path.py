@@ -7,11 +7,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.files import exists, read_text
-from truearm.modeling.chain import Array
-from truearm.planning.paths.path_file import PathFile, PlannedPath, planned_path, read_path
-from truearm.schemas import validated
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists, read_text
+from truearm.engine.base.schemas import validated
+from truearm.engine.motion.path_file import PathFile, PlannedPath, planned_path, read_path
+from truearm.engine.robot.chain import Array
 from truearm.studio import words
 from truearm.studio.jogging import Jogging
 from truearm.studio.path_points import (

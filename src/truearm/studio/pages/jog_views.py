@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from truearm.errors import InputError
+from truearm.engine.base.errors import InputError
 from truearm.studio import words
 from truearm.studio.jogging import Jogging
 from truearm.studio.load_arrows import load_arrows, reached_points

@@ -5,12 +5,11 @@ from __future__ import annotations
 import threading
 from typing import Any, ClassVar, Final
 
-from truearm.errors import InputError
-from truearm.files import confined_reads, exists
-from truearm.measurement.measuring.reading_log import LOG
-from truearm.notices import Notice
-from truearm.reporting.measure_figures import drift_figure, quality_figure
-from truearm.results.measured import DATA, PAGE
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.files import confined_reads, exists
+from truearm.measuring.reading_log import LOG
+from truearm.measuring.report import drift_figure, quality_figure
+from truearm.measuring.result import DATA, PAGE
 from truearm.studio import words
 from truearm.studio.measure_fields import SOURCES
 from truearm.studio.measuring import HEAD, Measuring
@@ -100,7 +99,7 @@ class MeasurePage:
         self._callbacks()
 
     def _source_fields(self) -> None:
-        from truearm.simulation.virtual_instrument import VIRTUAL
+        from truearm.measuring.virtual_instrument import VIRTUAL
 
         gui, fields = self._window.gui, self.fields
         with self._of_source["virtual instrument"]:

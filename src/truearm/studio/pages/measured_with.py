@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from truearm.errors import InputError
-from truearm.files import exists, read_text
-from truearm.measurement.measuring.about import About, read_about
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.files import exists, read_text
+from truearm.engine.base.units import as_number
+from truearm.measuring.reading_log import About, read_about
 from truearm.studio import words
 from truearm.studio.about_file import AIR, ENTRIES, changed_about, with_air, with_entry
 from truearm.studio.pages.fields import Fields
 from truearm.studio.window import Window
-from truearm.units import as_number
 
 #: The file that is written where none is chosen.
 _FILE: Final = "about.yaml"

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.modeling.chain import Array
+from truearm.engine.robot.chain import Array
 from truearm.studio import words
 from truearm.studio.measuring import ASIDE, INSTRUMENT, Measuring
 from truearm.studio.pages.jog import JogPage

@@ -7,13 +7,14 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar, Final
 
-from truearm.errors import InputError
-from truearm.files import exists
-from truearm.notices import Notice
-from truearm.planning.iso9283.plan_file import PLAN
-from truearm.results.iso9283_evaluation import EVALUATION_FILES, REPORT, RESULT
-from truearm.results.iso9283_simulation import FILES
-from truearm.results.iso9283_table import (
+from truearm.engine.base.errors import InputError, Notice, counted
+from truearm.engine.base.files import exists
+from truearm.engine.base.units import as_number
+from truearm.engine.twin.truths import truth_names
+from truearm.iso9283.criteria.rows import Value
+from truearm.iso9283.evaluate.comparison import ResultFile, read_result
+from truearm.iso9283.evaluate.evaluate import EVALUATION_FILES, REPORT, RESULT
+from truearm.iso9283.evaluate.table import (
     HEADING,
     UNITS,
     beside_words,
@@ -22,8 +23,8 @@ from truearm.results.iso9283_table import (
     values_of,
     worst_places,
 )
-from truearm.shown import counted
-from truearm.simulation.truths import truth_names
+from truearm.iso9283.plan.plan_file import PLAN
+from truearm.iso9283.simulate.simulate import FILES
 from truearm.studio import words
 from truearm.studio.evaluated_with import evaluated_with, other_evaluations, stamps_of
 from truearm.studio.pages.choices import NONE, chosen, offer
@@ -33,9 +34,6 @@ from truearm.studio.project import stamp_of
 from truearm.studio.tasks import Outcome
 from truearm.studio.tested import evaluate_tests, plan_tests, simulate_tests
 from truearm.studio.window import Window
-from truearm.units import as_number
-from truearm.validation.iso9283.result_file import ResultFile, read_result
-from truearm.validation.iso9283.values import Value
 
 #: Files that are chosen, with their labels, what they are, and their endings.
 _CHOICES: Final = (

@@ -8,15 +8,14 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.identification.solving.models import MODELS
-from truearm.jobs.texts import read_poses
-from truearm.manifest import MANIFEST
-from truearm.modeling.chain import Array
-from truearm.notices import Notice
-from truearm.planning.choosing.measurement_plan import ERROR
-from truearm.planning.choosing.observability import INDICES
-from truearm.simulation.devices import DEVICES
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.manifest import MANIFEST
+from truearm.engine.command.arguments import read_poses
+from truearm.engine.fit.design import INDICES
+from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.chain import Array
+from truearm.engine.twin.devices import DEVICES
+from truearm.planning.choosing import ERROR
 from truearm.studio import words
 from truearm.studio.arrows import coloured
 from truearm.studio.pages.choices import NONE, offer
@@ -261,6 +260,6 @@ class PlanPage:
 
 
 def _programs() -> tuple[str, ...]:
-    from truearm.compensation.programs import LANGUAGES
+    from truearm.engine.programs import LANGUAGES
 
     return (".csv", *(suffix for language in LANGUAGES for suffix in language.suffixes))

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.modeling.chain import Array
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
 from truearm.studio import words
 from truearm.studio.arrows import FACTORS, Arrows, error_arrows
 from truearm.studio.drawn_program import DrawnProgram

@@ -7,15 +7,14 @@ from glob import escape
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
-from truearm.compensation.cell import read_wrenches
-from truearm.errors import InputError
-from truearm.files import exists
-from truearm.manifest import MANIFEST
-from truearm.modeling.formats.controller_entry import STATED
-from truearm.modeling.wrench import WRENCH_FRAMES, Wrench
-from truearm.notices import Notice
-from truearm.results.calibration import RESULT_FILES
-from truearm.results.program_correction import REPORT
+from truearm.calibration.result import RESULT_FILES
+from truearm.compensation.result import REPORT
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.files import exists
+from truearm.engine.base.manifest import MANIFEST
+from truearm.engine.programs.cell import read_wrenches
+from truearm.engine.robot.robot_file.entries import STATED
+from truearm.engine.robot.wrench import WRENCH_FRAMES, Wrench
 from truearm.studio import words
 from truearm.studio.corrected import Corrected, corrected_now, kinematics_files
 from truearm.studio.drawn_program import DrawnProgram, corrected_program, read_program
@@ -88,7 +87,7 @@ class ProgramsPage:
 
     def refresh(self) -> None:
         """Offer the files of the folder, and show the settings."""
-        from truearm.compensation.programs import LANGUAGES
+        from truearm.engine.programs import LANGUAGES
 
         window, project, settings = self._window, self._window.project, self._window.project.settings
         suffixes = tuple(suffix for language in LANGUAGES for suffix in language.suffixes)

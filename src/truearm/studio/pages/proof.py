@@ -7,12 +7,11 @@ import json
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
-from truearm.errors import InputError
-from truearm.files import exists, read_text
-from truearm.measurement.excluded import read_exclusions
-from truearm.notices import Notice
-from truearm.results.calibration import RESULT_FILES
-from truearm.simulated import said_of
+from truearm.calibration.result import RESULT_FILES
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.files import exists, read_text
+from truearm.engine.base.units import said_of
+from truearm.engine.data.excluded import read_exclusions
 from truearm.studio import words
 from truearm.studio.made_with import MadeWith, made_with
 from truearm.studio.pages.choices import NONE, offer

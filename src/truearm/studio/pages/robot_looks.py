@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any, Final
 
-from truearm.errors import InputError
-from truearm.files import exists
-from truearm.library import urdf_source
-from truearm.modeling.robot import Robot
-from truearm.notices import Notice
-from truearm.printable import shortened
+from truearm.engine.base.errors import InputError, Notice, shortened
+from truearm.engine.base.files import exists
+from truearm.engine.robot.library import urdf_source
+from truearm.engine.robot.robot import Robot
 from truearm.studio import words
 from truearm.studio.solids import Mesh
 from truearm.studio.urdf_meshes import Looks, urdf_meshes

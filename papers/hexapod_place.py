@@ -1,0 +1,56 @@
+"""Where the base fixture stands in the studies of the hexapod device: invented, for no document prints it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from papers.campaign import touching
+from truearm.engine.data.hexapod import DEVICE, triangle
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+
+_DOWN: Final = np.diag([1.0, -1.0, -1.0])
+
+
+def fixture_at(centre: tuple[float, float, float], turn: float, tilt: float = 0.0, towards: float = 0.0) -> Transform:
+    """Return the fixture whose triangle has its centre at a point.
+
+    Args:
+        centre: In the robot's base frame [m].
+        turn: About its own normal [deg].
+        tilt, towards: How far the normal leans from the vertical, and in which direction [deg].
+    """
+    lean = _turned_about_z(towards) @ _turned_about_y(tilt) @ _turned_about_z(turn - towards)
+    middle = triangle([DEVICE.base] * 3, "B").mean(axis=0)
+    return Transform.from_matrix(lean, np.array(centre) - lean @ middle)
+
+
+def placed(outer: Transform, inner: Transform) -> Transform:
+    """Return a frame that is given in another one, where that one stands."""
+    R = outer.rotation
+    return Transform.from_matrix(R @ inner.rotation, R @ np.array(inner.translation) + np.array(outer.translation))
+
+
+def touched(robot: Robot, fixture: Transform) -> Array:
+    """Return joint positions that bring the robot's first cup to the base cups, the flange looking at the fixture."""
+    down = fixture.rotation @ _DOWN
+    return touching(robot, robot.targets[0].name, fixture, DEVICE.base, down)
+
+
+def _turned_about_z(angle: float) -> Array:
+    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _turned_about_y(angle: float) -> Array:
+    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+#: At this place an IRB 120 reaches 22 poses with its elbow up, 17 of them with two wrist configurations: the counts of
+#: Nubiola, 3.5.
+PLACE: Final = fixture_at((0.30, 0.05, 0.25), 4.0, 51.0, -43.0)

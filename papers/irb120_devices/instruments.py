@@ -1,0 +1,155 @@
+"""Every instrument of the list calibrating the same IRB 120, and a tool calibrated alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from papers.irb120 import ELASTIC
+from papers.irb120_devices.twin import Truth
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.observations import OBSERVATIONS
+from truearm.engine.fit.fit import Fit, identify, place
+from truearm.engine.fit.models import FRAMES
+from truearm.engine.fit.problem import Problem, find_redundancies, gauge_freedoms
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import rigid_motion
+from truearm.engine.twin.devices import named_device
+from truearm.engine.twin.devices.device import Device, measured_with
+from truearm.engine.twin.twin import Twin
+
+#: What no instrument sees: base against joint 1, tool against joint 6, slides along parallel axes, sag of joint 1.
+_CONVENTIONS = frozenset(
+    {"alpha_1", "a_1", "d_1", "theta_offset_1", "theta_offset_6", "d_6", "d_2", "d_3", "compliance_1"}
+)
+#: What a target on axis 6 alone does not separate either.
+_ON_AXIS_6 = frozenset({"alpha_6", "a_6", "compliance_6"})
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """What an instrument makes of the robot."""
+
+    device: Device  #: The instrument.
+    configurations: int  #: How many it measured.
+    #: Whether it says where the robot stands. Where it does not, errors are those left by the best rigid motion.
+    anchored: bool
+    #: before, after: position errors of its own targets at unseen configurations [m], of the nominal robot in the
+    #: frames that the same readings give it, and of the identified one.
+    before: Array
+    after: Array
+    sized: Array  #: Of the identified robot, a change of size taken out as well.
+    gauges: tuple[str, ...]  #: What nobody measured: ``base``, ``size``.
+    #: What its readings leave open of the arm itself, beside what no instrument sees, as combinations.
+    unobservable: tuple[str, ...]
+    numbers: int  #: How many numbers it read.
+
+
+def accuracy(
+    device: Device, nominal: Robot, twin: Twin, truth: Truth, count: int, rng: np.random.Generator
+) -> Accuracy:
+    """Calibrate a twin with an instrument and judge the robot at configurations that it has not seen.
+
+    Args:
+        nominal: With the payload of the twin.
+        count: Number of configurations.
+    """
+    data = measured_with(device, nominal, twin, count, rng)
+    fit = identify(nominal, data, ELASTIC)
+    points = _targets(device, twin)
+    truly = np.concatenate([truth.places(points[name]) for name in data.targets])
+    before = _predicted(place(nominal, data), data, truth)
+    after = _predicted(fit.robot, data, truth)
+    if not data.anchored:
+        before, after = _moved(before, truly), _moved(after, truly)
+    return Accuracy(
+        device,
+        count,
+        data.anchored,
+        _lengths(before - truly),
+        _lengths(after - truly),
+        _lengths(_resized(after, truly) - truly),
+        gauge_freedoms(data),
+        _unobservable(fit, data),
+        sum(int(np.isfinite(v).sum()) for v in (data.position, data.distance, data.height) if v is not None)
+        + 3 * int(data.has_orientation.sum()),
+    )
+
+
+@dataclass(frozen=True)
+class ToolErrors:
+    """How far off a tool centre point is that was found by touching one point, by the number of touches [m]."""
+
+    #: nominal, calibrated, true: found on the nominal robot, on one that a tracker calibrated, and on the true one.
+    nominal: Mapping[int, float]
+    calibrated: Mapping[int, float]
+    true: Mapping[int, float]
+
+
+def tool_alone(
+    nominal: Robot, twin: Twin, truth: Truth, touches: tuple[int, ...], rng: np.random.Generator
+) -> ToolErrors:
+    """Return how far off a tool centre point is that was found by touching one point.
+
+    The right answer for a robot that errs is the tool centre point with which it errs least: the mean of where the true
+    tip is, seen from the flange that the robot believes in.
+    """
+    with_tracker = measured_with(named_device("tracker"), nominal, twin, max(touches), rng)
+    point = named_device("point")
+    data = measured_with(point, nominal, twin, max(touches), rng)
+    tip = _targets(point, twin)["tip"]
+    compliance = {f"compliance_{number}": joint.compliance for number, joint in twin.joints.items()}
+
+    def errors(robot: Robot) -> dict[int, float]:
+        origin, rotation = robot.world_poses(truth.joints)
+        right = np.einsum("nji,nj->ni", rotation, truth.places(tip) - origin).mean(axis=0)
+        found = {
+            count: _points(identify(robot, data.of_configurations(range(count)), FRAMES).robot)["tip"]
+            for count in touches
+        }
+        return {count: float(np.linalg.norm(place - right)) for count, place in found.items()}
+
+    return ToolErrors(
+        nominal=errors(place(nominal, with_tracker)),
+        calibrated=errors(identify(nominal, with_tracker, ELASTIC).robot),
+        true=errors(twin.robot.with_effects(("compliance",)).with_values(compliance)),
+    )
+
+
+def _targets(device: Device, twin: Twin) -> dict[str, tuple[float, ...]]:
+    return _points(twin.robot) if device.tool is None else dict(device.tool.targets)
+
+
+def _points(robot: Robot) -> dict[str, tuple[float, ...]]:
+    return {t.name: tuple(robot.values[t.parameter(axis)] for axis in "xyz") for t in robot.targets}
+
+
+def _predicted(robot: Robot, data: Dataset, truth: Truth) -> Array:
+    return np.concatenate([robot.world_poses(truth.joints, name)[0] for name in data.targets])
+
+
+def _lengths(errors: Array) -> Array:
+    return np.asarray(np.linalg.norm(errors, axis=1))
+
+
+def _moved(points: Array, places: Array) -> Array:
+    R, p = rigid_motion(points, places)
+    return np.asarray(points @ R.T + p)
+
+
+def _resized(points: Array, places: Array) -> Array:
+    """Return points moved, turned and scaled to be nearest to their places."""
+    moved = _moved(points, places)
+    centre, x = places.mean(axis=0), moved - moved.mean(axis=0)
+    return np.asarray(centre + x * float(np.sum(x * (places - centre)) / np.sum(x * x)))
+
+
+def _unobservable(fit: Fit, data: Dataset) -> tuple[str, ...]:
+    found = np.array([fit.robot.values[name] for name in fit.free.names])
+    # The deviations are declared; the others are never asked for.
+    noise = {observation.name: 1.0 for observation in OBSERVATIONS}
+    held = find_redundancies(Problem(fit.robot, data, fit.free, noise, priors=False), found)
+    return tuple(r.combination for r in held if r.dropped not in _CONVENTIONS | _ON_AXIS_6)

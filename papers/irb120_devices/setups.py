@@ -1,0 +1,240 @@
+"""The three set-ups of chapter 2: tracker, optical CMM with a plate, optical CMM with a spatial artefact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from papers.irb120 import ELASTIC, without_beta
+from papers.irb120_devices.twin import Truth, driven, running_out
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.design import O1, most_informative, most_informative_number
+from truearm.engine.fit.fit import identify
+from truearm.engine.fit.models import Model
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.devices.device import TRACKER, Tracker, positions, shown
+from truearm.engine.twin.devices.jogging import postures_at, site
+from truearm.engine.twin.devices.touching import PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
+from truearm.engine.twin.truths import STATION, truth_twin
+from truearm.engine.twin.twin import Twin
+from truearm.planning.accuracy import sensitivity
+
+Point = tuple[float, float, float]
+
+_TRIANGULAR: Final = load_robot("irb120").tools["triangular"]
+#: Nests of the spatial artefact, invented: about 150 mm out of the flange plane, 45 mm off axis 6 (section 2.2.2) [m].
+_SPATIAL: Final = {"1": (0.045, 0.0, 0.15), "2": (-0.0225, 0.039, 0.15), "3": (-0.0225, -0.039, 0.15)}
+#: Of a coordinate about a well identified model, for the choice of configurations [m].
+_ABOUT: Final = 1e-4
+_RADIUS: Final = 0.3  # of the ballbar's sphere [m], section 2.6.3
+_ROUNDS: Final = 6
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What the document did with one instrument."""
+
+    name: str  #: In our words.
+    device: Tracker | Artefact  #: The instrument.
+    truth: str  #: Which of the robot file's truths it came to.
+    #: payload, nests: what hung on the flange, and where positions were judged, in the flange frame [m].
+    payload: Payload
+    nests: dict[str, Point]
+    configurations: int  #: How many it calibrated with (sections 2.5.3 to 2.5.5).
+    before: str  #: before, after: mean position error that it prints [mm], section 2.6.2.
+    after: str
+
+
+SETUPS: Final = (
+    Setup(
+        "tracker",
+        TRACKER,
+        "tracker-triangular",
+        Payload(_TRIANGULAR.mass, _TRIANGULAR.cog),
+        dict(_TRIANGULAR.targets),
+        38,
+        "3.168",
+        "0.146",
+    ),
+    Setup(
+        "planar artefact",
+        PLANAR_ARTEFACT,
+        "ctrack-triangular",
+        Payload(_TRIANGULAR.mass, _TRIANGULAR.cog),
+        dict(_TRIANGULAR.targets),
+        36,
+        "4.639",
+        "0.176",
+    ),
+    Setup(
+        "spatial artefact",
+        SPATIAL_ARTEFACT,
+        "ctrack-spatial",
+        Payload(2.6, (-0.023, 0.0, 0.1)),
+        _SPATIAL,
+        35,
+        "2.913",
+        "0.149",
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A robot that was calibrated in a set-up."""
+
+    setup: Setup  #: The set-up.
+    robot: Robot  #: As identified; its targets are those of the instrument.
+    joints: Array  #: At which it was measured, ``(n, joints)``.
+
+    def places(self, joints: Array, nest: str) -> Array:
+        """Return where it says a nest is in the world [m], ``(n, 3)``."""
+        return _nest(self.robot, self.setup, joints, nest)
+
+    def errors(self, truth: Truth) -> Array:
+        """Return the position errors of all nests [m], ``(3 n,)``."""
+        return _errors(self.robot, self.setup, truth)
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What an instrument sees [percent]."""
+
+    seen: float  #: Of all configurations.
+    several: float | None  #: Two reflectors or more, of those that are seen; None for an instrument without reflectors.
+    back: float | None  #: The side of a plate that is seen less often, of those that are seen; None without a plate.
+
+
+def twin_of(setup: Setup, truth: str, *, least: bool = False) -> Twin:
+    """Return the twin with one of the robot file's truths and gears that run out, carrying what the set-up does."""
+    twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)), least=least)
+    robot = twin.robot.with_frames(twin.robot.base, setup.nests).with_payload(setup.payload)
+    return replace(twin, robot=robot)
+
+
+def uncalibrated(setup: Setup, truth: Truth) -> Array:
+    """Return the errors of the nominal robot where it nominally stands [m], ``(3 n,)``."""
+    return _errors(driven().with_frames(STATION, setup.nests), setup, truth)
+
+
+def visible_configurations(setup: Setup, count: int, rng: np.random.Generator) -> tuple[Array, NDArray[np.bool_]]:
+    """Return configurations that the instrument sees ``(count, joints)``, and which targets ``(count, targets)``."""
+    return shown(_seen_by(setup), count, rng, setup.device.visible, setup.device.name)
+
+
+def shares(setup: Setup, count: int, rng: np.random.Generator) -> Shares:
+    """Return of how many of random configurations something is seen, and what."""
+    robot = _seen_by(setup)
+    joints = robot.random_configurations(count, rng)
+    seen = setup.device.visible(robot, joints)
+    several, back = None, None
+    if isinstance(setup.device, Tracker):
+        several = 100.0 * float((seen.sum(axis=1) > 1).sum() / seen.any(axis=1).sum())
+    elif setup.device is PLANAR_ARTEFACT:
+        joints = joints[seen[:, 0]]
+        place, rotation = robot.world_poses(joints, robot.targets[0].name)
+        share = float((np.einsum("ni,ni->n", rotation[:, :, 1], place) < 0.0).mean())
+        back = 100.0 * min(share, 1.0 - share)
+    return Shares(100.0 * float(seen.any(axis=1).mean()), several, back)
+
+
+def calibrate(
+    setup: Setup, twin: Twin, candidates: int, rng: np.random.Generator, model: Model = ELASTIC, *, chosen: bool = True
+) -> Calibrated:
+    """Measure a twin at configurations that O1 chooses and identify the document's model.
+
+    Parameters
+    ----------
+    candidates
+        How many visible configurations there are to choose from.
+    chosen
+        Whether they are chosen by O1; by chance if not.
+    """
+    joints, seen = visible_configurations(setup, candidates, rng)
+    rows, known = _rows(setup, joints, seen)
+    kept = most_informative(rows, setup.configurations, known, O1()) if chosen else list(range(setup.configurations))
+    data = _read(setup, twin, joints[kept], seen[kept], rng)
+    robot = without_beta(driven()).with_payload(setup.payload)
+    return Calibrated(setup, identify(robot, data, model).robot, joints[kept])
+
+
+def number_by_o1(setup: Setup, candidates: int, rng: np.random.Generator, *, tool_known: bool) -> int:
+    """Return how many configurations make O1 largest.
+
+    Args:
+        tool_known: Whether the nests were measured on the tool beforehand, as in the document, or are found with the
+            robot.
+    """
+    joints, seen = visible_configurations(setup, candidates, rng)
+    return len(most_informative_number(*_rows(setup, joints, seen, tool_known=tool_known)))
+
+
+def sphere_test(robot: Calibrated, twin: Twin, nest: str, points: int, rng: np.random.Generator) -> Array:
+    """Return by how much a ballbar misses its length on a sphere that a calibrated robot is sent to [m], ``(points,)``.
+
+    Nest 1 touches the centre, by hand, and the robot's model says where that is. The ball in a nest is then sent to
+    places on the upper half of a sphere about it, without the way back into range.
+    """
+    setup = robot.setup
+    nominal = driven().with_frames(STATION, setup.nests)
+    middle = site(nominal)
+    _, taught = postures_at(nominal, "1", middle[None], 1, rng, "ballbar")
+    centre = robot.places(taught, "1")[0]
+    up = rng.standard_normal((3 * points, 3))
+    up *= np.sign(up @ nominal.base.rotation[:, 2])[:, None]
+    goals = middle + _RADIUS * up / np.linalg.norm(up, axis=1, keepdims=True)
+    kept, joints = postures_at(nominal, nest, goals, points, rng, "ballbar")
+    wanted = goals[kept] - middle + centre
+    for _ in range(_ROUNDS):
+        inverse = np.linalg.pinv(nominal.joint_jacobian(joints, nest)[:, :3])
+        joints = joints + (inverse @ (wanted - robot.places(joints, nest))[..., None])[..., 0]
+    there = Truth.of(twin, np.concatenate([taught, joints]))
+    bar = there.places(setup.nests[nest])[1:] - there.places(setup.nests["1"])[0]
+    return np.asarray(np.linalg.norm(bar, axis=1) - _RADIUS)
+
+
+def _seen_by(setup: Setup) -> Robot:
+    tool = setup.device.tool
+    return driven().with_frames(STATION, setup.nests if tool is None else tool.targets)
+
+
+def _rows(setup: Setup, joints: Array, seen: NDArray[np.bool_], *, tool_known: bool = False) -> tuple[Array, Array]:
+    """Return the rows of the nests that are seen at each configuration, and what is known beforehand."""
+    robot = ELASTIC.prepared(without_beta(driven()).with_payload(setup.payload).with_frames(STATION, setup.nests))
+    rows = sensitivity(robot, Postures(joints), ELASTIC.free(robot), _ABOUT)
+    counted = np.repeat(np.broadcast_to(seen, (len(joints), len(setup.nests))), 3, axis=1)
+    rows = replace(rows, rows=rows.rows * counted[..., None])
+    free = rows.free.parameters
+    among = [k for k in rows.identifiable(setup.configurations) if not (tool_known and free[k].group == "target")]
+    return np.ascontiguousarray(rows.rows[..., among]), rows.known[np.ix_(among, among)]
+
+
+def _read(setup: Setup, twin: Twin, joints: Array, seen: NDArray[np.bool_], rng: np.random.Generator) -> Dataset:
+    device, robot = setup.device, _seen_by(setup)
+    if isinstance(device, Tracker):
+        return positions(robot, twin, joints, seen, device.sigma, rng, setup.name)
+    loaded = replace(twin, robot=twin.robot.with_frames(twin.robot.base, device.tool.targets if device.tool else {}))
+    return device.read(robot, loaded, joints, device.sigma, rng)
+
+
+def _nest(robot: Robot, setup: Setup, joints: Array, nest: str) -> Array:
+    if nest in {target.name for target in robot.targets}:
+        return robot.world_poses(joints, nest)[0]
+    # The artefact's own frame is read; where the nests are in it was measured beforehand.
+    artefact = robot.targets[0].name
+    place, rotation = robot.world_poses(joints, artefact)
+    tool = setup.device.tool
+    origin = np.array(tool.targets[artefact] if tool else (0.0, 0.0, 0.0))
+    return np.asarray(place + rotation @ (np.array(setup.nests[nest]) - origin))
+
+
+def _errors(robot: Robot, setup: Setup, truth: Truth) -> Array:
+    apart = [_nest(robot, setup, truth.joints, nest) - truth.places(setup.nests[nest]) for nest in setup.nests]
+    return np.asarray(np.linalg.norm(np.concatenate(apart), axis=1))

@@ -1,0 +1,1 @@
+"""Axis-by-axis calibration from circles: `truearm axes`."""

@@ -1,0 +1,1 @@
+"""Recordings of ROS cells: `truearm import ros`."""

@@ -1,0 +1,1 @@
+"""A ChArUco board in pictures, or its poses in a camera: `truearm import hand-eye`."""

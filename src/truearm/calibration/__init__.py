@@ -1,0 +1,1 @@
+"""The robot identified, judged and written: `truearm calibrate`."""

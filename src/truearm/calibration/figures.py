@@ -1,0 +1,578 @@
+"""Zones of the workspace: their held-out errors with one model and with their own, as a picture and as rows."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.calibration.parts import mdeg, name_of
+from truearm.calibration.zones import ZoneChoice
+from truearm.engine.base.errors import counted, listed
+from truearm.engine.base.units import SHOWN_AS, from_si
+from truearm.engine.choosing.cross_validation import FOLDS
+from truearm.engine.choosing.selection import Selection
+from truearm.engine.choosing.zones import Box, shown_box
+from truearm.engine.diagnose.curves import FoundCurve
+from truearm.engine.diagnose.error_budget import ErrorBudget, Share, shown_shares
+from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
+from truearm.engine.document.drawing import (
+    AFTER,
+    BEFORE,
+    Figure,
+    axis,
+    decimals_of,
+    figure,
+    rounded,
+    rounded_to,
+    significant,
+)
+from truearm.engine.document.summaries import LAYOUT
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects.joint_curve import JointCurve
+from truearm.engine.robot.parameters import PLACES
+from truearm.engine.robot.robot import Robot
+
+# What limits the accuracy, as a picture in which squares add up, and as rows of a table.
+
+_NEGATIVE = "#b3261e"
+#: Height of a bar with its gap, and of what stands around them.
+_BAR = 34
+_AROUND = 96
+
+
+@dataclass(frozen=True)
+class BudgetRow:
+    """One source of error as it is printed: its name, root [mm], part of the square, uncertainty and words."""
+
+    source: str
+    rms: str
+    part: str
+    square: str
+    words: str
+
+
+def budget_rows(budget: ErrorBudget) -> tuple[BudgetRow, ...]:
+    """Return a row for each source, and one for what they add up to."""
+    rows = [
+        BudgetRow(
+            name_of(share),
+            "–" if share.rms is None else _signed(share.rms * 1e3),
+            "–" if share.square is None else _percent(share.square, budget.square),
+            "–" if share.square is None else _squares(share.square, share.deviation),
+            share.words,
+        )
+        for share in budget.shares
+    ]
+    what = "all held-out readings together" if budget.held_out else "all together"
+    words = "the uncertainty is that by the scatter of the configurations"
+    return (
+        *rows,
+        BudgetRow(what, significant(budget.rms * 1e3), "100 %", _squares(budget.square, budget.deviation), words),
+    )
+
+
+def budget_figure(budget: ErrorBudget) -> Figure:
+    """Show squares from the first source to the last, each beginning where the one before ends, and their sum."""
+    shares = shown_shares(budget.shares)
+    return _stairs(shares, budget.square, "held out, together" if budget.held_out else "to expect, together")
+
+
+def workspace_budget_figure(shares: Sequence[Share]) -> Figure:
+    """Show likewise what the mean square to expect over the workspace is made of."""
+    total = sum(share.square or 0.0 for share in shares)
+    return _stairs(list(shares), total, "over the workspace, together")
+
+
+def _stairs(shares: Sequence[Share], total: float, together: str) -> Figure:
+    squares = np.array([share.square or 0.0 for share in shares]) * 1e6
+    ends = np.cumsum(squares)
+    begins = np.concatenate([ends - squares, [0.0]])
+    lengths = np.concatenate([squares, [total * 1e6]])
+    names = [*map(name_of, shares), together]
+    roots = [_signed(float(np.sign(s) * np.sqrt(abs(s)))) for s in lengths]
+    parts = [_percent(s, total * 1e6) for s in lengths.tolist()]
+    trace = {
+        "type": "bar",
+        "orientation": "h",
+        "y": names,
+        "x": rounded(lengths, 5),
+        "base": rounded(begins, 5),
+        "text": [f"{root} mm ({part})" for root, part in zip(roots, parts, strict=True)],
+        "textposition": "outside",
+        "cliponaxis": False,
+        "marker": {"color": [*(AFTER if s >= 0.0 else _NEGATIVE for s in squares), BEFORE], "line": {"width": 0}},
+        "hovertemplate": "%{y}: %{text}<extra></extra>",
+        "showlegend": False,
+    }
+    edges = np.concatenate([begins, begins + lengths])
+    low, high = min(float(edges.min()), 0.0), float(edges.max())
+    room = 0.22 * max(high - low, 1e-12)
+    return figure(
+        [trace],
+        _AROUND + _BAR * len(names),
+        xaxis=axis("mean square [mm²]")
+        | {"exponentformat": "none", "range": [low - (room if low < 0.0 else 0.0), high + room]},
+        yaxis={**axis(""), "autorange": "reversed", "showgrid": False, "ticks": ""},
+        bargap=0.3,
+        margin={"l": 60, "r": 20, "t": 12, "b": 50},
+    )
+
+
+def _percent(square: float, total: float) -> str:
+    text = f"{100.0 * square / total:.0f}" if total > 0.0 else "–"
+    return f"{'0' if text == '-0' else text.replace('-', '−')} %"
+
+
+def _signed(value: float) -> str:
+    return f"−{significant(-value)}" if value < 0.0 else significant(value)
+
+
+def _squares(square: float, deviation: float) -> str:
+    sign = "−" if square < 0.0 else ""
+    return f"{sign}{abs(square) * 1e6:.2g} ± {deviation * 1e6:.1g}" if deviation else f"{sign}{abs(square) * 1e6:.2g}"
+
+
+# The curves of the joints, one picture a joint: millidegrees over the range of the joint, with their band of 95 %.
+
+_BAND: Final = "#c3d5e3"
+_UNMEASURED: Final = "#e4e6e8"
+_PLACES: Final = "#646b72"
+_INK: Final = "#2b2f33"
+#: Width of an interval of 95 % to either side in standard deviations.
+_NORMAL_95: Final = 1.959964
+#: Beyond so many times the size of the measured part the picture ends, however wide the band.
+_ROOM: Final = 4.0
+
+
+@dataclass(frozen=True)
+class CurveRow:
+    """One joint's curve as it is printed."""
+
+    joint: str
+    rms: str
+    band: str
+    strongest: str
+    measured: str
+
+
+def curve_name(curve: FoundCurve) -> str:
+    """Return the name of the place of its picture."""
+    return f"joint-curve-{curve.number}"
+
+
+def curve_rows(curves: Sequence[FoundCurve]) -> tuple[CurveRow, ...]:
+    """Return a row for each curve; its band is the median one where it was measured."""
+    rows = []
+    for curve in curves:
+        groups = [f"{one.range} ({significant(mdeg(one.amplitude), 2, 1)} mdeg)" for one in curve.strongest]
+        ranges = [f"{low:.0f} to {high:.0f}" for low, high in np.degrees(curve.measured).reshape(-1, 2).tolist()]
+        inside = _measured(curve)
+        half = _NORMAL_95 * np.median(curve.at(curve.angles[inside])[1]) if inside.any() else np.nan
+        rows.append(
+            CurveRow(
+                f"{curve.number}, {curve.name}",
+                significant(mdeg(curve.rms), 2, 1),
+                significant(mdeg(float(half)), 2, 1),
+                ", ".join(groups),
+                ", ".join(ranges) or "nowhere",
+            )
+        )
+    return tuple(rows)
+
+
+def curve_figure(curve: FoundCurve) -> Figure:
+    """Show what a joint turns beyond its position, over its range; where nothing was measured the ground is grey."""
+    value, deviation = (mdeg(1.0) * part for part in curve.at(curve.angles))
+    low, high = value - _NORMAL_95 * deviation, value + _NORMAL_95 * deviation
+    degrees = np.degrees(curve.angles)
+    x = rounded_to(degrees, 2)
+    inside = _measured(curve)
+    here = slice(None) if not inside.any() else inside
+    ends = float(np.min(low[here])), float(np.max(high[here]))
+    middle, half = sum(ends) / 2.0, max((ends[1] - ends[0]) / 2.0, 1e-3)
+    bottom = max(float(low.min()), middle - _ROOM * half) - 0.16 * half
+    top = min(float(high.max()), middle + _ROOM * half) + 0.08 * half
+    spot: Figure = {"type": "scatter", "x": x, "hoverinfo": "skip", "showlegend": False}
+    traces: list[Figure] = [
+        spot | {"mode": "lines", "y": rounded_to(low, 3), "line": {"width": 0, "color": _BAND}},
+        spot
+        | {
+            "mode": "lines",
+            "name": "95 % band",
+            "y": rounded_to(high, 3),
+            "line": {"width": 0, "color": _BAND},
+            "fill": "tonexty",
+            "fillcolor": _BAND,
+            "showlegend": True,
+        },
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "name": "curve",
+            "x": x,
+            "y": rounded_to(value, 3),
+            "customdata": rounded_to(_NORMAL_95 * deviation, 2),
+            "line": {"color": AFTER, "width": 1.5},
+            "hovertemplate": "%{x:.1f} deg: %{y:.2f} mdeg, good to %{customdata:.2f} mdeg<extra></extra>",
+        },
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": "training configurations",
+            "x": rounded_to(np.degrees(curve.places), 2),
+            "y": [bottom + 0.05 * (top - bottom)] * len(curve.places),
+            "marker": {"symbol": "line-ns", "size": 7, "color": _PLACES, "line": {"color": _PLACES, "width": 1}},
+            "hovertemplate": "measured at %{x:.1f} deg<extra></extra>",
+        },
+    ]
+    ground = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "layer": "below", "line": {"width": 0}}
+    start, end = (round(float(v), 2) for v in (degrees[0], degrees[-1]))
+    return figure(
+        traces,
+        250,
+        xaxis={**axis(f"joint {curve.number} [deg]"), "range": [start, end]},
+        yaxis={**axis("curve [mdeg]"), "range": [bottom, top]},
+        legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom", "traceorder": "normal"},
+        shapes=[
+            ground | {"x0": round(a, 2), "x1": round(b, 2), "fillcolor": _UNMEASURED}
+            for a, b in _gaps(np.degrees(curve.measured).reshape(-1, 2), start, end)
+        ],
+    )
+
+
+def _measured(curve: FoundCurve) -> Array:
+    """Return at which of its angles a curve was measured."""
+    inside = np.zeros(len(curve.angles), dtype=bool)
+    for low, high in curve.measured:
+        inside |= (curve.angles >= low) & (curve.angles <= high)
+    return inside
+
+
+def _gaps(measured: Array, start: float, end: float) -> list[tuple[float, float]]:
+    """Return what lies between the measured ranges."""
+    edges = [start, *measured.reshape(-1).tolist(), end]
+    return [(a, b) for a, b in zip(edges[0::2], edges[1::2], strict=True) if b - a > 1e-6]
+
+
+# Intervals by Monte Carlo beside the linear ones: how often these hold, as a picture, and both as rows of a table.
+
+#: What the intervals are made to hold.
+_CLAIMED = 0.95
+
+
+@dataclass(frozen=True)
+class IntervalRow:
+    """One parameter: its intervals of 95 % and its deviations, by Monte Carlo and by the covariance, as printed."""
+
+    name: str
+    unit: str
+    linear: str
+    simulated: str
+    linear_deviation: str
+    deviation: str
+    coverage: str
+
+
+def interval_rows(found: SimulatedCalibrations, robot: Robot) -> tuple[IntervalRow, ...]:
+    """Return a row for each parameter that was free, in the order of the fit, but for terms of joint curves."""
+    rows = []
+    for i, name in enumerate(found.names):
+        if robot.parameters[name].group == JointCurve.name:
+            continue
+        unit = SHOWN_AS[robot.parameters[name].unit]
+        linear, deviation = (from_si(float(d[i]), unit) for d in (found.linear_deviation, found.deviation))
+        places = decimals_of(deviation, 6)
+        of_linear, of_trials = (
+            " to ".join(f"{from_si(end, unit):.{places}f}" for end in interval[i].tolist())
+            for interval in (found.linear_interval_95, found.interval_95)
+        )
+        rows.append(
+            IntervalRow(
+                name,
+                unit,
+                of_linear,
+                of_trials,
+                significant(linear, 2, 6),
+                significant(deviation, 2, 6),
+                f"{100.0 * float(found.coverage[i]):.1f} %",
+            )
+        )
+    return tuple(rows)
+
+
+def coverage_figure(found: SimulatedCalibrations, robot: Robot) -> Figure:
+    """Show the share of trials in which the linear interval of each of the arm's parameters held the truth.
+
+    Between the dotted lines lie 95 of 100 shares of so many trials, if the intervals hold 95 % of the truths.
+    """
+    beside = (*PLACES, JointCurve.name)
+    own = [i for i, name in enumerate(found.names) if robot.parameters[name].group not in beside]
+    own = own or list(range(len(found.names)))
+    shares = 100.0 * found.coverage[own]
+    ratio = found.deviation[own] / np.where(found.linear_deviation[own] > 0.0, found.linear_deviation[own], np.nan)
+    band = 196.0 * math.sqrt(_CLAIMED * (1.0 - _CLAIMED) / max(found.settled, 1))
+    trace = {
+        "type": "scatter",
+        "mode": "markers",
+        "x": [html.escape(found.names[i]) for i in own],
+        "y": rounded(shares, 4),
+        "customdata": ["–" if np.isnan(r) else f"{r:.2f}" for r in ratio.tolist()],
+        "marker": {"color": AFTER, "size": 7},
+        "hovertemplate": "%{x}: held in %{y} % of the trials, deviation %{customdata} times the linear one"
+        "<extra></extra>",
+        "showlegend": False,
+    }
+    line = {"type": "line", "x0": 0, "x1": 1, "xref": "paper"}
+    shapes = [
+        line | {"y0": y, "y1": y, "line": {"color": BEFORE, "width": 1.5, "dash": dash}}
+        for y, dash in ((100.0 * _CLAIMED, "solid"), (100.0 * _CLAIMED - band, "dot"), (100.0 * _CLAIMED + band, "dot"))
+    ]
+    low = min(float(shares.min()), 100.0 * _CLAIMED - band) - 1.0
+    high = min(max(float(shares.max()), 100.0 * _CLAIMED + band) + 1.0, 101.0)
+    return figure(
+        [trace],
+        340,
+        xaxis={**axis(""), "tickangle": -60, "type": "category"},
+        yaxis={**axis("held the truth [%]"), "range": [low, high]},
+        shapes=shapes,
+    )
+
+
+# How a model was chosen: what every joint effect gains, as a picture and as rows.
+
+#: Gains are drawn in proportion up to this at least [mm].
+_SMALLEST: Final = 1e-4
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """One joint effect as it is printed."""
+
+    effect: str
+    gain: str
+    error: str
+    verdict: str
+    taken: bool
+
+
+@dataclass(frozen=True)
+class ConfirmationRow:
+    """One comparison of fits in the folds as it is printed."""
+
+    model: str
+    error: str
+    smaller: str
+    smaller_error: str
+    gain: str
+    standard_error: str
+
+
+def choice_sentence(selection: Selection) -> str:
+    """Return how the choice was made, in words."""
+    held_out = (
+        f"{counted(selection.blocks, 'block')} of neighbours, because the configurations {LAYOUT[selection.layout]}"
+        if selection.blocks
+        else "configurations drawn one by one"
+    )
+    elastic = "" if selection.elastic is None else f", that of the elastic model {selection.elastic * 1e3:.4f} mm"
+    return (
+        f"By {FOLDS}-fold cross-validation on the training configurations alone, holding out {held_out}. The mean "
+        f"error of the geometric model there is {selection.geometric * 1e3:.4f} mm{elastic}, that of the chosen model "
+        f"{selection.error * 1e3:.4f} mm. Errors of every choice follow in closed form from one fit; of those that are "
+        "not worse than the best one by a standard error, the one with the fewest parameters was taken. Gains are "
+        "those over the chosen model without the effect, or what it would gain with it. A fold trains on four fifths "
+        "of the configurations, and what is chosen looked best in these folds; the error of held-out readings may be "
+        "smaller or larger than the one here: believe the held-out one."
+    )
+
+
+def candidate_rows(selection: Selection) -> tuple[CandidateRow, ...]:
+    """Return a row for every joint effect that could be chosen."""
+    return tuple(
+        CandidateRow(
+            one.effect,
+            "–" if one.gain is None else f"{one.gain.mean * 1e3:+.4f}",
+            "–" if one.gain is None else f"{one.gain.error * 1e3:.4f}",
+            "taken" if one.taken else f"left out: {one.reason}",
+            one.taken,
+        )
+        for one in selection.candidates
+    )
+
+
+def confirmation_rows(selection: Selection) -> tuple[ConfirmationRow, ...]:
+    """Return a row for every model that was fitted in the folds."""
+    return tuple(
+        ConfirmationRow(
+            listed(one.effects) or "geometric",
+            f"{one.error * 1e3:.4f}",
+            listed(one.smaller) or "geometric",
+            f"{one.smaller_error * 1e3:.4f}",
+            f"{one.gain.mean * 1e3:+.4f}",
+            f"{one.gain.error * 1e3:.4f}",
+        )
+        for one in selection.confirmations
+    )
+
+
+def candidates_figure(selection: Selection) -> Figure:
+    """Show what every joint effect that was tried gains, with its standard error.
+
+    The axis is linear near no gain and logarithmic beyond, so that what little effects gain is seen beside a large one.
+    """
+    tried = [one for one in reversed(selection.candidates) if one.gain is not None]
+    errors = [1e3 * one.gain.error for one in tried if one.gain is not None and one.gain.error > 0.0]
+    linear = max(float(np.median(errors)) if errors else 0.0, _SMALLEST)
+    ends: list[float] = [linear]
+    traces = []
+    for taken, name, colour in ((True, "taken", AFTER), (False, "left out", BEFORE)):
+        mine = [one for one in tried if one.taken is taken]
+        gains = np.array([1e3 * one.gain.mean for one in mine if one.gain is not None])
+        error = np.array([1e3 * one.gain.error for one in mine if one.gain is not None])
+        place = _bent(gains, linear)
+        above, below = _bent(gains + error, linear), _bent(gains - error, linear)
+        ends += [*(gains + error).tolist(), *(gains - error).tolist()]
+        traces.append(
+            {
+                "type": "bar",
+                "orientation": "h",
+                "name": name,
+                "y": [html.escape(one.effect) for one in mine],
+                "x": rounded(place, 4),
+                "customdata": rounded(gains, 4),
+                "error_x": {
+                    "type": "data",
+                    "symmetric": False,
+                    "array": rounded(above - place, 4),
+                    "arrayminus": rounded(place - below, 4),
+                },
+                "marker": {"color": colour, "line": {"width": 0}},
+                "hovertemplate": "%{y}: gains %{customdata} mm<extra></extra>",
+            }
+        )
+    low, high = min(min(ends), -linear), max(max(ends), linear)
+    left, right = _bent(np.array([low, high]), linear).tolist()
+    room = 0.2 * (right - left)
+    marks = [0.0, *(sign * 10.0**power for power in range(-5, 3) for sign in (-1.0, 1.0))]
+    marks = sorted(mark for mark in marks if low <= mark <= high and (mark == 0.0 or abs(mark) >= 0.5 * linear))
+    labels = [
+        {
+            "x": 1.0,
+            "xref": "paper",
+            "y": html.escape(one.effect),
+            "text": f"{one.gain.mean * 1e3:+.4f} ± {one.gain.error * 1e3:.4f}",
+            "xanchor": "right",
+            "showarrow": False,
+            "font": {"size": 11},
+        }
+        for one in tried
+        if one.gain is not None
+    ]
+    return figure(
+        traces,
+        120 + 26 * len(tried),
+        xaxis={
+            **axis("gain of the mean held-out error [mm], logarithmic beyond its usual standard error"),
+            "range": [left - 0.02 * (right - left), right + room],
+            "tickvals": rounded(_bent(np.array(marks), linear), 4),
+            "ticktext": [f"{mark:g}" for mark in marks],
+        },
+        yaxis={**axis(""), "type": "category", "categoryorder": "array", "categoryarray": [o.effect for o in tried]},
+        margin={"l": 160, "r": 16, "t": 16, "b": 48},
+        annotations=labels,
+    )
+
+
+def _bent(gain: Array, linear: float) -> Array:
+    """Return where gains [mm] are drawn: in proportion up to about `linear`, by their logarithm beyond."""
+    return np.asarray(np.sign(gain) * np.log10(1.0 + np.abs(gain) / linear))
+
+
+@dataclass(frozen=True)
+class ZoneRow:
+    """One zone as it is printed."""
+
+    name: str
+    box: str
+    training: int
+    held_out: int
+    whole: str
+    zone: str
+    error: str
+    verdict: str
+    kept: bool
+
+
+def zone_rows(choice: ZoneChoice) -> tuple[ZoneRow, ...]:
+    """Return a row for each zone that was tried."""
+    return tuple(
+        ZoneRow(
+            verdict.box.name,
+            box_words(verdict.box),
+            verdict.training,
+            verdict.held_out,
+            _mm(verdict.whole),
+            _mm(verdict.zone),
+            _mm(verdict.error),
+            f"{'kept' if verdict.kept else 'not kept'}: {verdict.why}",
+            verdict.kept,
+        )
+        for verdict in choice.verdicts
+    )
+
+
+def _mm(value: float | None) -> str:
+    return "–" if value is None else significant(value * 1e3)
+
+
+def box_words(box: Box) -> str:
+    """Return the limits of a box in words."""
+    words = []
+    for letter, ends in shown_box(box).items():
+        low, high = (None if end is None else round(end) for end in ends)
+        if low is None:
+            words.append(f"{letter} below {high}")
+        elif high is None:
+            words.append(f"{letter} from {low}")
+        else:
+            words.append(f"{letter} {low} to {high}")
+    return ", ".join(words)
+
+
+def zones_figure(choice: ZoneChoice) -> Figure:
+    """Show the mean held-out error of each zone with one model and with its own; what is not kept is faint."""
+    judged = [verdict for verdict in choice.verdicts if verdict.whole is not None and verdict.zone is not None]
+    names = [html.escape(f"{verdict.box.name}{'' if verdict.kept else ' (not kept)'}") for verdict in judged]
+    error = rounded(np.array([(verdict.error or 0.0) * 1e3 for verdict in judged]), 3)
+    traces = [
+        {
+            "type": "bar",
+            "name": name,
+            "x": names,
+            "y": rounded(np.array([(value or 0.0) * 1e3 for value in values]), 4),
+            "marker": {"color": colour, "line": {"width": 0}, "opacity": [1.0 if v.kept else 0.45 for v in judged]},
+            "hovertemplate": f"%{{x}}: %{{y}} mm, {name}<extra></extra>",
+            **bars,
+        }
+        for name, values, colour, bars in (
+            ("one model for the whole", [v.whole for v in judged], BEFORE, {}),
+            (
+                "a model of its own, with the standard error of the difference",
+                [v.zone for v in judged],
+                AFTER,
+                {"error_y": {"type": "data", "array": error, "thickness": 1.2, "width": 4}},
+            ),
+        )
+    ]
+    return figure(
+        traces,
+        340,
+        xaxis={**axis("zone"), "type": "category"},
+        yaxis=axis("mean held-out error [mm]") | {"rangemode": "tozero"},
+        barmode="group",
+    )

@@ -1,0 +1,210 @@
+"""The command ``truearm``: one file a command, each of them thin."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from copy import copy
+from typing import Annotated, NoReturn, TextIO
+
+import typer
+from typer.main import get_command_name
+from typer.models import CommandInfo
+
+from truearm.axis_circles.command import axes
+from truearm.bags.command import ros
+from truearm.board.command import hand_eye
+from truearm.calibration.command import calibrate
+from truearm.checking.command import check
+from truearm.compensation.command import compensate, path
+from truearm.drawn_circle.command import circle
+from truearm.engine.base.errors import InputError, is_one_line, printable
+from truearm.engine.base.version import __version__
+from truearm.engine.command.options import CommandError, Commands, by_device
+from truearm.fleets.command import fleet
+from truearm.hexapod.command import app as hexapod
+from truearm.importing.command import guess, matrices, robodk, sockets, table
+from truearm.inclinometers.command import plan_pairs, simulate_readings, tilting
+from truearm.iso9283.command import app as iso9283
+from truearm.measuring.command import measure
+from truearm.planning.command import plan, poses
+from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
+from truearm.simulation.command import devices, influence, simulate
+from truearm.starting.command import demo, example, new_robot, study, study_help
+from truearm.studio.command_studio import studio
+from truearm.validation.command import distances, lines, sphere, tolerance, validate
+
+# A calibration's matrices are small: a second BLAS thread gains nothing on a quiet machine and waits for its turn on
+# a busy one. NumPy reads this when it is first imported, which is after here.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+app = Commands(
+    name="truearm",
+    help="Make a serial robot accurate: identify the real robot from measurements and prove how good it is.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"truearm {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and stop.")
+    ] = False,
+) -> None:
+    pass
+
+
+importing = Commands(
+    help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
+    no_args_is_help=True,
+)
+importing.command()(matrices)
+importing.command()(table)
+importing.command()(guess)
+importing.command()(robodk)
+importing.command()(circle)
+importing.command()(sockets)
+importing.command("hand-eye")(hand_eye)
+importing.command("ur-kinematics")(ur_kinematics)
+importing.command()(ros)
+
+app.command()(check)
+app.command()(calibrate)
+app.command()(tilting)
+app.command()(validate)
+app.command()(distances)
+app.command()(compensate)
+app.command()(ik)
+app.command()(by_device(plan, {"inclinometers": plan_pairs}))
+app.command()(measure)
+app.command()(poses)
+app.command()(path)
+app.command()(axes)
+app.command()(tolerance)
+app.command()(lines)
+app.command()(influence)
+app.command()(sphere)
+app.command()(by_device(simulate, {"inclinometers": simulate_readings}))
+app.command()(devices)
+app.add_typer(importing, name="import")
+app.add_typer(hexapod, name="hexapod")
+app.add_typer(iso9283, name="iso9283")
+app.command()(robots)
+app.command()(show)
+app.command()(convert)
+app.command()(export)
+app.command()(export_robodk)
+app.command("new-robot")(new_robot)
+app.command(help=study_help())(study)
+app.command()(fleet)
+app.command()(example)
+app.command()(demo)
+app.command()(studio)
+
+
+def main() -> None:
+    """Run the command; what cannot be used ends with one message and exit code 2."""
+    try:
+        _refuse_unprintable(sys.argv[1:])
+        try:
+            _asked_for(sys.argv[1:])(prog_name="truearm")
+        finally:
+            sys.stdout.flush()
+    except (InputError, CommandError) as error:
+        _end(f"{error}")
+    except BrokenPipeError:
+        _end_of_pipe()
+    except SystemExit as stop:
+        if isinstance(stop.__context__, BrokenPipeError):  # Typer has its own exit code for it
+            _end_of_pipe()
+        _say_of_stop(stop)
+        raise
+    except OSError as error:
+        _drop(sys.stdout)
+        _end(f"{error.filename or 'output'}: {error.strerror or error}.")
+    except UnicodeError as error:
+        _end(f"a text cannot be written ({error}).")
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except MemoryError:
+        _end("there is not enough memory for this. Take less data at a time, or a larger computer.")
+    except RecursionError:
+        _end("something in the input is nested too deep. Look for very many brackets in its files.")
+    except ValueError as error:
+        from numpy.linalg import LinAlgError
+
+        if not isinstance(error, LinAlgError):
+            raise
+        _end(f"the equations cannot be solved ({error}). Look at the data with 'truearm check'.")
+
+
+def _asked_for(words: Sequence[str]) -> typer.Typer:
+    """Return the command with the one part that is asked for: to make all of them takes longer than many run."""
+    part = copy(app)
+    for name in words[:1]:
+        part.registered_commands = [c for c in app.registered_commands if (c.name or _spelled(c)) == name]
+        part.registered_groups = [g for g in app.registered_groups if g.name == name]
+    return part if part.registered_commands or part.registered_groups else app
+
+
+def _spelled(command: CommandInfo) -> str:
+    return get_command_name(command.callback.__name__ if command.callback else "")
+
+
+def _refuse_unprintable(words: Sequence[str]) -> None:
+    """Refuse what could not be written into results, before any long work, nor shown in messages."""
+    for word in filter(None, words):
+        if not is_one_line(word.replace(" ", "x")):
+            halved = any("\ud800" <= character <= "\udfff" for character in word)
+            raise InputError(
+                "this is not UTF-8 text" if halved else "this holds a control character",
+                where="command line",
+                came=word,
+                allowed="text that can be shown and written",
+                cure="Rename the file, or correct the word.",
+            )
+
+
+def _say_of_stop(stop: SystemExit) -> None:
+    """Print what a job says where it was stopped by Ctrl-C, of which Typer keeps the exit code alone."""
+    cause: BaseException | None = stop
+    while cause is not None and not isinstance(cause, KeyboardInterrupt):
+        cause = cause.__context__
+    if cause is not None and cause.args:
+        _print_error(f"{cause}")
+
+
+def _end(message: str) -> NoReturn:
+    _print_error(f"truearm: {message}")
+    sys.exit(2)
+
+
+def _print_error(message: str) -> None:
+    try:
+        print(printable(message), file=sys.stderr, flush=True)  # noqa: T201
+    except OSError:  # a pipe that nobody reads, a full disk: the exit code is all that is left
+        _drop(sys.stderr)
+
+
+def _end_of_pipe() -> NoReturn:
+    """End as a program does whose reader has seen enough: quietly, with the exit code that shells have for it."""
+    _drop(sys.stdout)
+    _drop(sys.stderr)
+    sys.exit(141)
+
+
+def _drop(stream: TextIO) -> None:
+    """Let go of output that could not be written: Python would try, and fail, once more when it ends."""
+    with suppress(OSError, ValueError):  # where it is no file, or closed
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -1,0 +1,454 @@
+"""A path followed by a robot: its joint motion, corrected, and as programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from truearm.compensation.corrected_path import (
+    KNOWLEDGE,
+    STAGES,
+    TIP,
+    CorrectedPath,
+    Knowledge,
+    TargetKind,
+    correct_path,
+    path_program,
+)
+from truearm.compensation.limit import (
+    CorrectionLimit,
+    check_size,
+    controller_notices,
+    controller_question,
+    correction_limit,
+    ledger_of,
+    ledger_to_write,
+    refuse_proprietary_controller,
+)
+from truearm.engine.base.arrays import finite_number
+from truearm.engine.base.errors import InputError, Notice, counted, listed, millimetres, refusals_of
+from truearm.engine.base.files import path_argument
+from truearm.engine.base.writing import output_folder, write_files
+from truearm.engine.command.arguments import (
+    array_argument,
+    choice_argument,
+    choices_argument,
+    command_argument,
+    files_of,
+    folder_beside,
+    gravity_argument,
+    joints_argument,
+    name_argument,
+    payload_argument,
+    pushed_argument,
+    python_call,
+    robot_argument,
+    wrench_argument,
+)
+from truearm.engine.command.split import accept_argument, changed_since, refuse_unaccepted, told_of
+from truearm.engine.diagnose.external_force import check_force
+from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.motion.path_file import read_path
+from truearm.engine.programs import BY_NAME
+from truearm.engine.programs.chosen_targets import refuse_unanswered
+from truearm.engine.programs.corrected_targets import LedgerEntry, corrected_digests, remember
+from truearm.engine.programs.gauge import turns_between
+from truearm.engine.programs.new_program import NewProgram
+from truearm.engine.programs.program import Language, Source
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.controller import JointsOf
+from truearm.engine.robot.controller_kinematics import with_controller_kinematics
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.entries import STATED
+from truearm.engine.robot.transform import homogeneous
+from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
+from truearm.engine.robot.wrench import Wrench, WrenchFrame
+
+# A path followed: joint positions over time, corrected ones, and programs.
+
+#: Files that are always written.
+MOTION: Final = "motion.csv"
+REPORT: Final = "report.html"
+#: Written for a calibrated robot, and for one with masses.
+CORRECTED: Final = "corrected.csv"
+LOADS: Final = "loads.csv"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FollowedPath(Record):
+    """The joint motion along a path, and what corrects it."""
+
+    robot: Robot  #: The robot, with what it carries.
+    path: CorrectedPath  #: The path, its joint motions and the errors that the calibrated robot predicts along it.
+    programs: Mapping[str, str]  #: Texts of programs by the names of their files.
+    command: str  #: How to run it again.
+    warnings: tuple[Notice, ...] = ()  #: What to know about it.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    #: Whose joint positions the files hold: the ``model``'s, or those that the ``controller`` shows.
+    joints_are: JointsOf = "model"
+    #: Where the targets of corrected programs are remembered, and what; None for nowhere.
+    ledger: tuple[Path, tuple[LedgerEntry, ...]] | None = None
+
+    @property
+    def joints(self) -> Array:
+        """Joint positions to command, of the model, ``(n, joints)`` [rad or m]."""
+        return self.path.joints[self.path.best]
+
+    @property
+    def stages(self) -> tuple[Knowledge, ...]:
+        """What the corrections that were made know, from nothing to most."""
+        return tuple(name for name in KNOWLEDGE if name in self.path.joints)
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it: lengths in mm, times in s."""
+        path = self.path
+        trajectory = path.planned.trajectory
+        return {
+            "samples": len(trajectory.time),
+            "seconds": float(trajectory.time[-1]),
+            "length_mm": float(trajectory.distance[-1]) * 1e3,
+            "sections": list(path.planned.kinds),
+            "frame": path.planned.frame,
+            "calibrated": path.calibrated,
+            "error_mm": {
+                name: {"mean": float(path.errors[name].mean()) * 1e3, "max": float(path.errors[name].max()) * 1e3}
+                for name in self.stages
+                if path.calibrated
+            },
+            "joints_are": self.joints_are,
+            "programs": list(self.programs),
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    @property
+    def answer(self) -> tuple[str, str]:
+        """What the path is, and what can be said of its correction."""
+        path = self.path
+        trajectory = path.planned.trajectory
+        first = (
+            f"{counted(len(path.planned.kinds), 'section')} ({', '.join(path.planned.kinds)}), "
+            f"{trajectory.distance[-1] * 1e3:.1f} mm in {trajectory.time[-1]:.2f} s, "
+            f"{counted(len(trajectory.time), 'sample')}."
+        )
+        if not path.calibrated:
+            return first, "The robot is not calibrated: there is nothing to correct."
+        return first, (
+            "What is left after the last correction is what the model says of itself: the real robot misses the path "
+            "by the model's error."
+        )
+
+    def lines(self) -> list[str]:
+        """Return how long the path is, and how far the robot is from it before and after correction."""
+        first, last = self.answer
+        text = [first]
+        if self.path.calibrated:
+            text.append("Off the path, as the calibrated robot predicts it in motion:")
+            wide = max(len(STAGES[name]) for name in self.stages)
+            for name in self.stages:
+                error = self.path.errors[name] * 1e3
+                text.append(f"  {STAGES[name]:<{wide}}  mean {error.mean():.3f}  max {error.max():.3f} mm")
+        return [*text, last, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
+
+    def motion_csv(self) -> str:
+        """Return what the controller would command: time, section, joint positions, and where the tip shall be."""
+        return self._csv(self.path.motion.joints, self.path.planned.trajectory.position, ())
+
+    def corrected_csv(self) -> str:
+        """Return the corrected joint positions, where the tip shall be, and the predicted error before and after."""
+        path = self.path
+        errors = (("error_before [mm]", path.errors["nothing"]), ("error_after [mm]", path.errors[path.best]))
+        return self._csv(self.joints, path.planned.trajectory.position, errors)
+
+    def loads_csv(self) -> str:
+        """Return force and moment of the load at every joint along the path, in the joint's own axes."""
+        loads = self.path.loads
+        assert loads is not None
+        names = [
+            f"{kind}_{axis}_{joint} [{unit}]"
+            for joint in range(1, len(loads) + 1)
+            for kind, unit in (("force", "N"), ("moment", "N m"))
+            for axis in "xyz"
+        ]
+        rows = loads.transpose(2, 0, 1).reshape(loads.shape[2], -1)
+        return _table(
+            ["time [s]", *names],
+            [[repr(t), *(f"{v:.6g}" for v in row)] for t, row in zip(self._times(), rows.tolist(), strict=True)],
+        )
+
+    def contents(self) -> dict[str, str]:
+        """Return the texts of all files by their names."""
+        from truearm.compensation.path_page import path_page
+
+        files = {MOTION: self.motion_csv()}
+        if self.path.calibrated:
+            files[CORRECTED] = self.corrected_csv()
+        if self.path.loads is not None:
+            files[LOADS] = self.loads_csv()
+        return files | dict(self.programs) | {REPORT: path_page(self)}
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write all files into a folder; return them."""
+        contents = self.contents()
+        out = output_folder(folder, contents, self.inputs, "folder")
+        if self.ledger is not None:
+            remember(*self.ledger)
+        write_files(out, contents, self.command)
+        return tuple(out / name for name in contents)
+
+    def _times(self) -> list[float]:
+        return [round(t, 9) for t in self.path.motion.time.tolist()]
+
+    def _csv(self, joints: Array, tip: Array, errors: tuple[tuple[str, Array], ...]) -> str:
+        controller = counting(self.robot, self.joints_are)
+        heading = ["time [s]", "section", *joint_headings(self.robot.joints, controller)]
+        heading += [f"tip_{axis} [mm]" for axis in "xyz"] + [name for name, _ in errors]
+        cells = joint_cells(joints, self.robot.joints, controller)
+        millimetres = np.round(tip * 1e3, 6) + 0.0
+        rows = []
+        for row, time in enumerate(self._times()):
+            cell = [repr(time), str(int(self.path.planned.section[row])), *cells[row]]
+            rows.append([*cell, *map(repr, millimetres[row].tolist()), *(f"{v[row] * 1e3:.6f}" for _, v in errors)])
+        return _table(heading, rows)
+
+
+def _table(heading: list[str], rows: list[list[str]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(heading)
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+#: Every language at once.
+ALL = "all"
+#: A program that leaves the path by no more than this between its targets is said nothing of [m].
+_FAR = 0.02e-3
+
+
+def path(
+    robot: Robot | str | Path,
+    file: str | Path,
+    *,
+    seed: Array | Sequence[float] | None = None,
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+    wrench: Wrench | Sequence[float] | str | None = None,
+    wrench_frame: WrenchFrame | None = None,
+    programs: Sequence[str] = (),
+    targets: str = "joints",
+    spacing: float = 0.02,
+    name: str = "truearm_path",
+    controller_kinematics: str | Path | None = None,
+    accept: Sequence[str] = (),
+    accept_correction: str | None = None,
+    joints: JointsOf | None = None,
+    out: str | Path | None = None,
+    command: str | None = None,
+) -> FollowedPath:
+    """Follow a path of lines, circles and waypoints, and correct it for the calibrated robot.
+
+    Parameters
+    ----------
+    robot
+        A calibrated robot, or what :func:`truearm.load_robot` takes. One that is nominal follows the path, and there is
+        nothing to correct.
+    file
+        The path, see :mod:`truearm.engine.motion.path_file`.
+    seed
+        Joint positions of the model ``(joints,)`` [rad; m for prismatic joints] near which the motion shall begin; zero
+        if None.
+    payload, gravity
+        What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
+        [m/s^2]; None for what its file says.
+    wrench, wrench_frame
+        External force and moment on the tip, the same all along the path, and whose axes it is given in, as for
+        :func:`truearm.inverse`.
+    programs
+        Languages in which to write the corrected path: ``rapid``, ``krl``, ``fanuc-ls``, ``urscript``, ``inform``,
+        ``val3``, or ``all``.
+    targets
+        ``joints`` if the targets of the programs are joint positions, ``poses`` for straight moves to poses.
+    spacing
+        Time from one target to the next [s], or a little less; that of the file's samples at the least.
+    name
+        Of the programs.
+    controller_kinematics
+        With what the controller turns poses into joint positions, as :func:`truearm.compensate` takes it.
+    accept
+        What may speak against the robot's calibration, by name, as :func:`truearm.compensate` takes it; asked for where
+        programs are written.
+    accept_correction
+        How far a program may move and turn the tip from the path, such as ``95mm,3deg``, as for
+        :func:`truearm.compensate`.
+    joints
+        Whose joint positions the CSV files hold: the ``model``'s, or as the ``controller`` shows them; None for the
+        controller's where the robot file says that they differ.
+    out
+        Folder for the joint motion, the corrected one, the loads, the programs and report.html; None writes nothing.
+    command
+        How to run it again, for the page; None writes the call in Python.
+
+    Raises
+    ------
+    InputError
+        If the file is malformed, or the robot cannot follow the path: with the place on it. If the correction of a
+        program is larger than the robot's errors explain.
+    """
+    read = path_argument(file, "file")
+    known = [*BY_NAME, ALL]
+    languages = choices_argument(programs, "programs", known, "language")
+    if ALL in languages:
+        languages = tuple(BY_NAME)
+    kinds: dict[str, TargetKind] = {"joints": "joints", "poses": "poses"}
+    kind = choice_argument(targets, "targets", kinds)
+    called = name_argument(name, "name")
+    time = finite_number(spacing, "spacing", allowed="a time in s")
+    if not time > 0.0:
+        raise InputError("targets are some time apart", parameter="spacing", came=f"{time:g} s", allowed="above 0 s")
+    kinematics = (
+        () if controller_kinematics is None or str(controller_kinematics) in STATED else (controller_kinematics,)
+    )
+    written = (MOTION, CORRECTED, LOADS, REPORT)
+    folder = None if out is None else folder_beside(written, MOTION, out, robot, file, *kinematics)
+    pushed = wrench_argument(wrench, wrench_frame)
+    carried, fall = payload_argument(payload), gravity_argument(gravity)
+    allowed = None if accept_correction is None else CorrectionLimit.of(accept_correction, "accept_correction")
+    calibrated = robot_argument(robot)
+    if controller_kinematics is not None:
+        with refusals_of("controller_kinematics"):
+            said = str(path_argument(controller_kinematics, "controller_kinematics"))
+            calibrated = with_controller_kinematics(calibrated, said, Path())
+    arm = pushed_argument(calibrated.with_payload(carried, fall), pushed)
+    accepted = accept_argument(accept, arm)
+    call = command_argument(command) or python_call(
+        "path",
+        robot,
+        file,
+        seed=None if seed is None else np.asarray(seed).tolist(),
+        payload=carried,
+        gravity=fall,
+        wrench=None if pushed is None else pushed.text,
+        wrench_frame=wrench_frame,
+        programs=list(languages) or None,
+        targets=kind,
+        spacing=time,
+        name=called,
+        controller_kinematics=controller_kinematics,
+        accept=list(accepted) or None,
+        accept_correction=accept_correction,
+        joints=joints,
+    )
+    if languages:
+        refuse_unaccepted(arm, accepted)
+    joints_are = joints_argument(joints, arm)
+    near = None
+    if seed is not None:
+        near = array_argument(seed, "seed", (len(arm.joints),), f"{len(arm.joints)} numbers, one for each joint")
+    with refusals_of("file"):
+        followed = correct_path(arm, read_path(read), near)
+    chosen = [BY_NAME[one] for one in languages]
+    notices = [*changed_since(robot), *told_of(arm), *check_force([(arm, followed.joints[followed.best])])]
+    texts: dict[str, str] = {}
+    if chosen:
+        if followed.calibrated:
+            notices += _check_size(followed, correction_limit(calibrated), allowed)
+        with refusals_of("name" if kind == "joints" else "targets"):
+            content = path_program(followed, arm, called, targets=kind, spacing=time)
+            texts = _programs(arm, content, chosen, notices)
+    ledger = None
+    if chosen and followed.calibrated:
+        ledger, unremembered = ledger_to_write(ledger_of(robot))
+        notices += unremembered
+    made = FollowedPath(
+        arm,
+        followed,
+        texts,
+        call,
+        tuple(dict.fromkeys(notices)),
+        files_of(robot, file, *kinematics),
+        joints_are,
+        None if ledger is None else (ledger, _entries(arm, chosen, texts)),
+    )
+    if folder is not None:
+        made.save(folder)
+    return made
+
+
+def _check_size(followed: CorrectedPath, limit: CorrectionLimit, accepted: CorrectionLimit | None) -> list[Notice]:
+    """Refuse a correction that errors of the robot do not explain, or say that it was accepted."""
+    before, after = (
+        homogeneous(rotation, position)
+        for position, rotation in (
+            followed.nominal.forward(followed.joints[name], target=TIP) for name in ("nothing", followed.best)
+        )
+    )
+    turned = np.linalg.norm(turns_between(before, after), axis=1)
+    trajectory = followed.planned.trajectory
+    return check_size(
+        np.linalg.norm(after[:, :3, 3] - before[:, :3, 3], axis=1),
+        turned if followed.planned.orientation == "full" else np.zeros_like(turned),
+        limit,
+        accepted,
+        where=lambda row: f"{followed.planned.source}, {trajectory.distance[row] * 1e3:.1f} mm along the path",
+        check="Check the payload, the force, and that the calibration is of this robot.",
+        parameter="file",
+    )
+
+
+def _entries(arm: Robot, languages: Sequence[Language], texts: Mapping[str, str]) -> tuple[LedgerEntry, ...]:
+    """Return what is remembered of corrected programs."""
+    sources = [Source(Path(file), text) for file, text in texts.items()]
+    day = date.today().isoformat()
+    return tuple(
+        LedgerEntry(program=str(path), date=day, robot=arm.name, targets=corrected_digests((), targets))
+        for language in languages
+        for program in language.programs([one for one in sources if one.path.suffix.lower() in language.suffixes])
+        for path, targets in program.by_file().items()
+    )
+
+
+def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], notices: list[Notice]) -> dict[str, str]:
+    """Return the files of a program in every language, and add what is to be said of them."""
+    texts: dict[str, str] = {}
+    for language in languages:
+        assert language.new is not None
+        files = language.new(content)
+        theirs = not arm.maker or language.runs_on(arm.maker)
+        if content.corrected and theirs:
+            as_read = [language.read([Source(Path(file), text) for file, text in files.items()])]
+            refuse_proprietary_controller(arm, as_read)
+            refuse_unanswered([controller_question(arm, as_read)])
+            notices += controller_notices(arm, as_read)
+        texts |= files
+    foreign = [one for one in languages if arm.maker and not one.runs_on(arm.maker)]
+    if foreign:
+        written = ", ".join(f"{one.name} of {one.makers[0]}" for one in foreign)
+        notices.append(Notice("maker", f"{arm.name} is of {arm.maker}, and programs were written in {written}."))
+    if content.beside > _FAR:
+        notices.append(
+            Notice(
+                "between-targets",
+                f"Between its targets the program leaves the path by up to {millimetres(content.beside)} mm. Take a "
+                "smaller `spacing`.",
+            )
+        )
+    untimed = [one.name for one in languages if content.untimed(one.name)]
+    if untimed:
+        notices.append(
+            Notice(
+                "untimed-moves",
+                f"{listed(untimed)} cannot say how long a joint motion takes: the robot goes as fast as it is set to, "
+                "and what motion adds to the loads is another than was corrected. Write `targets=poses`, or run the "
+                "program slowly.",
+                "note",
+            )
+        )
+    return texts

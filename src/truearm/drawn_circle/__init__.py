@@ -1,0 +1,1 @@
+"""Circles on scanned pages: `truearm import circle`."""

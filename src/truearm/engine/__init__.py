@@ -1,0 +1,1 @@
+"""What several features share. Nothing here knows a feature."""

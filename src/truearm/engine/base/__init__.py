@@ -1,0 +1,1 @@
+"""Refusals, units, limits; files as they are read, written and replaced; parts of great work."""

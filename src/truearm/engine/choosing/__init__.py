@@ -1,0 +1,1 @@
+"""Which joint effects the data support, and models for zones."""

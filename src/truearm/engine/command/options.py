@@ -1,0 +1,359 @@
+"""Options about a cube and what goes to the poses in it."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import wraps
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
+
+import typer
+from typer.core import TyperArgument, TyperCommand
+
+from truearm.engine.base.errors import InputError, printable, with_parameters, with_short_words
+
+if TYPE_CHECKING:
+    from truearm.engine.base.errors import Notice
+    from truearm.engine.document.records import Record
+
+
+# How the command names what jobs call by their parameters.
+
+JointsAreText = Annotated[
+    str | None,
+    typer.Option(
+        "--joints-are",
+        metavar="controller|model",
+        help="Whose joint positions they are: as the robot's controller shows them, or its model's.",
+        show_default="the model's",
+    ),
+]
+
+
+C = TypeVar("C", bound=Callable[..., Any])
+
+#: The command that runs.
+_running: ContextVar[typer.Context | None] = ContextVar("_running", default=None)
+
+#: Parameters that say where results go or how they are printed: running again elsewhere is the same run.
+_OUTPUT = ("out", "replace", "json", "token")
+
+
+class CommandError(Exception):
+    """What a command ends with: a message that names its options."""
+
+
+class Command(TyperCommand):
+    """A command whose refusals name its options, where those of jobs name their parameters.
+
+    The parameters of a command's function are called like those of its job.
+    """
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the arguments as their metavar has them: [ROBOT] may be left out."""
+        named = [str(p.metavar) for p in self.params if isinstance(p, TyperArgument) and p.metavar]
+        return ["[OPTIONS]", *named]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return what is left of the words; a value that is no number is told as jobs tell it."""
+        if "--out=" in args or ("--out", "") in pairwise(args):  # a variable of the shell that is not set
+            raise CommandError("--out: no file or folder is given; got ''.")
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            faults = getattr(error.__cause__, "errors", None)  # of pydantic, by which Typer checks values
+            if faults is None or error.param is None:
+                raise
+            from truearm.engine.base.schemas import refused_value
+
+            option = error.param.metavar if isinstance(error.param, TyperArgument) else max(error.param.opts, key=len)
+            raise CommandError(str(refused_value(faults()[0], str(option)))) from error
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; a refusal of the job is told in the words of the command line."""
+        mark = _running.set(ctx)
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            raise CommandError(spelled(error.message(_option))) from error
+        finally:
+            _running.reset(mark)
+
+
+class Commands(typer.Typer):
+    """A group of commands that are all a :class:`Command`."""
+
+    def command(self, name: str | None = None, **how: Any) -> Callable[[C], C]:
+        """Add a command."""
+        return super().command(name, cls=Command, **how)
+
+
+def spelled(text: str) -> str:
+    """Return a text of the library with options of the running command instead of parameters in backticks."""
+
+    def one(name: str, value: str | None) -> str:
+        if value is None:
+            return _option(name)
+        return _flag(f"{name}_{value}") or f"{_option(name)} {value}"
+
+    return with_parameters(text, one)
+
+
+def command_line() -> str:
+    """Return the running command as it can be typed again: what was given, and a place for where results go."""
+    context = _running.get()
+    if context is None:
+        return ""
+    words, end = context.command_path.split(), list[str]()
+    for parameter in context.command.params:
+        name, value = parameter.name or "", context.params.get(parameter.name or "")
+        if isinstance(parameter, TyperArgument):
+            words += map(str, value if isinstance(value, list | tuple) else [value])
+        elif name in _OUTPUT:
+            end = [max(parameter.opts, key=len), str(parameter.metavar)] if name == "out" else end
+        elif value is True and _given(context, name):
+            words.append(max(parameter.opts, key=len))
+        elif value is not None and value is not False and _given(context, name):
+            for entry in value if isinstance(value, list | tuple) else [value]:
+                words += [max(parameter.opts, key=len), str(entry)]
+    return shlex.join([*words, *end])
+
+
+def _given(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name != "DEFAULT"
+
+
+def _flag(name: str) -> str | None:
+    """Return the option that stands for one value of a parameter, where the running command has one."""
+    context = _running.get()
+    known = {} if context is None else {parameter.name: parameter for parameter in context.command.params}
+    return max(known[name].opts, key=len) if name in known else None
+
+
+def _option(name: str) -> str:
+    """Return how the running command calls a parameter of a job."""
+    context = _running.get()
+    for parameter in context.command.params if context is not None else ():
+        if parameter.name == name and isinstance(parameter, TyperArgument):
+            return str(parameter.metavar or name).strip("[]")
+        if parameter.name == name:
+            return max(parameter.opts, key=len)
+    return f"--{name.replace('_', '-')}"
+
+
+def _named(entries: list[str], parameter: str, what: str = "FILE") -> dict[str, Path]:
+    named: dict[str, Path] = {}
+    for entry in entries:
+        name, separator, file = entry.partition("=")
+        if not separator or not name or not file:
+            raise InputError(
+                f"a name and a {what.lower()} belong here", parameter=parameter, came=entry, allowed=f"NAME={what}"
+            )
+        if name in named:
+            raise InputError("this name is given twice", parameter=parameter, came=name)
+        named[name] = Path(file)
+    return named
+
+
+def by_device(command: C, others: Mapping[str, Callable[..., None]]) -> C:
+    """Return a command that leaves some devices, by their names, to other functions with the same parameters."""
+
+    @wraps(command)
+    def chosen(**given: Any) -> None:
+        others.get(given["device"], command)(**given)
+
+    return cast("C", chosen)
+
+
+# What commands print: results on standard output, progress on standard error.
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")]
+
+
+def print_json(content: Any) -> None:
+    """Print one JSON object."""
+    typer.echo(json.dumps(content, indent=2, allow_nan=False))
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """Show on standard error what is being done, where somebody is looking."""
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda _: None
+        return
+    with console.status("starting") as status:
+        yield lambda words: status.update(Text(with_short_words(printable(words))))
+
+
+def end_on_error(notices: Iterable[Notice]) -> None:
+    """End with exit code 3 if a notice says that the result should not be used as it is."""
+    from truearm.engine.base.errors import has_error
+
+    if has_error(notices):
+        raise typer.Exit(3)
+
+
+def print_record(record: Record) -> None:
+    """Print a result in words and figures."""
+    for line in record.lines():
+        print_line(spelled(line))
+
+
+def print_line(line: str, *, err: bool = False) -> None:
+    """Print one line, whatever names of files and targets are in it."""
+    typer.echo(with_short_words(printable(line)), err=err)
+
+
+# Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), and notes.
+
+PayloadText = Annotated[
+    str | None,
+    typer.Option(
+        "--payload",
+        metavar="MASS,X,Y,Z",
+        help='What the flange carries, with its centre of gravity in the flange frame: "2.7kg,50mm,25mm,100mm".',
+        show_default="as the robot file says",
+    ),
+]
+GravityText = Annotated[
+    str | None,
+    typer.Option(
+        "--gravity",
+        metavar="X,Y,Z",
+        help="Free fall in the robot's base frame \\[m/s^2], 0,0,9.81 for a robot that hangs.",
+        show_default="as the robot file says",
+    ),
+]
+WrenchText = Annotated[
+    str | None,
+    typer.Option(
+        "--wrench",
+        metavar="FX,FY,FZ,MX,MY,MZ",
+        help="What acts on the tool besides weight: a force \\[N] at its point and a moment \\[N m], or with units: "
+        '"0N,0N,80N,0Nm,0Nm,1.5Nm".',
+        show_default="nothing",
+    ),
+]
+WrenchFrameText = Annotated[
+    str | None,
+    typer.Option(
+        "--wrench-frame",
+        metavar="base|tool|world|controller",
+        help="Whose axes --wrench is given in.",
+        show_default="base",
+    ),
+]
+WrenchAtText = Annotated[
+    str | None,
+    typer.Option(
+        "--wrench-at",
+        metavar="NAME",
+        help="The target on which --wrench acts, or flange.",
+        show_default="the only target",
+    ),
+]
+NoteTexts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--note",
+        metavar="KEY=VALUE",
+        help="What the result shall say beside the figures: date, serial, operator, instrument, ...; repeatable.",
+        show_default=False,
+    ),
+]
+
+Pull = Annotated[
+    float | None,
+    typer.Option(
+        metavar="N",
+        min=0.0,
+        help="Of a string or weight on the flange under which inclinometers are read; 0: gravity alone.",
+        show_default="20",
+    ),
+]
+JointsText = Annotated[
+    str | None,
+    typer.Option(
+        "--joints",
+        metavar="controller|model",
+        help="Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
+        show_default="the controller's where the robot file says that they differ",
+    ),
+]
+
+
+def read_notes(texts: list[str] | None) -> dict[str, str] | None:
+    """Return the notes that texts such as ``serial=1234`` hold, None for None."""
+    if not texts:
+        return None
+    notes: dict[str, str] = {}
+    for text in texts:
+        name, given, said = text.partition("=")
+        if not given or name.strip() in notes:
+            what = "a note was given twice" if given else "a note is a name and a text"
+            raise InputError(what, parameter="notes", came=text, allowed="NAME=TEXT, such as serial=1234")
+        notes[name.strip()] = said
+    return notes
+
+
+def read_gravity(text: str | None) -> tuple[float, float, float] | None:
+    """Return the acceleration of free fall that a text names, None for None."""
+    from truearm.engine.base.units import as_number
+
+    if text is None:
+        return None
+    numbers = [as_number(part.strip()) for part in text.split(",")]
+    if len(numbers) != 3 or any(number is None for number in numbers):
+        raise InputError(
+            "three numbers belong here", parameter="gravity", came=text, allowed="0,0,-9.81 for a robot that stands"
+        )
+    x, y, z = (float(number) for number in numbers if number is not None)
+    return x, y, z
+
+
+def number_or(text: str | None) -> Any:
+    """Return a number where the text is one, else the text."""
+    try:
+        return text if text is None else int(text)
+    except ValueError:
+        return text
+
+
+def read_train(text: str | None) -> Any:
+    """Return a number where the text is one; the job refuses what is neither that nor all."""
+    return number_or(text)
+
+
+def refuse_pull(pull: float | None) -> None:
+    """Refuse a pull for devices that are not read under one."""
+    if pull is not None:
+        raise InputError(
+            "only inclinometers are read under a pull",
+            parameter="pull",
+            came=pull,
+            cure="Leave `pull` out, or use `device=inclinometers`.",
+        )
+
+
+Ahead = Annotated[str, typer.Option(metavar="+x|-x|+y|-y", help="Where the largest cube is searched.")]
+Nearest = Annotated[float, typer.Option(metavar="MM", help="How far ahead the largest cube begins.")]
+Floor = Annotated[float, typer.Option(metavar="MM", help="How high the largest cube begins.")]
+TargetName = Annotated[
+    str | None, typer.Option(metavar="NAME", help="What goes to the poses.", show_default="the flange")
+]
+TipText = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y,Z", help="What goes to the poses, in the flange frame \\[mm].", show_default="the flange"
+    ),
+]

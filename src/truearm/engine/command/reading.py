@@ -1,0 +1,199 @@
+"""Readings that were excluded, as results tell of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from truearm.engine.base.errors import Notice, counted, refusals_of
+from truearm.engine.base.files import path_argument
+from truearm.engine.command.arguments import data_argument, readings_argument, robot_argument
+from truearm.engine.data.dataset import Dataset, IntArray
+from truearm.engine.data.excluded import Exclusion, read_exclusions, without_readings
+from truearm.engine.data.statistics import Errors, errors_of, without_table_motion
+from truearm.engine.robot.robot import Robot
+
+Part = Literal["training", "held out", "left out"]
+_OF: Final = {
+    "training": "of the training part",
+    "held out": "of the held-out part",
+    "left out": "of configurations that are left out",
+}
+
+
+@dataclass(frozen=True)
+class Excluded:
+    """An exclusion, and what it means for a result."""
+
+    row: Exclusion  #: Of the file of exclusions.
+    readings: int  #: How many readings it means.
+    part: Part  #: The part of the split that they would belong to; ``left out`` if their whole configuration is.
+
+    def summary(self) -> dict[str, str | int]:
+        """Return it as JSON holds it."""
+        row = self.row
+        return {
+            "configuration": row.configuration,
+            "target": row.target,
+            **({"visit": row.visit} if row.visit else {}),
+            **({"fixture": row.fixture} if row.fixture else {}),
+            "reason": row.reason,
+            "readings": self.readings,
+            "part": self.part,
+        }
+
+
+def excluded_line(excluded: Sequence[Excluded]) -> str:
+    """Return how many readings of each part were excluded, and why."""
+    parts = Counter[str]()
+    for one in excluded:
+        parts[one.part] += one.readings
+    told = ", ".join(f"{count} {_OF[part]}" for part, count in parts.items())
+    return f"Excluded: {counted(parts.total(), 'reading')} ({told}): {reasons(excluded)}"
+
+
+def reasons(excluded: Sequence[Excluded]) -> str:
+    """Return the reasons, each with how many readings have it."""
+    found = Counter[str]()
+    for one in excluded:
+        found[one.row.reason] += one.readings
+    return ", ".join(f"{reason} ({count})" for reason, count in found.items())
+
+
+# Readings that a job is told to exclude, and what is said of it.
+
+_RULE: Final = (
+    "Exclude readings for reasons of the instrument alone: to exclude what fits badly, or to repeat it, falsifies the "
+    "proof."
+)
+
+
+def without_excluded(data: Dataset, exclude: str | Path | None) -> tuple[Dataset, tuple[Excluded, ...]]:
+    """Return data in which the readings that a file excludes are missing, and these, all of them as of training.
+
+    Raises:
+        InputError: If the file cannot be used, or excludes what was not read.
+    """
+    if exclude is None:
+        return data, ()
+    path = path_argument(exclude, "exclude")
+    with refusals_of("exclude"):
+        rows = read_exclusions(path)
+        made, counts = without_readings(data, rows)
+    return made, tuple(Excluded(row, count, "training") for row, count in zip(rows, counts, strict=True))
+
+
+def in_parts(excluded: tuple[Excluded, ...], split: Dataset, held_out: IntArray) -> tuple[Excluded, ...]:
+    """Return excluded readings with the part of a split that they would belong to.
+
+    Args:
+        split: The data that were split.
+    """
+    judging, known = {split.labels[c] for c in held_out.tolist()}, set(split.labels)
+
+    def part(label: str) -> Part:
+        return "held out" if label in judging else "training" if label in known else "left out"
+
+    return tuple(Excluded(one.row, one.readings, part(one.row.configuration)) for one in excluded)
+
+
+def count_excluded(excluded: tuple[Excluded, ...]) -> dict[str, int]:
+    """Return how many readings of each target are excluded, of configurations that are not left out."""
+    found = Counter[str]()
+    for one in excluded:
+        if one.part != "left out":
+            found[one.row.target] += one.readings
+    return dict(found)
+
+
+def excluded_notices(excluded: tuple[Excluded, ...]) -> list[Notice]:
+    """Say how many readings are excluded, before any split."""
+    count = sum(one.readings for one in excluded)
+    if not count:
+        return []
+    return [
+        Notice(
+            "excluded",
+            f"{counted(count, 'reading')} {'is' if count == 1 else 'are'} excluded: {reasons(excluded)}. Excluded "
+            f"readings count as missing. {_RULE}",
+            "note",
+        )
+    ]
+
+
+def check_excluded(
+    excluded: tuple[Excluded, ...], robot: Robot, as_read: Dataset | None, held_out: IntArray, without: Errors | None
+) -> list[Notice]:
+    """Say if readings are excluded by which a fit would be judged, and what the errors are with them.
+
+    Args:
+        robot: The calibrated one.
+        as_read: The data that were split, with the excluded readings; None if they cannot be compared.
+        without: Errors on the held-out part as it judges; None if there is none.
+    """
+    mine = tuple(one for one in excluded if one.part == "held out")
+    count = sum(one.readings for one in mine)
+    if not count:
+        return []
+    told = ""
+    if as_read is not None and without is not None:
+        whole = errors_of(robot, without_table_motion(as_read).of_configurations(held_out))
+        some, every = without.position or without.length, whole.position or whole.length
+        if some is not None and every is not None:
+            it = "it" if count == 1 else "them"
+            told = (
+                f" With {it} the held-out errors are {every.mean * 1e3:.3f} mm on average and {every.max * 1e3:.3f} mm "
+                f"at most; without {it} {some.mean * 1e3:.3f} and {some.max * 1e3:.3f} mm."
+            )
+    return [
+        Notice(
+            "held-out-excluded",
+            f"{counted(count, 'reading')} of the held-out part {'is' if count == 1 else 'are'} excluded: "
+            f"{reasons(mine)}.{told} {_RULE}",
+        )
+    ]
+
+
+# A robot by library id or from a file.
+
+
+def load_robot(robot: Robot | str | Path) -> Robot:
+    """Return a robot.
+
+    Parameters
+    ----------
+    robot
+        The id of a library robot (``irb120``), a robot file (``my.yaml``), or a URDF (``my.urdf``, or
+        ``my.urdf#tool0`` to name the link at the end of the chain). A robot is returned as it is.
+
+    Raises
+    ------
+    InputError
+        If there is no such robot, or its file cannot be used; the message names the entry.
+    """
+    return robot_argument(robot)
+
+
+# Measurements from a canonical CSV file.
+
+
+def load_data(data: Dataset | str | Path, robot: Robot | str | Path | None = None) -> Dataset:
+    """Return the measurements in a canonical CSV file.
+
+    Parameters
+    ----------
+    data
+        The file. A dataset is returned as it is.
+    robot
+        The robot that was measured, or what :func:`truearm.load_robot` takes: joint positions that its controller
+        shows become its model's. None leaves them as they are.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used; the message names the line and the column.
+    """
+    return data_argument(data) if robot is None else readings_argument(robot_argument(robot), data)

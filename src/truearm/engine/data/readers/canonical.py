@@ -1,0 +1,515 @@
+"""Rows of the canonical CSV that have to do with fixtures: what stands beside the robot."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from truearm.engine.base.errors import InputError, nearest_names
+from truearm.engine.base.files import read_text
+from truearm.engine.base.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, YES, checked_unit, written
+from truearm.engine.base.units import COLUMN as SIMULATED
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cells
+from truearm.engine.data.readers.rows import (
+    ROLES,
+    Readings,
+    before_each,
+    check_mark,
+    dataset_of,
+    found_configurations,
+    order_of,
+    order_of_labels,
+    roles_of,
+    same_everywhere,
+    scale_sigma_of,
+    visits_of,
+)
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.urdf_writing import COLUMN, JOINT_COLUMN, joint_names
+
+#: What a row may say of a fixture.
+_OF_SETUP: Final = ("target", "role", "fixture", "x", "y", "z", "distance", "height", "sigma")
+
+
+def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -> None:
+    """Refuse distances and heights from nothing, below what they can be, or beside another length.
+
+    Args:
+        places: The column of each name.
+    """
+    position = np.isfinite(readings.position).any(axis=1)
+    lengths: dict[str, Array] = {}
+    if readings.distance is not None:
+        lengths["distance"] = readings.distance
+    if readings.height is not None:
+        lengths["height"] = readings.height
+    held = [position, *(np.isfinite(values) for values in lengths.values())]
+    for row in np.flatnonzero(np.sum(held, axis=0) > 1).tolist():
+        raise InputError(
+            "the row holds more than one reading",
+            where=f"{readings.source}, line {readings.lines[row]}",
+            came="two or more of a position, a distance and a height",
+            allowed="one of them",
+            cure="Give each a row of its own, with the same configuration.",
+        )
+    for name, values in lengths.items():
+        for row in np.flatnonzero(np.isfinite(values)).tolist():
+            if readings.fixture is None or not readings.fixture[row]:
+                raise InputError(
+                    f"the {name} names no fixture that it is measured from",
+                    where=cells.place(row, places[name]),
+                    allowed="a fixture in the column fixture",
+                    cure="Name what it is measured from, with any name.",
+                )
+            if name == "distance" and values[row] <= 0.0:
+                raise InputError(
+                    "a distance must be above zero",
+                    where=cells.place(row, places[name]),
+                    came=cells.columns[places[name]][row],
+                    allowed="a number above 0",
+                    cure="Of a target held at a point give x, y and z from that point, 0, 0, 0.",
+                )
+    if readings.fixture is not None:
+        for row in np.flatnonzero(readings.reference).tolist():
+            if readings.fixture[row]:
+                raise InputError(
+                    "a reference point is measured in the instrument's frame",
+                    where=cells.place(row, places["fixture"]),
+                    came=readings.fixture[row],
+                    allowed="nothing in the column fixture",
+                )
+
+
+def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Dataset) -> Dataset:
+    """Read what is known of the fixtures: where they stand, how far from each other or how high over one, and how well.
+
+    Args:
+        cells: The rows of the role ``fixture``.
+        columns: Place and unit of each column.
+        data: What is measured against them.
+    """
+    for heading, (place, _) in columns.items():
+        if heading not in _OF_SETUP:
+            for row, cell in enumerate(cells.columns[place]):
+                if cell:
+                    raise InputError(
+                        "this cell does not apply to a fixture, which stands still beside the robot",
+                        where=cells.place(row, place),
+                        came=cell,
+                        allowed=f"cells filled in {', '.join(_OF_SETUP)} alone",
+                        cure="Empty the cell, or give the row the role target.",
+                    )
+
+    def numbers(name: str, *, deviation: bool = False) -> Array:
+        if name not in columns:
+            return np.full(len(cells.lines), np.nan)
+        place, unit = columns[name]
+        return cells.numbers(place, unit, missing=True, deviation=deviation)
+
+    names = cells.texts(columns["target"][0])
+    others = cells.texts(columns["fixture"][0], missing=True) if "fixture" in columns else ("",) * len(names)
+    position = np.column_stack([numbers(axis) for axis in "xyz"])
+    distance, height, sigma = numbers("distance"), numbers("height"), numbers("sigma", deviation=True)
+    for row, (name, other) in enumerate(zip(names, others, strict=True)):
+        where = f"{cells.source}, line {cells.lines[row]}"
+        placed, apart = bool(np.isfinite(position[row]).any()), bool(np.isfinite(distance[row]))
+        over = bool(np.isfinite(height[row]))
+        for one in filter(None, (name, other)):
+            if one not in data.fixtures:
+                near = nearest_names(one, data.fixtures)
+                raise InputError(
+                    "nothing is measured against this fixture",
+                    where=f"{where}, column {'target' if one == name else 'fixture'}",
+                    came=one,
+                    allowed=", ".join(data.fixtures) or "no row names a fixture",
+                    cure=f"Did you mean {' or '.join(near)}?" if near else "Remove the row.",
+                )
+        part_missing = placed and not np.isfinite(position[row]).all()
+        if placed + apart + over != 1 or part_missing or placed == bool(other) or name == other:
+            raise InputError(
+                "the row does not say where the fixture is",
+                where=where,
+                allowed="x, y and z of its place in the instrument's frame, its distance from another fixture, or its"
+                " height over one that is a plane",
+                cure="Fill in x, y, z, or fixture and distance, or fixture and height.",
+            )
+        if distance[row] <= 0.0:
+            raise InputError(
+                "a distance must be above zero",
+                where=cells.place(row, columns["distance"][0]),
+                came=cells.columns[columns["distance"][0]][row],
+                allowed="a number above 0",
+            )
+        if np.isnan(sigma[row]):
+            raise InputError(
+                "the row of a fixture has no standard deviation",
+                where=f"{where}, column sigma",
+                allowed="a standard deviation above 0",
+                cure="Fill in sigma, for example 0.001 mm of a ground scale bar.",
+            )
+    targets = tuple(dict.fromkeys(names))
+    against = np.array([data.fixtures.index(other) if other else -1 for other in others], dtype=np.intp)
+    return Dataset(
+        source=cells.source,
+        labels=("",),
+        joints=np.zeros((1, data.joints.shape[1])),
+        joint_kinds=data.joint_kinds,
+        targets=targets,
+        configuration=np.zeros(len(names), dtype=np.intp),
+        target=np.array([targets.index(name) for name in names], dtype=np.intp),
+        position=position,
+        distance=distance if np.isfinite(distance).any() else None,
+        height=height if np.isfinite(height).any() else None,
+        fixtures=data.fixtures,
+        fixture=against if (against >= 0).any() else None,
+        sigma=sigma,
+    )
+
+
+# The canonical CSV: one row a reading, with its configuration, joints, target and units in the header.
+#
+# Rows of the role ``fixture`` are of no configuration: they say what is known of what stands beside the robot.
+
+_POSITION: Final = ("x", "y", "z")
+_QUATERNION: Final = ("qw", "qx", "qy", "qz")
+_LENGTHS: Final = ("distance", "height")
+_FORCE: Final = ("force_x", "force_y", "force_z")
+_MOMENT: Final = ("moment_x", "moment_y", "moment_z")
+_UNITS: Final[dict[str, tuple[str, ...]]] = (
+    dict.fromkeys((*_POSITION, *_LENGTHS, "sigma"), LENGTH_UNITS)
+    | {"sigma_rot": SMALL_ANGLE_UNITS, "scale_sigma": ("ppm",), "temperature": ("degC",)}
+    | dict.fromkeys(_FORCE, ("N",))
+    | dict.fromkeys(_MOMENT, ("N m",))
+)
+_PLAIN: Final = ("configuration", "order", "target", "role", "fixture", "visit", SIMULATED, *_QUATERNION)
+#: Every column as one writes it, for messages.
+_SHOWN: Final = (
+    {
+        "configuration": "configuration",
+        "joint_1": "joint_1 [deg]",
+        "axis_1": "axis_1 [deg]",
+        "target": "target",
+        "role": "role",
+    }
+    | {"order": "order", "visit": "visit", "fixture": "fixture", "distance": "distance [mm]", "height": "height [mm]"}
+    | {axis: f"{axis} [mm]" for axis in _POSITION}
+    | {part: part for part in _QUATERNION}
+    | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]"}
+    | {"scale_sigma": "scale_sigma [ppm]", "temperature": "temperature [degC]"}
+    | {name: f"{name} [N]" for name in _FORCE}
+    | {name: f"{name} [N m]" for name in _MOMENT}
+    | {SIMULATED: SIMULATED}
+)
+_ALLOWED: Final = ", ".join(_SHOWN.values()).replace("[deg]", "[deg] ..")
+_HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
+#: Highest place in the order that a file holds.
+_LAST_PLACE: Final = 999_999_999
+_SEPARATORS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
+
+
+@dataclass(frozen=True)
+class _Column:
+    place: int
+    unit: str
+
+
+def read_csv(path: Path) -> Dataset:
+    """Read a canonical CSV.
+
+    A row with an empty x, y or z has no position, and one with an empty qw, qx, qy or qz no orientation: it
+    stays, as a missing reading. Quaternions must have length 1 within 1e-3 and are then normalised.
+
+    Returns:
+        Dataset: Configurations in order of first appearance; rows of the role ``reference`` are in ``references``.
+    """
+    text = read_text(path)
+    header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
+    refuse_other_separators(text, f"{path}, line {header}", ", or import it with `truearm import table`")
+    cells = read_cells(text, str(path), Layout(header=header))
+    columns = _columns(cells)
+    if SIMULATED in columns:
+        check_mark(cells, columns[SIMULATED].place)
+    setup = None
+    if "role" in columns and "fixture" in (roles := roles_of(cells, columns["role"].place)):
+        beside = [role == "fixture" for role in roles]
+        setup, cells = cells.some(beside), cells.some([not is_beside for is_beside in beside])
+        if not cells.lines:
+            raise InputError(
+                "all rows are fixtures, there is no target",
+                where=str(path),
+                cure="Give the points on the robot the role `target`.",
+            )
+    joints_are, names = joint_names(columns, f"{path}, line {header}")
+    joints = [columns[name] for name in names]
+    labels = cells.texts(columns["configuration"].place)
+    configurations = found_configurations(
+        cells, labels, [j.place for j in joints], [j.unit for j in joints], joints_are
+    )
+
+    def numbers(*names: str, deviation: bool = False) -> Array:
+        found = [columns[name] for name in names]
+        return np.column_stack(
+            [cells.numbers(column.place, column.unit, missing=True, deviation=deviation) for column in found]
+        )
+
+    role = columns["role"].place if "role" in columns else None
+    readings = Readings(
+        source=str(path),
+        lines=cells.lines,
+        configuration=configurations.of_row,
+        targets=cells.texts(columns["target"].place),
+        reference=np.array(roles_of(cells, role)) == "reference",
+        position=numbers(*_POSITION) if "x" in columns else np.full((len(cells.lines), 3), np.nan),
+        quaternion=numbers(*_QUATERNION) if "qw" in columns else None,
+        sigma=numbers("sigma", deviation=True)[:, 0] if "sigma" in columns else None,
+        sigma_rot=numbers("sigma_rot", deviation=True)[:, 0] if "sigma_rot" in columns else None,
+        fixture=cells.texts(columns["fixture"].place, missing=True) if "fixture" in columns else None,
+        distance=numbers("distance")[:, 0] if "distance" in columns else None,
+        height=numbers("height")[:, 0] if "height" in columns else None,
+        visit=visits_of(cells, columns["visit"].place) if "visit" in columns else None,
+    )
+    check_lengths(cells, readings, {name: column.place for name, column in columns.items()})
+
+    def circumstance(name: str) -> Array:
+        column = columns[name]
+        return same_everywhere(cells, configurations, column.place, column.unit)
+
+    wrench = None
+    if "force_x" in columns:
+        still = np.zeros(len(configurations.labels))
+        wrench = np.column_stack([circumstance(n) if n in columns else still for n in (*_FORCE, *_MOMENT)])
+    order = order_of(cells, configurations, columns["order"].place) if "order" in columns else None
+    dataset = dataset_of(readings, configurations, order)
+    places = {name: (column.place, column.unit) for name, column in columns.items()}
+    return replace(
+        dataset,
+        setup=None if setup is None else read_setup(setup, places, dataset),
+        scale_sigma=scale_sigma_of(cells, *scale) if (scale := places.get("scale_sigma")) else None,
+        temperature=circumstance("temperature") if "temperature" in columns else None,
+        wrench=wrench,
+    )
+
+
+def refuse_other_separators(text: str, where: str, otherwise: str = "") -> None:
+    """Refuse a text whose header is not separated by commas.
+
+    Args:
+        where: Names the header.
+        otherwise: What can be done besides saving it again, for the end of that sentence.
+    """
+    heading = next(line for line in lines_of(text) if line.strip())
+    seen = next((name for sign, name in _SEPARATORS.items() if sign in heading), None)
+    if seen is None and "," not in heading and len(heading.split()) > 3:
+        seen = "blanks"
+    if seen is not None:
+        raise InputError(
+            "the columns are not separated by commas",
+            where=where,
+            came=seen,
+            allowed="commas",
+            cure=f"Save the file with commas and decimal points{otherwise}.",
+        )
+
+
+def _columns(cells: Cells) -> dict[str, _Column]:
+    """Return the place and the unit of every column by its name, or refuse the header."""
+    columns: dict[str, _Column] = {}
+    for place, heading in enumerate(cells.names):
+        where = f"{cells.source}, line {cells.header}, column {place + 1}"
+        match = _HEADING.fullmatch(heading)
+        name, unit = (match["name"], match["unit"]) if match else (heading, None)
+        units = _UNITS.get(name)
+        if JOINT_COLUMN.fullmatch(name):
+            units = (*ANGLE_UNITS, *LENGTH_UNITS)
+        if units is None and name not in _PLAIN:
+            word = re.split(r"[^A-Za-z]", name)[0]
+            near = nearest_names(name, _SHOWN, 1) or nearest_names(word, _SHOWN, 1)
+            raise InputError(
+                "the column is not known" if heading else "the column has no name",
+                where=where,
+                came=heading,
+                allowed=_ALLOWED,
+                cure=f"Did you mean {_SHOWN[near[0]]}?" if near else "Rename it, or leave it out.",
+            )
+        if name in columns:
+            raise InputError(
+                f"the column {name} appears twice",
+                where=f"{where} as well as column {columns[name].place + 1}",
+                came=heading,
+                cure="Remove one of them.",
+            )
+        if units is not None:
+            unit = checked_unit(unit, units, f"{where}, {heading}")
+        elif unit is not None:
+            raise InputError(
+                "this column takes no unit", where=where, came=heading, allowed=name, cure="Remove the unit."
+            )
+        columns[name] = _Column(place, unit or "1")
+    _refuse_missing(cells, columns)
+    return columns
+
+
+def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
+    where = f"{cells.source}, line {cells.header}"
+    joint_names(columns, where)
+    lengths = [name for name in _LENGTHS if name in columns]
+    positions = () if lengths and not any(axis in columns for axis in _POSITION) else _POSITION
+    for name in ("configuration", "target", *positions, *(["fixture"] if lengths else [])):
+        if name not in columns:
+            raise InputError(
+                f"the column {name} is missing", where=where, allowed=_ALLOWED, cure=f"Add {_SHOWN[name]}."
+            )
+    there = [name for name in _QUATERNION if name in columns]
+    if there and len(there) < 4:
+        raise InputError(
+            "the quaternion is not complete",
+            where=where,
+            came=", ".join(there),
+            allowed="qw, qx, qy, qz, or none of them",
+            cure=f"Add {', '.join(n for n in _QUATERNION if n not in there)}.",
+        )
+    for needed, group in ((_FORCE, (*_FORCE, *_MOMENT)), (_MOMENT, _MOMENT)):
+        if any(name in columns for name in group):
+            for name in needed:
+                if name not in columns:
+                    raise InputError(
+                        f"the column {name} is missing",
+                        where=where,
+                        allowed=f"{', '.join(_SHOWN[n] for n in needed)}, or none of them",
+                        cure=f"Add {_SHOWN[name]}; it may be zero.",
+                    )
+    if "sigma_rot" in columns and not there:
+        raise InputError(
+            "the column sigma_rot is there, and no orientation",
+            where=where,
+            allowed="sigma_rot together with qw, qx, qy, qz",
+            cure="Add the quaternion, or remove sigma_rot.",
+        )
+
+
+# -- writing -------------------------------------------------------------------------------------------
+
+
+def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg") -> str:
+    """Return a dataset as the text of a canonical CSV.
+
+    Rows come configuration by configuration, in each one the targets first and then the reference points; what is
+    known of fixtures comes last.
+    What was read from such a text is written as the same text again. ``sigma_rot`` is always in mrad.
+    """
+    checked_unit(length_unit, LENGTH_UNITS, "length unit")
+    checked_unit(angle_unit, ANGLE_UNITS, "angle unit")
+    references = dataset.references
+    parts = [dataset] if references is None else [dataset, references]
+    oriented = any(part.quaternion is not None or part.sigma_rot is not None for part in parts)
+    with_sigma = any(part.sigma is not None for part in parts)
+    with_sigma_rot = any(part.sigma_rot is not None for part in parts)
+    circumstances = {} if dataset.temperature is None else {"temperature": dataset.temperature}
+    if dataset.wrench is not None:
+        circumstances |= dict(zip((*_FORCE, *_MOMENT), dataset.wrench.T, strict=True))
+    units = [angle_unit if kind == "revolute" else length_unit for kind in dataset.joint_kinds]
+    column = COLUMN["controller" if dataset.joints_are == "controller" else "model"]
+    setup = dataset.setup
+    with_visits = any(part.visit is not None for part in parts)
+    with_roles = references is not None or setup is not None
+    every = [part for part in (*parts, setup) if part is not None]
+    lengths = [name for name in _LENGTHS if any(getattr(part, name) is not None for part in every)]
+    positions = not lengths or any(np.isfinite(part.position).any() for part in every)
+    with_sigma = with_sigma or setup is not None
+    order = _order_beside_labels(dataset)
+    heading = [
+        "configuration",
+        *([] if order is None else ["order"]),
+        *(f"{column}_{number} [{unit}]" for number, unit in enumerate(units, 1)),
+        "target",
+        *(["role"] if with_roles else []),
+        *(["visit"] if with_visits else []),
+        *(["fixture"] if any(part.fixtures for part in every) else []),
+        *(f"{axis} [{length_unit}]" for axis in (_POSITION if positions else ())),
+        *(_QUATERNION if oriented else ()),
+        *(f"{name} [{length_unit}]" for name in lengths),
+        *([f"sigma [{length_unit}]"] if with_sigma else []),
+        *(["sigma_rot [mrad]"] if with_sigma_rot else []),
+        *([_SHOWN["scale_sigma"]] if dataset.scale_sigma is not None else []),
+        *(_SHOWN[name] for name in circumstances),
+        *([SIMULATED] if dataset.simulated else []),
+    ]
+    joints = [[_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()]
+    rows: list[list[list[str]]] = [[] for _ in dataset.labels]
+    mark = [YES] if dataset.simulated else []
+
+    def reading_cells(part: Dataset, role: str, reading: int) -> list[str]:
+        row = [part.targets[part.target[reading]], *([role] if with_roles else [])]
+        if with_visits:
+            once = "" if role == "fixture" else "1"
+            row.append(once if part.visit is None else str(int(part.visit[reading])))
+        if "fixture" in heading:
+            other = int(part.against[reading])
+            row.append(part.fixtures[other] if other >= 0 else "")
+        if positions:
+            row += [_shown(v, length_unit) for v in part.position[reading].tolist()]
+        if oriented:
+            row += _cells(part.quaternion, reading, "1", 4)
+        for name in lengths:
+            row += _cells(getattr(part, name), reading, length_unit, 1)
+        if with_sigma:
+            row += _cells(part.sigma, reading, length_unit, 1)
+        if with_sigma_rot:
+            row += _cells(part.sigma_rot, reading, "mrad", 1)
+        if dataset.scale_sigma is not None:
+            row.append("" if role == "fixture" else _shown(dataset.scale_sigma, "ppm"))
+        return row
+
+    for part, role in zip(parts, ROLES, strict=False):
+        for reading, configuration in enumerate(part.configuration.tolist()):
+            place = [] if order is None else [order[configuration]]
+            row = [dataset.labels[configuration], *place, *joints[configuration], *reading_cells(part, role, reading)]
+            row += [_shown(float(values[configuration]), "1") for values in circumstances.values()]
+            row += mark
+            rows[configuration].append(row)
+    unmeasured = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
+    if unmeasured is not None:
+        raise InputError(
+            "a configuration without a reading cannot be written to a file",
+            where=f"{dataset.source}, configuration {unmeasured}",
+            cure="Leave it out, or give it missing readings.",
+        )
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(heading)
+    writer.writerows(row for found in rows for row in found)
+    for reading in range(0 if setup is None else len(setup.target)):
+        ends = [""] * (len(units) + (order is not None)), [""] * (len(circumstances) + len(mark))
+        row = ["", *ends[0], *reading_cells(setup, "fixture", reading), *ends[1]]  # type: ignore[arg-type]
+        writer.writerow(row)
+    return stream.getvalue()
+
+
+def _order_beside_labels(dataset: Dataset) -> list[str] | None:
+    """Return the place of each configuration in the order of measurement, None if it is not known or labels tell it."""
+    if dataset.number is None:
+        return None
+    told = order_of_labels(dataset.labels)
+    if told is not None and np.array_equal(before_each(told), dataset.number):
+        return None
+    places = [str(int(number) + 1) for number in dataset.number.tolist()]
+    is_one = len(set(places)) == len(places) and bool((dataset.number == np.floor(dataset.number)).all())
+    return places if is_one and dataset.number.min() >= 0 and dataset.number.max() < _LAST_PLACE else None
+
+
+def _cells(values: Array | None, reading: int, unit: str, count: int) -> list[str]:
+    if values is None:
+        return [""] * count
+    return [_shown(v, unit) for v in np.atleast_1d(values[reading]).tolist()]
+
+
+def _shown(value: float, unit: str) -> str:
+    return "" if np.isnan(value) else repr(written(value, unit))

@@ -1,0 +1,253 @@
+"""What a person should know about a fit, in plain words and with parameter names."""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+from typing import Final
+
+from truearm.engine.base.errors import Notice, listed
+from truearm.engine.diagnose.expected_error import ExpectedError
+from truearm.engine.fit.fit import Fit, Status
+from truearm.engine.robot.conventions.parallel import parallel_joints_without_beta
+from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
+from truearm.engine.robot.effects.joint_curve import JointCurve
+from truearm.engine.robot.loads import has_weight
+
+#: Groups of parameters of the rigid arm.
+_KINEMATIC: Final = frozenset({"joint zero", "geometry", *(effect.name for effect in EFFECTS if effect.kinematic)})
+#: Priors that an angle may move before it is named; of lengths see :mod:`truearm.engine.diagnose.wrong_robot`.
+_LARGEST_MOVE: Final = 6.0
+#: Standard deviations below zero from which a stiffness or a play is doubted.
+_NEGATIVE_DEVIATIONS: Final = 4.0
+#: Share of the prior variance that the data should remove, and of parameters of effects that may fall short of it.
+_LEAST_INFORMED: Final = 0.5
+_LARGEST_UNINFORMED_SHARE: Final = 0.05
+
+
+def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> list[Notice]:
+    """Return what a fit says about its model, its data and its parameters.
+
+    Args:
+        expected: Of the fit, over the workspace.
+        doubted: Whether the data, or the robot, are known to be wrong: nothing is said of where its parameters went
+            then.
+    """
+    found = []
+    robot = fit.robot
+    if "joint zero" in fit.model.groups and "geometry" in fit.model.groups:
+        pairs = parallel_joints_without_beta(robot.convention, [dict(j.row) for j in robot.joints])
+        if pairs:
+            names = ", ".join(f"{a} and {b}" for a, b in pairs)
+            better = {"standard-dh": "hayati", "modified-dh": "modified-hayati"}.get(
+                robot.convention_name, robot.convention_name
+            )
+            cure = (
+                "Convert the robot to the convention hayati with 'truearm convert'."
+                if robot.convention_name == "s-model"
+                else f"Write 'convention: {better}' in the robot file and 'beta: 0' at the link between them."
+            )
+            found.append(
+                Notice(
+                    "parallel-axes",
+                    f"Joints {names} are parallel. The model has no beta that lets them tilt against each other, so it "
+                    f"cannot follow the real robot. {cure}",
+                )
+            )
+    if fit.status is Status.NOT_CONVERGED:
+        found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}", "error"))
+    if fit.unobservable:
+        found.append(
+            Notice(
+                "rank-loss",
+                f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend "
+                f"on them. {Status.RANK_LOSS.advice}",
+                "error",
+            )
+        )
+    if fit.gauge_freedoms:
+        words = (
+            "No reading locates the robot, so its base frame is the world frame. The held-out error is one of "
+            f"readings. Predicted positions are accurate to about {expected.overall.mean * 1e3:.2g} mm on average, up "
+            "to the unknown base pose."
+        )
+        if "size" in fit.gauge_freedoms:
+            words += (
+                " No length was measured either, so the scale of the result is that of the nominal lengths, as "
+                "uncertain as their priors say. Without errors of the scale it would be "
+                f"{expected.without_scale.mean * 1e3:.2g} mm. One known length determines the scale: the distance of "
+                "two points, or a ballbar."
+            )
+        if fit.unobservable_combinations:
+            held = "; ".join(fit.unobservable_combinations)
+            words += f" Unobservable combinations of parameters, held at nominal values: {held}."
+        found.append(Notice("closed-loop", words, "note"))
+    if fit.at_bound:
+        found.append(Notice("at-bound", f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
+    if fit.redundancies:
+        combinations = "; ".join(f"{r.dropped} ({r.combination})" for r in fit.redundancies)
+        found.append(
+            Notice(
+                "redundant",
+                f"Redundant parameters are held at their nominal values: {combinations}. The readings hardly observe "
+                "the combinations in brackets."
+                + (
+                    ""
+                    if fit.unobservable
+                    else " At configurations like the measured ones predictions hardly depend on them."
+                ),
+                "note",
+            )
+        )
+    found += [] if doubted else _far_from_nominal(fit)
+    shared = fit.joint_error.any() and not fit.scattered
+    if fit.excess > 1.0:
+        found.append(
+            Notice(
+                "residuals-exceed-sigma",
+                f"The residuals are {fit.excess:.1f} times what the declared deviations"
+                f"{', and errors of the joints that readings of a configuration share,' if shared else ''} allow. "
+                f"Either the robot does something that the {fit.model.name} model cannot express, or sigma is too "
+                "small, or readings are wrong. The deviations of the parameters allow for it.",
+            )
+        )
+    found += _check_effects(fit)
+    if fit.robot.effect_names:
+        effects = ", ".join(fit.robot.effect_names)
+        own = [p.name for effect in robot.effects for p in effect.parameters]
+        found.append(
+            Notice(
+                "urdf-partial",
+                f"calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold {effects} "
+                f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
+                "and the targets in the instrument's frame. calibrated.yaml holds everything.",
+                "note",
+            )
+        )
+    return found
+
+
+def _far_from_nominal(fit: Fit) -> list[Notice]:
+    """Say which parameters, lengths apart, are farther from their nominal values than their priors let expect."""
+    far = [
+        p.name
+        for p in fit.robot.parameters.values()
+        if p.group in _KINEMATIC
+        and (p.group, p.unit) != ("geometry", "m")
+        and abs(p.value - p.nominal) > _LARGEST_MOVE * p.prior
+    ]
+    if not far:
+        return []
+    return [
+        Notice(
+            "far-from-nominal",
+            f"{listed(far)} moved by more than {_LARGEST_MOVE:g} standard deviations of "
+            f"{'its prior' if len(far) == 1 else 'their priors'}. A robot that was never mastered well is so far off. "
+            "Check that the nominal values are those of its controller: corrections of programs are wrong by what they "
+            "differ. If they are, enter wider priors in the robot file.",
+            "note",
+        )
+    ]
+
+
+def _check_effects(fit: Fit) -> list[Notice]:
+    """Say which joint effects the data know nothing about, and which came out as no spring can be."""
+    robot, found = fit.robot, []
+    idle = [
+        effect.name
+        for effect in robot.effects
+        if effect.parameters
+        and effect.name not in fit.model.effects
+        and not any(p.name in fit.free.names for p in effect.parameters)
+        and all(robot.values[p.name] == p.value for p in effect.parameters)
+    ]
+    if idle:
+        found.append(
+            Notice(
+                "effects-idle",
+                f"The robot file has the joint effects {', '.join(idle)} with all values zero, and the model "
+                f"{fit.model.name} does not free them. Add `effects={idle[0]}`, or take them out of the file.",
+            )
+        )
+    # What is expected of curves follows from the data: most of their many coefficients are meant to stay near zero.
+    effects = {p.name for effect in robot.effects if effect.name != JointCurve.name for p in effect.parameters}
+    own = [name for name in fit.free.names if name in effects]
+    unknown = [name for name in own if fit.parameter_status(name) == "uninformed"]
+    unknown += [r.dropped for r in fit.redundancies if r.dropped in effects]
+    if any(effect.loaded for effect in robot.effects) and not has_weight(robot):
+        found.append(
+            Notice(
+                "no-loads",
+                "The robot has no link masses and no payload, so nothing loads its joints. Compliance cannot be found. "
+                "Give masses in the robot file, or `payload`.",
+            )
+        )
+    elif unknown:
+        found.append(
+            Notice(
+                "effects-uninformed",
+                f"The data say nothing about {', '.join(unknown)}. Either nothing loads these joints that way (gravity "
+                "does not turn a vertical axis), or there are too few configurations for so many effects. The values "
+                "stay near zero.",
+            )
+        )
+    tilting = {p.name for effect in robot.effects if effect.tilts for p in effect.parameters}
+    assumed = [
+        joint.name
+        for number, joint in enumerate(robot.joints, 1)
+        if joint.bearing is None and any(name in tilting and name.endswith(f"_{number}") for name in own)
+    ]
+    if assumed:
+        found.append(
+            Notice(
+                "bearing-assumed",
+                f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are "
+                "taken at the joints' origins, and so are the moments that tilt them. If drawings tell, enter "
+                "the entry bearing of these joints in the robot file.",
+            )
+        )
+    vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _LEAST_INFORMED]
+    if len(vague) > _LARGEST_UNINFORMED_SHARE * len(own):
+        found.append(
+            Notice(
+                "too-many-effects",
+                f"Of {len(own)} parameters of joint effects, {len(vague)} rest more on their priors than on the data: "
+                f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}. There are too few configurations "
+                f"for so many effects. Measure more{'' if fit.model.tried else ', or let `model=auto` choose'}.",
+            )
+        )
+    soft = _negative(fit)
+    if soft:
+        found.append(
+            Notice(
+                "negative-effect",
+                f"{', '.join(soft)} came out negative, as no spring and no play is: masses, payload or gravity may be "
+                "wrong, or the parameter stands for something else that the model lacks.",
+            )
+        )
+    return found
+
+
+def _negative(fit: Fit) -> list[str]:
+    """Return which springs, plays and gaps came out negative, and of which two the sum did.
+
+    Two joints may move a target in the same way: only the sum of their parameters is known then, and neither alone.
+    """
+    of = fit.robot.parameters
+    places = [
+        place
+        for place, name in enumerate(fit.free.names)
+        if of[name].group in NON_NEGATIVE and fit.parameter_status(name) == "identified"
+    ]
+    names, spread = fit.free.names, fit.covariance
+    found = {i: names[i] for i in places if of[names[i]].value < -_NEGATIVE_DEVIATIONS * math.sqrt(spread[i, i])}
+    for i, j in combinations([place for place in places if place not in found], 2):
+        total, variance = of[names[i]].value + of[names[j]].value, spread[i, i] + spread[j, j] + 2.0 * spread[i, j]
+        better_known = variance < min(spread[i, i], spread[j, j])
+        if (
+            of[names[i]].group == of[names[j]].group
+            and better_known
+            and total < -_NEGATIVE_DEVIATIONS * math.sqrt(variance)
+        ):
+            found[i] = f"the sum of {names[i]} and {names[j]}"
+    return [found[place] for place in sorted(found)]

@@ -1,0 +1,201 @@
+"""How well the robot comes back to a posture, from postures that were visited again.
+
+Readings of a target at the same joint positions, on separate visits, differ by the robot's repeatability and the noise
+of the instrument; no model of the robot is needed. ISO 9283 states it as RP, the mean distance of the visits from their
+barycentre plus three of its standard deviations. Here the scatter of all postures is taken together, the share of the
+instrument is taken out, and RP follows from the distances of a normal distribution with that scatter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.engine.base.errors import Notice, counted, millimetres
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import Errors
+from truearm.engine.robot.chain import Array
+
+# Is the calibrated robot better than the nominal one, or worse, at configurations that the fit has not seen.
+#
+# Both robots predict the same readings, so their errors are compared in pairs, one pair for each posture: readings of a
+# posture share its errors and are not independent. The signed-rank test (Wilcoxon 1945) needs neither normal errors nor
+# errors of one size, and a few wrong readings, which both robots miss alike, do not decide it. With fewer than seven
+# pairs no result of it has a probability below 1 %, so that nothing is said of so few.
+
+#: The calibrated robot is no better than the nominal one, as far as unseen configurations tell.
+NO_GAIN: Final = "no-gain"
+#: It is significantly worse.
+WORSE: Final = "worse-than-nominal"
+#: Probability of such differences, or larger ones, where there is no difference.
+_LEVEL: Final = 0.01
+#: Of fewer pairs even the most extreme order of signs is more probable than that.
+_FEWEST: Final = math.ceil(-math.log2(_LEVEL))
+#: Worse is by more than this factor: a fit in which nothing is wrong makes a robot that is accurate already worse by
+#: some hundredths, because its parameters are uncertain.
+_FACTOR: Final = 1.1
+#: From so many pairs on the normal distribution is close enough.
+_MANY: Final = 100
+#: Joint positions that differ by less are one posture [rad or m].
+_SAME: Final = math.radians(0.01)
+
+
+def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = False) -> list[Notice]:
+    """Say if the calibrated robot is significantly worse than the nominal one, no better, or if that is not known.
+
+    Args:
+        before, after: Errors of the nominal and of the calibrated robot on the held-out part, both with base and
+            targets found from the training part.
+        data: The held-out part.
+        doubted: Whether base and targets of the nominal robot were found by a robust loss, because readings are
+            doubted.
+    """
+    old, new = (_by_posture(errors, data) for errors in (before, after))
+    postures = counted(len(new), "posture")
+    if len(new) < _FEWEST:
+        return [
+            Notice(
+                "few-held-out",
+                f"Only {postures} with readings {'is' if len(new) == 1 else 'are'} held out: whether the calibrated "
+                f"robot is better than the nominal one is not known. {_FEWEST} or more can tell.",
+                "note",
+            )
+        ]
+    figures = (
+        f"On {postures} that the fit has not seen the median error is {millimetres(float(np.median(new)))} mm with the "
+        f"calibrated robot and {millimetres(float(np.median(old)))} mm with the nominal one"
+        f"{', whose base and targets were found with `loss=cauchy` because readings are doubted' if doubted else ''}."
+    )
+    if signed_rank_probability(new - _FACTOR * old) <= _LEVEL:
+        return [
+            Notice(
+                WORSE,
+                f"{figures} The calibrated robot is significantly worse (more than a tenth; signed-rank test in pairs, "
+                "1 %). Do not use it: readings are wrong, or too few for this model.",
+                "error",
+            )
+        ]
+    if signed_rank_probability(old - new) <= _LEVEL:
+        return []
+    return [
+        Notice(
+            NO_GAIN,
+            f"{figures} That is no significant gain (signed-rank test in pairs, 1 %). The nominal robot is accurate "
+            "already, or there are too few readings for this model, or something is wrong with them.",
+        )
+    ]
+
+
+def signed_rank_probability(differences: Array) -> float:
+    """Return how probable signed ranks are that speak for positive differences as much as these do, or more.
+
+    The distribution is that of differences which are symmetric about zero: exact for up to a hundred of them, a normal
+    one for more. Differences of zero are left out, and equal ones share their ranks.
+
+    Args:
+        differences: One for each pair, ``(n,)``.
+    """
+    from scipy.special import ndtr  # scipy.stats.wilcoxon is the same, but takes half a second to import
+
+    d = differences[differences != 0.0]
+    if not len(d):
+        return 1.0
+    which, count = np.unique(np.abs(d), return_inverse=True, return_counts=True)[1:]
+    ranks = (2 * np.cumsum(count) - count + 1)[which]  # twice the mean rank: whole numbers
+    reached = int(ranks[d > 0.0].sum())
+    if len(d) > _MANY:
+        mean, deviation = ranks.sum() / 2.0, math.sqrt(float(ranks @ ranks)) / 2.0
+        return float(ndtr((mean - reached + 1.0) / deviation))
+    chances = np.zeros(int(ranks.sum()) + 1)
+    chances[0] = 1.0
+    for rank in ranks.tolist():
+        chances[rank:] = (chances[rank:] + chances[: len(chances) - rank]) / 2.0
+        chances[:rank] /= 2.0
+    return float(chances[reached:].sum())
+
+
+def _by_posture(errors: Errors, data: Dataset) -> Array:
+    """Return the mean error of the positions, else of the lengths, at each posture [m], ``(postures,)``."""
+    off = np.linalg.norm(errors.position_errors, axis=1)
+    if errors.length_errors is not None and not np.isfinite(off).any():
+        off = np.abs(errors.length_errors)
+    read = np.flatnonzero(np.isfinite(off))
+    joints = np.round(data.joints[data.configuration[read]] / _SAME)
+    which, count = np.unique(joints, axis=0, return_inverse=True, return_counts=True)[1:]
+    return np.asarray(np.bincount(which.reshape(-1), off[read]) / count)
+
+
+#: Joint positions that differ by less are the same [rad or m].
+_SAME_REPEATABILITY: Final = 1e-9
+#: Degrees of freedom from which a scatter is worth a figure: RP is then good to about a fifth.
+_LEAST_FREEDOM: Final = 10
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Of a robot, at the postures that were visited again."""
+
+    rp: float  #: Pose repeatability of ISO 9283 [m].
+    postures: int  #: How many were visited again.
+    visits: int  #: How many visits these had together.
+    #: Mean square of the visits' distances from where the posture is on average, without the instrument's noise [m^2];
+    #: negative where the visits scatter less than the noise lets expect.
+    square: float
+    deviation: float  #: Its standard deviation [m^2].
+
+
+def repeatability(data: Dataset, sigma: float) -> Repeatability | None:
+    """Return the repeatability that postures visited again show; None if too few were.
+
+    Args:
+        data: Readings. Visits of a posture are configurations with the same joint positions, or visits of one
+            configuration.
+        sigma: Standard deviation of a coordinate [m].
+    """
+    read = np.flatnonzero(data.has_position)
+    if not len(read):
+        return None
+    postures = np.unique(np.round(data.joints / _SAME_REPEATABILITY), axis=0, return_inverse=True)[1].reshape(-1)
+    visit = np.zeros(len(read), dtype=np.intp) if data.visit is None else data.visit[read]
+    at = data.configuration[read]
+    keys = np.stack([postures[at], data.target[read]])
+    sets = np.unique(keys, axis=1, return_inverse=True)[1].reshape(-1)
+    arrival = np.unique(np.stack([sets, at, visit]), axis=1, return_inverse=True)[1].reshape(-1)
+    first = np.unique(arrival, return_index=True)[1]  # several readings on one visit say nothing of the next
+    sets, at, visit, place = sets[first], at[first], visit[first], data.position[read][first]
+    count = np.bincount(sets)
+    again = count[sets] > 1
+    freedom = int((count[count > 1] - 1).sum())
+    if freedom < _LEAST_FREEDOM:
+        return None
+    centre = np.stack([np.bincount(sets, weights=axis) / count for axis in place.T], axis=1)
+    apart = (place - centre[sets])[again]
+    own = np.linalg.eigvalsh(apart.T @ apart / freedom) - sigma**2
+    mean = _mean_length(np.maximum(own, 0.0))
+    spread = math.sqrt(max(float(np.maximum(own, 0.0).sum()) - mean**2, 0.0))
+    visits = len(np.unique(np.stack([at, visit])[:, again], axis=1).T)
+    square = float(own.sum())
+    posture = postures[at[again]]  # of which all targets scatter together
+    beyond = np.bincount(
+        posture, np.einsum("ni,ni->n", apart, apart) - (square + 3.0 * sigma**2) * freedom / len(apart)
+    )
+    deviation = math.sqrt(float(beyond @ beyond)) / freedom
+    return Repeatability(mean + 3.0 * spread, len(np.unique(posture)), visits, square, deviation)
+
+
+def _mean_length(variances: Array) -> float:
+    """Return the mean length of a normal vector with variances along three axes.
+
+    ``E sqrt(Q) = int (1 - E exp(-t Q)) t^-1.5 dt / (2 sqrt(pi))``, and ``E exp(-t Q)`` is the product of
+    ``(1 + 2 t v)^-0.5`` (Mathai and Provost 1992, "Quadratic forms in random variables", section 3.2b).
+    """
+    largest = float(variances.max())
+    if largest <= 0.0:
+        return 0.0
+    logs = np.linspace(-30.0, 40.0, 1401)
+    t = np.exp(logs)
+    missing = -np.expm1(-0.5 * np.log1p(2.0 * t[:, None] * variances / largest).sum(axis=1))
+    return math.sqrt(largest) * float(np.trapezoid(missing / np.sqrt(t), logs)) / (2.0 * math.sqrt(math.pi))

@@ -1,0 +1,486 @@
+"""What to do next after a fit and after a check: the most useful first, with the gain to expect.
+
+Every gain is an estimate near the solution of the fit and costs no other fit. A gain of an effect, or of leaving
+configurations out, is a share of what the fit leaves, times the error that is known. More configurations gain what the
+variance of the parameters adds to the predictions: twice as many halve it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import Errors
+from truearm.engine.diagnose.changes import LEAST_ARRIVALS, Change, find_change
+from truearm.engine.diagnose.curves import about_curves, has_curves
+from truearm.engine.diagnose.expected_error import ExpectedError
+from truearm.engine.diagnose.far_off import ORIENTATION_OUTLIERS
+from truearm.engine.diagnose.gain import NO_GAIN, WORSE
+from truearm.engine.diagnose.narrow_data import (
+    CURE,
+    FEW_READINGS,
+    expected_where_measured,
+    joints_that_moved_little,
+    least_known,
+)
+from truearm.engine.diagnose.next_step import MOST, NextStep, most_useful_first
+from truearm.engine.diagnose.off_configurations import Off, OffConfiguration, off_configurations
+from truearm.engine.diagnose.unmodelled import (
+    GEOMETRY,
+    LOADS,
+    PAYLOAD,
+    Explanation,
+    LeftOver,
+    can_explain,
+    explanation,
+    with_causes,
+)
+from truearm.engine.fit.fit import Fit, Status
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects.fourier import Fourier
+from truearm.engine.robot.effects.joint_curve import JointCurve
+
+# The steps for what is wrong with configurations, for what moved, and for another model, in words.
+
+#: Configurations named one by one.
+_NAMED: Final = 3
+
+
+def measured_again(left: LeftOver, off: Off, known: float, *, checked: bool) -> list[NextStep]:
+    """Return the step for configurations that are off one by one."""
+    if not off.configurations:
+        return []
+    labels = ",".join(left.problem.data.labels[index] for index in sorted(off.indices))
+    gain = known * (1.0 - off.left)
+    if off.in_a_row:
+        names = [left.problem.data.labels[index] for index in sorted(off.indices)]
+        size = math.sqrt(sum(one.distance**2 for one in off.configurations) / len(names))
+        how = "them out of the calibration" if checked else f"them out (`without={labels}`)"
+        words = (
+            f"Measure configurations {names[0]} to {names[-1]} again, or leave {how}: they were measured one after the "
+            f"other and are off by about {size * 1e3:.2g} mm, so something moved meanwhile."
+        )
+        return [NextStep("measure-again", words, gain)]
+    said = [_off_by(left, one) for one in off.configurations[:_NAMED]]
+    rest = len(off.configurations) - len(said)
+    if rest:
+        others = [left.problem.data.labels[one.index] for one in off.configurations[_NAMED:]]
+        said.append(f"{counted(rest, 'more configuration')} ({listed(others)})")
+    out = "leave them out" if len(off.configurations) > 1 else "leave it out"
+    way = f"{out} of the calibration" if checked else f"{out} (`without={labels}`)"
+    what = "Measure these again" if len(off.configurations) > 1 else "Measure again"
+    return [NextStep("measure-again", f"{what}, or {way}: {'; '.join(said)}.", gain)]
+
+
+def _off_by(left: LeftOver, off: OffConfiguration) -> str:
+    """Say what is wrong with a configuration."""
+    label = left.problem.data.labels[off.index]
+    if off.joint is not None:
+        which = f"joint {off.joint.number} of configuration {label}"
+        if off.joint.sign:
+            return f"the sign of {which} looks wrong"
+        turns = left.fit.robot.joints[off.joint.number - 1].kind == "revolute"
+        size = f"{math.degrees(abs(off.joint.error)):.2g} deg" if turns else f"{abs(off.joint.error) * 1e3:.2g} mm"
+        return f"{which} looks off by about {size}"
+    where = f"target {off.target} of " if off.target else ""
+    return f"{where}configuration {label} is off by {off.distance * 1e3:.2g} mm"
+
+
+def about_change(left: LeftOver, change: Change, known: float) -> NextStep:
+    """Return the step for what moved during the campaign."""
+    label = left.problem.data.labels[change.first]
+    gain = known * (1.0 - math.sqrt(max(1.0 - change.share, 0.0)))
+    words = {
+        "instrument-moved": f"The instrument or the robot's base moved before configuration {label}: name it in "
+        f"`base_changes={label}`, or measure again from there.",
+        "target-moved": f"Target {change.what} was seated anew before configuration {label}: give it another name from "
+        "there on.",
+        "joint-zero-jumped": f"The zero of joint {change.what} jumped before configuration {label}: find out why, and "
+        "measure again from there or calibrate the parts apart.",
+        "drift": "Everything drifted during the campaign: measure reference points along with the targets, or let the "
+        "arm and the instrument warm up first.",
+    }
+    return NextStep(change.kind, words[change.kind], gain)
+
+
+def other_model(fit: Fit, found: Explanation, known: float) -> NextStep:
+    """Return the step for what would explain what is left."""
+    gain = known * (1.0 - found.left)
+    share = f"{1.0 - found.left:.0%}"
+    if found.cause == PAYLOAD:
+        given = fit.robot.payload.mass
+        what = f"about {found.mass:.2g} kg" if found.mass else "another load"
+        words = (
+            f"Check what the robot carried (`payload`) and the masses in the robot file: {what} on the flange instead "
+            f"of {given:g} kg would explain {share} of what is left."
+            if given
+            else f"Give what the robot carried (`payload`): {what} on the flange instead of none would explain {share} "
+            "of what is left."
+        )
+        return NextStep("give-payload", words, gain)
+    if found.cause == LOADS:
+        words = (
+            f"Joints that give way explain {share} of what is left, but the robot has no masses: give masses in the "
+            "robot file or what it carried (`payload`), and use `model=elastic`."
+        )
+        return NextStep("give-loads", words, gain)
+    if found.cause == GEOMETRY:
+        words = f"Use `model=geometric`: free geometry and joint zeros explain {share} of what is left."
+        return NextStep("other-model", words, gain)
+    plain = "geometry" in fit.model.groups and not fit.model.effects
+    if found.cause == "compliance" and plain:
+        return NextStep(
+            "other-model", f"Use `model=elastic`: joints that give way explain {share} of what is left.", gain
+        )
+    if found.cause == Fourier.name:
+        words = (
+            f"Add `effects={found.cause}`, or `effects={JointCurve.name}`, which contains it and is found from some "
+            f"100 configurations on, or let `model=auto` choose: it explains {share} of what is left."
+        )
+        return NextStep("other-model", words, gain)
+    words = f"Add `effects={found.cause}`, or let `model=auto` choose: it explains {share} of what is left."
+    return NextStep("other-model", words, gain)
+
+
+#: Share of the error that twice as many configurations must gain for more to be advised.
+_LEAST_GAIN: Final = 0.1
+#: Root mean square of what is left over the declared deviation, up to which it is the instrument's noise.
+_AT_THE_NOISE: Final = 1.3
+#: Share of the variance of what is left that errors of the joints may have where it is called noise.
+_OF_THE_JOINTS: Final = 0.5
+#: Mean length of three normal coordinates over the deviation of one.
+_LENGTH: Final = 2.0 * math.sqrt(2.0 / math.pi)
+#: Share of the squares that a change must explain to be told before the model has what it lacks.
+_LEAST_SHARE: Final = 0.5
+#: Share that an effect leaves, as a root mean square, from which on it hides no more what else is wrong.
+_HIDING: Final = 0.7
+#: Steps to a model that has what the present one lacks, and how many times as much as by other steps must be gained by
+#: them for the others to come after.
+_ANOTHER_MODEL: Final = frozenset({"other-model", "give-loads", "give-payload"})
+_FAR_MORE: Final = 2.0
+#: Joints named one by one.
+_NAMED_NEXT_STEPS: Final = 3
+#: Errors that steps of their own are about.
+_OWN_STEP: Final = frozenset(
+    {
+        *("instrument-moved", "target-moved", "joint-zero-jumped"),
+        *("narrow-data", "rank-loss", "not-converged", FEW_READINGS, WORSE),
+    }
+)
+#: Warnings whose cure comes before more configurations.
+_CURED_FIRST: Final = (
+    "parallel-axes",
+    "no-loads",
+    "reference-moved",
+    "targets-swapped",
+    "target-mistaken",
+    "joints-mistaken",
+    ORIENTATION_OUTLIERS,
+    "outliers",
+    "joints-not-settled",
+    "joints-rounded",
+    "separate-visits",
+    "payload-unlikely",
+    "sigma-too-large",
+    "transmission-error",
+    "large-remainder",
+    WORSE,
+    NO_GAIN,
+)
+#: Those that any other step may explain.
+_EXPLAINED: Final = frozenset({WORSE, NO_GAIN, "large-remainder"})
+#: Those that configurations which are off explain.
+_OF_CONFIGURATIONS: Final = frozenset(
+    {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", WORSE, NO_GAIN}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A fit and what is known of it."""
+
+    left: LeftOver  #: What it leaves of all readings.
+    status: Status  #: How it ended.
+    notices: Sequence[Notice]  #: What was noticed about data and fit.
+    off: Off  #: The configurations that are off one by one.
+    #: What it leaves of the others, and what moved during the campaign; None if nothing did.
+    moved: tuple[LeftOver, Change] | None
+    errors: Errors  #: Of the readings that judge it.
+    held_out: bool  #: Whether the fit has not seen these.
+    expected: ExpectedError  #: Error to expect over the workspace.
+    training: Dataset  #: The readings that the fit was made from.
+    bent: bool = False  #: Whether wrong readings, of which a notice says which, pulled the fit away.
+
+
+def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
+    """Return at most three things to do after a fit, the most useful first; one at least."""
+    first = _to_mend(judged.notices)
+    if judged.status in (Status.NOT_CONVERGED, Status.IMPLAUSIBLE):
+        first = first or [NextStep("mend-data", judged.status.advice)]
+    if judged.bent and any(notice.code == ORIENTATION_OUTLIERS for notice in judged.notices):
+        first = first or _cures([n for n in judged.notices if n.code == ORIENTATION_OUTLIERS], [])
+    if first:
+        return tuple(first)
+    left, known = judged.left, _known(judged.errors)
+    steps, now = _of_left_over(left, judged.off, judged.moved, known, checked=False)
+    bound = _at_bound(judged, now)
+    spoiled = (
+        judged.moved is not None
+        or any(step.gain is not None for step in bound)
+        or any(step.code == "measure-again" for step in steps)
+    )
+    if judged.status is not Status.RANK_LOSS and not spoiled:
+        steps += _after(steps, _more(judged, now))
+    steps += _cures(judged.notices, steps)
+    steps += bound
+    if not judged.held_out:
+        steps.append(NextStep("hold-out", "Hold configurations out to judge the fit: leave `train=all` out."))
+    if judged.status is Status.RANK_LOSS:
+        more = NextStep("measure-more", _where(judged, f"determine {listed(left.fit.unobservable)}"))
+        return (more, *most_useful_first(steps))[:MOST]
+    if any(notice.code == FEW_READINGS for notice in judged.notices):
+        more = NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters take up.")
+        return (more, *most_useful_first(step for step in steps if step.code != more.code))[:MOST]
+    return most_useful_first(steps or [_end(left, judged.training.configurations)])
+
+
+def steps_after_check(
+    notices: Sequence[Notice], left: LeftOver | None = None, errors: Errors | None = None, *, robot: bool = True
+) -> tuple[NextStep, ...]:
+    """Return at most three things to do after a check, the most useful first; one at least.
+
+    Args:
+        left: What a robust geometric fit leaves of the readings; None without one.
+        errors: Of that fit.
+        robot: Whether the data were compared with a robot.
+    """
+    mend = _to_mend(notices)
+    if mend:
+        return tuple(mend)
+    steps: list[NextStep] = []
+    if left is not None and errors is not None:
+        off = off_configurations(left)
+        steps, _ = _of_left_over(left, off, what_moved(left, off), _known(errors), checked=True)
+    steps += _cures(notices, steps)
+    if any(notice.code == FEW_READINGS for notice in notices):
+        steps.append(NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters are."))
+    elif not robot:
+        steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
+    elif not any(step.code in ("other-model", "give-loads") for step in steps):
+        told = left is not None and can_explain(left)
+        also = ": no joint effect would explain more of the readings" if told else ""
+        steps.append(NextStep("calibrate", f"Calibrate with `model=geometric`{also}."))
+    return most_useful_first(steps)
+
+
+def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
+    """Return what a fit leaves without configurations that are off one by one, and what moved during the others.
+
+    A single configuration that is far off looks like something that moved. Nothing is returned where nothing moved.
+    """
+    rest = left.without(() if _is_a_part(off) else off.indices)
+    change = find_change(rest)
+    return None if change is None else (rest, change)
+
+
+def _is_a_part(off: Off) -> bool:
+    """Return whether what is off is a part of the campaign, so long that its beginning can be found."""
+    return off.in_a_row and len(off.configurations) >= LEAST_ARRIVALS
+
+
+def _of_left_over(
+    left: LeftOver, off: Off, moved: tuple[LeftOver, Change] | None, known: float, *, checked: bool
+) -> tuple[list[NextStep], float]:
+    """Return what to do about what a fit leaves, and the error without configurations that are off [m]."""
+    found = explanation(left, off.indices)
+    share, wider, known_moved = 1.0, left, known
+    if found is not None and (off.configurations or found.left < _HIDING):
+        # What a model lacks may be large at a few configurations, which are then not wrong, and hide others that are.
+        wider = with_causes(left, GEOMETRY, "compliance", LOADS, found.cause)
+    if found is not None and wider is not left:
+        still = off_configurations(wider)
+        share = 1.0 if off.configurations else found.left
+        if set(still.indices) - set(off.indices):
+            found = explanation(left, still.indices) or found
+        off = still
+        if moved is None:
+            moved = what_moved(wider, off)
+            # Small changes are told by the next fit, which has what this one lacks.
+            moved = None if moved is None or moved[1].share < _LEAST_SHARE else moved
+            known_moved = known * found.left if found is not None else known
+    told = moved is not None and _is_a_part(off)
+    steps = [] if told else measured_again(left, off, known * share, checked=checked)
+    now = known * off.left
+    if moved is not None:
+        steps.append(about_change(*moved, known_moved * off.left))
+    if found is not None:
+        steps.append(other_model(left.fit, found, now))
+    return steps, now
+
+
+def _known(errors: Errors) -> float:
+    """Return the mean error of positions, or else of lengths [m]."""
+    spread = errors.position or errors.length
+    return 0.0 if spread is None else spread.mean
+
+
+def _to_mend(notices: Sequence[Notice]) -> list[NextStep]:
+    """Return the step that mends what makes all other advice worthless."""
+    codes = list(dict.fromkeys(n.code for n in notices if n.level == "error" and n.code not in _OWN_STEP))
+    if not codes:
+        return []
+    what = "the error" if len(codes) == 1 else "the errors"
+    return [NextStep("mend-data", f"Mend first what {what} {listed(codes)} names: nothing else can be judged before.")]
+
+
+def _cures(notices: Sequence[Notice], steps: Sequence[NextStep]) -> list[NextStep]:
+    """Return the step that cures what warnings are about, if no other step does."""
+    again = any(step.code == "measure-again" for step in steps)
+    present = [n.code for n in notices if n.level != "note" or n.code == "outliers"]
+    codes = [code for code in _CURED_FIRST if code in present and not (again and code in _OF_CONFIGURATIONS)]
+    codes = [code for code in codes if not (steps and code in _EXPLAINED)]
+    if not codes:
+        return []
+    what = "the warning" if len(codes) == 1 else "the warnings"
+    return [NextStep("see-warning", f"Do what {what} {listed(codes)} below {'says' if len(codes) == 1 else 'say'}.")]
+
+
+def _at_bound(judged: Judged, known: float) -> list[NextStep]:
+    """Return the step for values at bounds; without bounds the parameters would take what they can."""
+    if judged.status is not Status.AT_BOUND:
+        return []
+    r = judged.left.residual
+    before, after = float(np.linalg.norm(r)), float(np.linalg.norm(judged.left.without_parameters(r)))
+    gain = known * (1.0 - after / before) if before > 0.0 and 1.0 - after / before > _LEAST_GAIN else None
+    return [NextStep("widen-bound", f"Widen the bound of {listed(judged.left.fit.at_bound)} if it was a guess.", gain)]
+
+
+def _more(judged: Judged, known: float) -> list[NextStep]:
+    """Return the step for more configurations, if they would gain something."""
+    noise, parameters = _variances(judged)
+    narrow = any(notice.code == "narrow-data" for notice in judged.notices)
+    before, after = (math.sqrt(noise + part * parameters) for part in (1.0, 0.5))
+    if not narrow and (before == 0.0 or 1.0 - after / before < _LEAST_GAIN):
+        return []
+    n = judged.training.configurations
+    if narrow and has_curves(judged.left.fit) and joints_that_moved_little(judged.left.fit, judged.training):
+        fit = replace(judged.left.fit, joint_error=judged.expected.joint_error)
+        over = judged.expected.overall.mean - expected_where_measured(fit, judged.training)
+        where = _where(judged, "know the whole workspace as well as where was measured")
+        return [NextStep("measure-more", f"{where} The gain is over the workspace.", max(over, 0.0))]
+    gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else _LENGTH * (before - after)
+    held_out = judged.left.problem.data.configurations - n
+    train = " Or train on more of them: `train`." if held_out >= n else ""
+    where = _where(judged, f"halve what {n} leave uncertain, as {n} more would")
+    return [NextStep("measure-more", where + train, gain)]
+
+
+def _after(steps: Sequence[NextStep], more: list[NextStep]) -> list[NextStep]:
+    """Return the step for more configurations as a second one, where another model gains far more.
+
+    What more configurations gain was estimated without what the model lacks, and is not told then.
+    """
+    first = max((step.gain or 0.0 for step in steps if step.code in _ANOTHER_MODEL), default=0.0)
+    return [
+        NextStep(step.code, f"After that: {step.message[0].lower()}{step.message[1:]}")
+        if step.gain is not None and first > _FAR_MORE * step.gain
+        else step
+        for step in more
+    ]
+
+
+def _where(judged: Judged, purpose: str) -> str:
+    """Say where to measure more."""
+    few = joints_that_moved_little(judged.left.fit, judged.training)
+    if few:
+        where = f"in which these joints move further: {'; '.join(few[:_NAMED_NEXT_STEPS])}"
+    elif judged.status is Status.RANK_LOSS or judged.left.fit.gauge_freedoms:
+        where = "all over the workspace"
+    else:
+        where = f"also {least_known(judged.left.fit)}"
+    return f"Measure more configurations to {purpose}: {where}."
+
+
+def _variances(judged: Judged) -> tuple[float, float]:
+    """Return the variance of a coordinate by what the fit leaves, and by its parameters [m^2].
+
+    The parameters' is that at the measured configurations, or that over the workspace if it is larger.
+    """
+    left = judged.left
+    metres = _metres(left)
+    used = metres > 0.0
+    if not used.any():
+        return 0.0, 0.0
+    J = left.jacobian[used] * metres[used][:, None]
+    parameters = float(np.mean(np.sum((J @ left.fit.covariance) * J, axis=1)))
+    r = left.without_parameters(left.residual)[used] * metres[used]
+    noise = float(r @ r) / len(r) * len(left.residual) / max(left.freedom, 1)
+    if not left.fit.joint_error.any() and not left.fit.gauge_freedoms:
+        parameters = max(parameters, (judged.expected.overall.mean / _LENGTH) ** 2)
+    return noise, parameters
+
+
+def _metres(left: LeftOver) -> Array:
+    """Return the deviation of each row [m], zero for angles."""
+    blocks = left.problem.blocks
+    return np.concatenate(
+        [np.repeat(b.sigma if b.observation.unit == "m" else 0.0 * b.sigma, b.observation.components) for b in blocks]
+    )
+
+
+def _unexplained(first: str, untold: str, last: str) -> str:
+    """Say that something is left, what of joint curves cannot be told, and what to look at."""
+    again = f"isit a few postures again to see how well the robot repeats, {last}"
+    if untold:
+        return f"{first}, and no other effect known here explains it. {untold} If they are not it, v{again}"
+    return f"{first}, and no effect known here explains it. V{again}"
+
+
+def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
+    """Say that it is done, or that nothing known here explains what is left.
+
+    Args:
+        configurations: That the fit was made from; all of the readings if None.
+    """
+    fit = left.fit
+    untold = about_curves(fit, left.problem.data.configurations if configurations is None else configurations)
+    metres = _metres(left)
+    used = metres > 0.0
+    r = left.without_parameters(left.residual)
+    spread = math.sqrt(len(left.residual) / max(left.freedom, 1))
+    size = spread * float(np.sqrt(np.mean((r[used] * metres[used]) ** 2))) if used.any() else 0.0
+    noise = float(np.sqrt(np.mean(metres[used] ** 2))) if used.any() else 0.0
+    said = f"{size * 1e3:.2g} mm in each coordinate"
+    if fit.declared and size > _AT_THE_NOISE * noise:
+        first = f"What is left ({said}) is {size / noise:.2g} times the declared noise"
+        return NextStep("unexplained", _unexplained(first, untold, "and check sigma."))
+    if not fit.declared and fit.joint_error.any():
+        vector = np.array([fit.robot.values[name] for name in fit.free.names])
+        shared = (left.problem.at(vector).by_joints[used] * metres[used][:, None]) ** 2 @ fit.joint_error**2
+        if float(np.mean(shared)) > _OF_THE_JOINTS * size**2:
+            return NextStep(
+                "unexplained",
+                _unexplained(
+                    f"What is left ({said}) is shared by the readings of a configuration",
+                    untold,
+                    "which is what is left if they scatter as much.",
+                ),
+            )
+    known = "is the instrument's noise" if fit.declared else "looks like the instrument's noise"
+    effects = (
+        ", and no effect known here explains more of it."
+        if can_explain(left)
+        else ", and cross-validation found no other joint effect that explains more of it."
+        if fit.model.tried
+        else ". The curves leave too few equations to try other joint effects beside them: `model=auto` compares them."
+        if has_curves(fit)
+        else ". There are too few readings to tell whether joint effects would explain more of it."
+    )
+    better = "" if fit.declared else " If the instrument is better than that, say so in a column sigma."
+    return NextStep("stop", f"Stop here: what is left ({said}) {known}{effects}{better}")

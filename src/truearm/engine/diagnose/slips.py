@@ -1,0 +1,536 @@
+"""Slips that people make with units, signs, orders and axes, tried one by one on data that the robot does not fit.
+
+The nominal robot is placed by the closed form. Where that fails badly, the same data are tried as they would be with
+one slip mended; the simplest slip that makes them fit several times better is what happened.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.observations import OBSERVATIONS
+from truearm.engine.data.rigid_tool import FARTHEST, LENGTH_FACTORS, factors_of, lengths_noticed
+from truearm.engine.data.statistics import Errors, errors_of
+from truearm.engine.diagnose.slip_trials import (
+    Slip,
+    angle_slips,
+    as_noted,
+    controller_slips,
+    length_slips,
+    mirrored,
+    mixed_angle_slips,
+    order_slips,
+    orientation_slips,
+    scale_slips,
+    shifted,
+    sign_slips,
+)
+from truearm.engine.fit.frames import initial_frames, placed_errors
+from truearm.engine.fit.models import named_model
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.start_values import centres_of, start_from_readings
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+
+# Single rows or blocks of positions in another unit of length, tried before any fit.
+#
+# Rows in another unit pull a placement by all of them away. Sorted by how far from the instrument they were read, such
+# rows are the first or the last ones. So the robot is placed by each half of this order and by its middle, in each
+# unit, and that part counts from which most positions follow, in one unit or another.
+
+#: Configurations that the robot is placed by at least, and among how many at most.
+_FEWEST_PLACED: Final = 4
+_MOST_PLACED: Final = 60
+#: What makes positions right, in the unit that they came in first.
+_UNITS: Final = (1.0, *(by for by, _ in LENGTH_FACTORS))
+#: A position may be so many times as far off the placed nominal robot as half of all are.
+_ALLOWED: Final = 20.0
+#: Positions follow the robot where half of them are off by less than this share of how far half of those that it
+#: predicts lie from their middle. Positions that are made so small that they are one point follow none.
+_FOLLOWS: Final = 0.1
+#: How often the robot is placed anew by all that it explains.
+_ROUNDS: Final = 2
+
+
+def mixed_length_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+    """Try another unit of length of those positions that it explains, where it explains no whole target.
+
+    Args:
+        robot: At the origin, with no targets.
+    """
+    some = data
+    if data.configurations > _MOST_PLACED:
+        some = data.of_configurations(np.linspace(0, data.configurations - 1, _MOST_PLACED).astype(np.intp))
+    placed = _placed(robot, some)
+    if placed is None:
+        return
+    predicted = _predicted(placed, data)
+    factor = factors_of(data.position, predicted, _allowed(data, predicted))
+    for t in range(len(data.targets)):
+        mine = (data.target == t) & data.has_position
+        if len(np.unique(factor[mine])) == 1:  # the unit of the target, not of rows
+            factor[mine] = 1.0
+    if (factor == 1.0).all():
+        return
+    words, at = lengths_noticed(data, factor)
+    yield Slip("unit-length", words, replace(data, position=data.position * factor[:, None]), at)
+
+
+def _placed(robot: Robot, data: Dataset) -> Robot | None:
+    """Return the robot placed by the part of the data from which most positions follow; None without one."""
+    read = np.flatnonzero(data.has_position)
+    far = np.linalg.norm(data.position[read], axis=1)
+    measured = np.unique(data.configuration[read])
+    order = measured[np.argsort([np.median(far[data.configuration[read] == c]) for c in measured], kind="stable")]
+    n = len(order)
+    best, least = None, _FOLLOWS
+    for part in (order[: n // 2], order[n - n // 2 :], order[n // 4 : n - n // 4]):
+        if len(part) < _FEWEST_PLACED:
+            return None
+        mine = data.of_readings(data.has_position & np.isin(data.configuration, part))
+        farthest = float(np.abs(mine.position).max())
+        for by in (by for by in _UNITS if by * farthest <= FARTHEST or by <= 1.0):
+            placed = initial_frames(robot, replace(mine, position=by * mine.position))
+            predicted = _predicted(placed, data)[read]
+            apart = np.nanmedian(np.linalg.norm(predicted - np.nanmedian(predicted, axis=0), axis=1))
+            share = float(np.median(_gaps(data.position[read], predicted)) / apart) if apart > 0.0 else np.inf
+            if share < least:
+                best, least = placed, share
+    if best is None:
+        return None
+    for _ in range(_ROUNDS):
+        predicted = _predicted(best, data)
+        factor = factors_of(data.position, predicted, _allowed(data, predicted))
+        mended = replace(data, position=data.position * factor[:, None])
+        near = np.linalg.norm(mended.position - predicted, axis=1) <= _allowed(data, predicted)
+        best = initial_frames(robot, mended.of_readings(near & data.has_position))
+    return best
+
+
+def _predicted(placed: Robot, data: Dataset) -> Array:
+    """Return where the placed robot has the target of each reading [m], ``(readings, 3)``; NaN if it has none."""
+    predicted = np.full(data.position.shape, np.nan)
+    for target in placed.targets:
+        mine = data.target == data.targets.index(target.name)
+        predicted[mine] = placed.world_poses(data.postures, target.name)[0][data.configuration[mine]]
+    return predicted
+
+
+def _gaps(position: Array, predicted: Array) -> Array:
+    """Return how far off positions are in the unit that explains them best [m], ``(readings,)``."""
+    gaps = [np.linalg.norm(by * position - predicted, axis=1) for by in _UNITS]
+    return np.asarray(np.nan_to_num(np.min(gaps, axis=0), nan=np.inf))
+
+
+def _allowed(data: Dataset, predicted: Array) -> float:
+    read = data.has_position
+    return _ALLOWED * float(np.median(_gaps(data.position[read], predicted[read])))
+
+
+# How well a robot fits distances from points nobody measured, without a fit of the robot: quick enough to try slips.
+#
+# The place t of the target on the flange and the centres c are the only unknowns of ``|p_i + R_i t - c_f| = d_i``.
+# Places on a coarse grid around the flange, each with its centres in closed form, are starts; Levenberg's steps go on
+# from the best few of them at once.
+
+#: How far from the flange a target is looked for, and in what steps [m].
+_REACH: Final = 0.45
+_STEP: Final = 0.15
+#: Places that are gone on from, and steps.
+_PLACES_KEPT: Final = 12
+_STEPS: Final = 40
+#: A weak pull towards the start keeps what nothing determines where it is, beside readings of 1 m.
+_PULL: Final = 1e-6
+
+
+def quick_misfit(robot: Robot, data: Dataset) -> float | None:
+    """Return the median size of what the distances are off by [m], where targets and points fit best.
+
+    Each target has points of its own, and what is known of the distances between them does not count: with it they are
+    off by more. None unless readings are distances of targets from points nobody measured, and nothing else.
+
+    Args:
+        robot: Nominal; its base is the world, and its own targets do not count.
+    """
+    distance = _distances_alone(data)
+    if distance is None:
+        return None
+    p, R = robot.world_poses(data.postures)
+    off = []
+    for target in np.unique(data.target).tolist():
+        mine = np.flatnonzero(data.target == target)
+        _, of = np.unique(data.against[mine], return_inverse=True)
+        where = data.configuration[mine]
+        off.append(_off_by(p[where], R[where], of, distance[mine]))
+    return float(np.median(np.abs(np.concatenate(off))))
+
+
+def _distances_alone(data: Dataset) -> Array | None:
+    """Return the distances if readings are distances of targets from points nobody measured, and nothing else."""
+    if (
+        data.fixture is not None
+        and data.distance is not None
+        and data.height is None
+        and data.quaternion is None
+        and not data.has_position.any()
+        and (data.setup is None or not data.setup.has_position.any())
+        and bool((np.isfinite(data.distance) & (data.against >= 0)).all())
+    ):
+        return data.distance
+    return None
+
+
+def _off_by(p: Array, R: Array, of: NDArray[np.intp], d: Array) -> Array:
+    """Return what the distances of one target are off by [m], ``(n,)``; `of` is the point of each."""
+    steps = np.arange(-_REACH, _REACH + 1e-9, _STEP)
+    grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    tips = p + np.einsum("nij,gj->gni", R, grid)
+    centres, cost = np.empty((len(grid), int(of.max()) + 1, 3)), np.zeros(len(grid))
+    for index in range(centres.shape[1]):
+        mine = of == index
+        centres[:, index] = centres_of(tips[:, mine], d[mine])
+        cost += np.sum((np.linalg.norm(tips[:, mine] - centres[:, index, None], axis=2) - d[mine]) ** 2, axis=1)
+    best = np.argsort(cost)[:_PLACES_KEPT]
+    settled = np.abs(_settled(p, R, of, d, grid[best], centres[best]))
+    return np.asarray(settled[np.argmin(np.median(settled, axis=1))])
+
+
+def _settled(p: Array, R: Array, of: NDArray[np.intp], d: Array, target: Array, centres: Array) -> Array:
+    """Return what is left of the distances ``(starts, n)`` [m] where steps from the starts end."""
+    starts, fixtures, _ = centres.shape
+    one = np.eye(fixtures)[of]
+    damping = np.full(starts, 1e-3)
+
+    def seen(target: Array, centres: Array) -> tuple[Array, Array]:
+        away = p + np.einsum("nij,gj->gni", R, target) - centres[:, of]
+        far = np.linalg.norm(away, axis=2)
+        return far - d, away / np.maximum(far, 1e-12)[..., None]
+
+    off, along = seen(target, centres)
+    for _ in range(_STEPS):
+        by_target = np.einsum("gni,nij->gnj", along, R)
+        by_centres = -(one[None, :, :, None] * along[:, :, None, :]).reshape(starts, len(d), -1)
+        J = np.concatenate([by_target, by_centres], axis=2)
+        transposed = J.swapaxes(1, 2)
+        normal = transposed @ J
+        size = normal.diagonal(axis1=1, axis2=2)
+        normal = normal + np.eye(normal.shape[1]) * (damping[:, None] * size + _PULL)[:, None, :]
+        step = -np.linalg.solve(normal, transposed @ off[..., None])[..., 0]
+        there, centred = target + step[:, :3], centres + step[:, 3:].reshape(centres.shape)
+        now_off, now_along = seen(there, centred)
+        better = (now_off**2).sum(axis=1) < (off**2).sum(axis=1)
+        damping = np.where(better, np.maximum(damping / 10, 1e-9), np.minimum(damping * 10, 1e6))
+        if not better.any() or np.abs(step).max() < 1e-7:
+            break
+        target, centres = np.where(better[:, None], there, target), np.where(better[:, None, None], centred, centres)
+        off = np.where(better[:, None], now_off, off)
+        along = np.where(better[:, None, None], now_along, along)
+    return off
+
+
+#: A nominal robot that is placed better than this needs no explanation [m].
+_PLACED_WITHIN: Final = 3e-3
+_PLACED_WITHIN_BY_FIXTURES: Final = 6e-3
+#: Distances that are off by so many times that at the least are not looked at more closely.
+_PLAINLY_OFF: Final = 2.0
+#: Share of the rows that stay, beside others in another unit: fewer of a campaign are about zero by chance.
+_MANY_ROWS: Final = 0.05
+#: A slip explains the data if they fit this many times better with it mended.
+_LEAST_IMPROVEMENT: Final = 4.0
+#: Beside a slip whose mending makes the data fit this many times better, nothing else is wrong.
+_PLAIN_IMPROVEMENT: Final = 20.0
+#: A simpler slip is preferred to one that fits this many times better: mirrored readings and the opposite signs of
+#: joints 1, 4 and 6 are the same for an arm that is its own mirror image, up to its errors.
+_AS_GOOD: Final = 1.5
+#: Configurations looked at; more tell nothing new.
+_CONFIGURATIONS_TRIED: Final = 60
+#: Targets looked at, those that were read most often.
+_TARGETS_TRIED: Final = 10
+#: A campaign moves some joint by more than this [rad or m].
+_LEAST_TRAVEL: Final = 0.3
+#: Share of the spread of the readings that is left where these do not follow the joints; chance leaves 0.6 or more.
+_UNRELATED: Final = 0.3
+#: Orders of the rows that are drawn to see how well readings fit that have nothing to do with the joints, and how
+#: much better than the best of these data must fit that follow them.
+_ORDERS_DRAWN: Final = 19
+_ALIKE: Final = 0.8
+#: A campaign is at least so large, over what an arm lets it be at most.
+_LEAST_OF_REACH: Final = 0.02
+#: No target is farther from the flange [m].
+_LARGEST_TOOL: Final = 2.0
+#: Weight of readings against priors where slips are judged by a fit [m or rad].
+_FITTED_NOISE: Final = 1e-4
+
+
+def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return which slip explains positions in the instrument's frame; nothing if they fit, or if none does."""
+    data, robot = _few_targets(data), robot.with_frames(Transform(), {})  # made once for all that is tried
+    turned = orientation_slips(robot, _some(data))
+    some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
+    some = replace(some, quaternion=None, sigma_rot=None)
+    seen = [t for t in range(len(some.targets)) if _seen(some, t)]
+    errors = placed_errors(robot, [_only(some, t) for t in seen])
+    misfit = {t: float(np.median(off)) for t, off in zip(seen, errors, strict=True)}
+    least = min(misfit.values())
+    bad = [t for t, size in misfit.items() if size > max(_PLACED_WITHIN, _LEAST_IMPROVEMENT * least)]
+    if not bad and least <= _PLACED_WITHIN:
+        return turned
+    rows = _best(robot, some, (replace(slip, data=_some(slip.data)) for slip in mixed_length_slips(robot, rest)))
+    if rows is not None:
+        return [rows.notice]
+    if not bad:
+        best = _best(
+            robot,
+            some,
+            _simple_slips(robot, rest),
+            lambda: [slip for size in (2, 3) for slip in as_noted(robot, some, partial(sign_slips, size=size))],
+        )
+        if best is not None:
+            return [best.notice]
+        return turned or _two_slips(robot, rest) or _beyond_reach(robot, some) or _unrelated(robot, some)
+    # The other targets fit with the same joints, so these are right.
+    found = []
+    for t in bad:
+        only = _only(some, t)
+        best = _best(robot, only, [*length_slips(only), *mirrored(only), *scale_slips(robot, only)])
+        if best is not None:
+            found.append(Notice(best.code, f"Target {some.targets[t]}: {best.words}.", "error"))
+    return [*turned, *found] or _beyond_reach(robot, some)
+
+
+def _two_slips(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if lengths in another unit and one slip more explain the data: a unit alone is told by no size."""
+    some = _some(data)
+    if _size_over_reach(robot, some) <= 1.0:
+        return []
+    for lengths in length_slips(some):
+        mended = next(slip.data for slip in length_slips(data) if slip.words == lengths.words)
+        if not _LEAST_OF_REACH < _size_over_reach(robot, lengths.data) <= 1.0:
+            continue
+        best = _best(robot, lengths.data, _simple_slips(robot, mended))
+        if best is not None:
+            return [lengths.notice, best.notice]
+    return []
+
+
+def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+    """Try everything but several slips at once, the simplest first."""
+    some = _some(data)
+    yield from length_slips(some)
+    yield from _angle_slips(robot, some)
+    yield from controller_slips(robot, some)
+    yield from mirrored(some)
+    yield from as_noted(robot, some, sign_slips)
+    yield from as_noted(robot, some, order_slips)
+    yield from (replace(slip, data=_some(slip.data)) for slip in shifted(data))
+    yield from scale_slips(robot, some)
+
+
+def _angle_slips(robot: Robot, data: Dataset) -> list[Slip]:
+    """Try other units of angle, of some rows first where only these can be in it, and the others are many enough."""
+    whole, some = (list(as_noted(robot, data, slips)) for slips in (angle_slips, mixed_angle_slips))
+    first = [slip for slip in some if (slip.data.joints == data.joints).all(axis=1).mean() > _MANY_ROWS]
+    return [*first, *whole, *(slip for slip in some if slip not in first)]
+
+
+def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[[], list[Slip]] = list) -> Slip | None:
+    """Return the simplest slip that explains the data, None if none does.
+
+    Args:
+        several: Several slips at once, tried where none alone makes the data fit as if nothing else were wrong.
+    """
+    tried = list(slips)
+    if not tried:
+        return None
+    given = _misfit(robot, data) / _spread(data)
+    shares = _shares(robot, tried)
+    if min(shares) * _PLAIN_IMPROVEMENT > given:
+        more = several()
+        tried += more
+        shares += _shares(robot, more)
+    least = min(shares)
+    best = next(slip for slip, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
+    return best if least * _LEAST_IMPROVEMENT < given else None
+
+
+def _shares(robot: Robot, slips: Sequence[Slip]) -> list[float]:
+    """Return how badly each slip fits in proportion to how far its readings lie apart."""
+    errors = placed_errors(robot, [slip.data for slip in slips])
+    return [float(np.median(off)) / _spread(slip.data) for off, slip in zip(errors, slips, strict=True)]
+
+
+def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return the first slip that explains readings against fixtures: turned about, several may fit alike."""
+    size = _misfit(robot, data)
+    if size <= _PLACED_WITHIN_BY_FIXTURES:
+        return []
+    for slip in (
+        *length_slips(data),
+        *_angle_slips(robot, data),
+        *controller_slips(robot, data),
+        *as_noted(robot, data, sign_slips),
+        *as_noted(robot, data, order_slips),
+    ):
+        travel, before = (np.ptp(one.joints, axis=0) for one in (slip.data, data))
+        less = travel < 0.5 * before
+        if min(travel.max(), travel[less].max(initial=0.0) if less.any() else np.inf) < _LEAST_TRAVEL:
+            continue  # an arm that hardly moves fits any fixture, and so does a joint that would hardly move
+        quick = quick_misfit(robot, slip.data)
+        if quick is not None and quick > _PLAINLY_OFF * _PLACED_WITHIN_BY_FIXTURES:
+            continue
+        mended = _misfit(robot, slip.data)
+        if mended <= _PLACED_WITHIN_BY_FIXTURES and _LEAST_IMPROVEMENT * mended / _spread(slip.data) < size / _spread(
+            data
+        ):
+            return [slip.notice]
+    return [
+        Notice(
+            "fixtures-unlikely",
+            "The nominal robot does not fit the readings against fixtures. Half of them are off by more than "
+            f"{size * 1e3:.3g} mm, with base, targets and fixtures where they fit best. Check that the rows name the "
+            "right fixtures, and the places in the rows of the role fixture.",
+        )
+    ]
+
+
+def slips_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return the joint whose opposite sign, or the mirror image that, explains what a fit leaves over.
+
+    The targets may be so near the axis of the last joint, or the campaign so narrow, that the placed nominal robot
+    hardly sees it. So one step of the geometric fit from there is judged, which takes out what the robot's own errors
+    explain.
+    """
+    some = _some(replace(_few_targets(data), quaternion=None, sigma=None, sigma_rot=None))
+    given = _fitted_misfit(robot, some)
+    tries = [*controller_slips(robot, some), *mirrored(some), *as_noted(robot, some, sign_slips)]
+    tried = [(_fitted_misfit(robot, slip.data), slip) for slip in tries]
+    least = min(left for left, _ in tried)
+    slip = next(slip for left, slip in tried if left <= _AS_GOOD * least)
+    return [slip.notice] if least * _LEAST_IMPROVEMENT < given else []
+
+
+def _fitted_misfit(robot: Robot, data: Dataset) -> float:
+    """Return the root mean square that one step of the geometric fit from the placed nominal robot leaves [m]."""
+    model = named_model("geometric")
+    start = initial_frames(model.prepared(robot), data)
+    noise = {observation.name: _FITTED_NOISE for observation in OBSERVATIONS}
+    problem = Problem(start, data, model.free(start), noise)
+    r, J = problem.linearised(problem.free.start)
+    prior, weight = problem.prior_rows(problem.free.start)
+    step = np.linalg.lstsq(np.concatenate([J, np.diag(weight)]), -np.concatenate([r, prior]), rcond=None)[0]
+    return float(np.sqrt(np.mean((r + J @ step) ** 2))) * _FITTED_NOISE
+
+
+def _misfit(robot: Robot, data: Dataset) -> float:
+    """Return the median distance that the placed nominal robot leaves [m]; infinite if it cannot be placed."""
+    if data.fixture is None:
+        return float(np.median(placed_errors(robot, [data])[0]))
+    try:
+        return float(np.nanmedian(off_by(errors_of(start_from_readings(robot, data), data))))
+    except InputError:
+        return math.inf
+
+
+def off_by(errors: Errors) -> Array:
+    """Return how far off each position, distance or height is [m], NaN where there is none."""
+    off: Array = np.linalg.norm(errors.position_errors, axis=1)
+    return off if errors.length_errors is None else np.where(np.isfinite(off), off, np.abs(errors.length_errors))
+
+
+def _spread(data: Dataset) -> float:
+    """Return how far the readings lie apart [m]: positions that shrink fit better, but not in proportion."""
+    if data.fixture is not None:
+        counted = [data.position, *(v[:, None] for v in (data.distance, data.height) if v is not None)]
+        return float(np.sqrt(np.nanmean(np.concatenate([v.reshape(-1) for v in counted]) ** 2))) + 1e-3
+    return float(np.sqrt(np.mean(np.var(data.position[data.has_position], axis=0)))) + 1e-12
+
+
+def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if readings lie so far apart that no arm of this size was read, in whatever frame."""
+    if _size_over_reach(robot, data) <= 1.0:
+        return []
+    return [
+        Notice(
+            "unit-length",
+            f"The positions lie up to {_apart(data):.3g} m from the middle of all, where the arm reaches "
+            f"{_reach(robot, data):.2g} m. No one unit makes them fit: some of their numbers are in another unit or "
+            "lost their decimal point or comma, or more is wrong with the data than that.",
+            "error",
+        )
+    ]
+
+
+def _size_over_reach(robot: Robot, data: Dataset) -> float:
+    """Return how far readings lie apart, over what an arm of this size lets them at most."""
+    return _apart(data) / (2.0 * (_reach(robot, data) + _LARGEST_TOOL))
+
+
+def _apart(data: Dataset) -> float:
+    read = data.position[data.has_position]
+    return float(np.linalg.norm(read - np.median(read, axis=0), axis=1).max())
+
+
+def _reach(robot: Robot, data: Dataset) -> float:
+    return float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
+
+
+def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if the readings fit the joints no better than in an order that is drawn."""
+    given = _misfit(robot, data)
+    if given < _UNRELATED * _spread(data):
+        return []
+    half = data.configurations // 2
+    for part in (data.of_configurations(np.arange(half)), data.of_configurations(np.arange(half, data.configurations))):
+        if part.has_position.any() and _misfit(robot, part) * _LEAST_IMPROVEMENT < given:
+            return []  # the robot or the instrument stands elsewhere in the other half
+    rng = np.random.default_rng(0)
+    drawn = (replace(data, joints=rng.permutation(data.joints)) for _ in range(_ORDERS_DRAWN))
+    if any(_ALIKE * _misfit(robot, other) <= given for other in drawn):
+        return [
+            Notice(
+                "rows-unrelated",
+                "The readings do not follow the joint positions: in an order drawn at random they fit the robot as "
+                "well. Check that joint positions and readings are of the same campaign, and row by row of the same "
+                "configuration.",
+                "error",
+            )
+        ]
+    return []
+
+
+# -- parts of the data -------------------------------------------------------------------------------------
+
+
+def _some(data: Dataset) -> Dataset:
+    if data.configurations <= _CONFIGURATIONS_TRIED:
+        return data
+    return data.of_configurations(np.linspace(0, data.configurations - 1, _CONFIGURATIONS_TRIED).astype(np.intp))
+
+
+def _few_targets(data: Dataset) -> Dataset:
+    """Return the data of the targets that were read most often."""
+    if len(data.targets) <= _TARGETS_TRIED:
+        return data
+    often = np.argsort(-np.bincount(data.target[data.has_position], minlength=len(data.targets)), kind="stable")
+    return data.of_readings(np.isin(data.target, often[:_TARGETS_TRIED]))
+
+
+def _only(data: Dataset, target: int) -> Dataset:
+    kept = (data.target == target) & data.has_position
+
+    some = data.of_readings(kept)
+    return replace(some, target=np.zeros(len(some.target), dtype=np.intp), targets=(data.targets[target],))
+
+
+def _seen(data: Dataset, target: int) -> bool:
+    return bool((data.has_position & (data.target == target)).any())

@@ -1,0 +1,169 @@
+"""A page of a few sentences, tables and pictures: what results have that need no page of their own kind."""
+
+from __future__ import annotations
+
+import json
+import platform
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version as installed_version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
+
+from truearm.engine.base.errors import (
+    LONGEST_WORD,
+    TURNING,
+    Notice,
+    printable,
+    shortened,
+    with_short_words,
+    worst_first,
+)
+from truearm.engine.base.units import parts_of, said_of, without_mark
+from truearm.engine.base.version import __version__
+from truearm.engine.document.drawing import AFTER, BEFORE, DARK, Figure
+
+# One HTML file that needs nothing else, not even a network: style, scripts and data are inside.
+
+#: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
+_UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
+#: Part of a text, and of nothing else that JSON has.
+_LONG_WORD: Final = re.compile(rf'[^\s"\\,:\[\]{{}}]{{{LONGEST_WORD + 1},}}')
+
+
+def page(template: Path, figures: Mapping[str, Figure], of: object, **content: Any) -> str:
+    """Return a page.
+
+    Args:
+        template: A template; it includes ``style.css.jinja`` and ``script.html.jinja`` of this room.
+        figures: Pictures by the name of their place on the page.
+        of: The record that it tells about: if that is simulated, the page begins with it.
+        content: What the template tells about.
+    """
+    return _template(template).render(
+        **content,
+        mark=said_of(parts_of([of])),
+        drawn=set(figures),
+        heights={name: figure["layout"]["height"] for name, figure in figures.items()},
+        figures=Markup(json_for_script(figures)),
+        plotly=Markup(_plotly()),
+        versions={
+            "truearm": __version__,
+            "Python": platform.python_version(),
+            "NumPy": np.__version__,
+            "SciPy": installed_version("scipy"),
+        },
+        colours={"before": BEFORE, "after": AFTER},
+        dark_colours=Markup(json_for_script(DARK)),
+    )
+
+
+@cache
+def _template(path: Path) -> Template:
+    """Return a template, compiled once."""
+    return _environment().from_string(path.read_text("utf-8"))
+
+
+@cache
+def _environment() -> Environment:
+    """Return what reads the templates, each of which it compiles once."""
+    environment = Environment(
+        loader=PackageLoader("truearm.engine.document", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_shown,
+    )
+    environment.filters["with_code"] = with_code
+    return environment
+
+
+def _shown(value: object) -> object:
+    """Return what a template puts on the page: of texts that come from files, only what can be seen."""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return with_short_words(printable(value))
+    return value
+
+
+def with_code(text: str) -> Markup:
+    """Return a text for a page: what is in backticks, parameters and values, as code."""
+    plain = str(escape(with_short_words(printable(text))))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", plain))
+
+
+def json_for_script(value: object) -> str:
+    """Return JSON that can stand inside a script element whatever its texts hold."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    text = _LONG_WORD.sub(lambda found: shortened(found[0], LONGEST_WORD), text)
+    return text.translate(_UNSAFE | {ord(c): f"\\\\u{ord(c):04x}" for c in TURNING})
+
+
+def _plotly() -> str:
+    """Return Plotly's own script, which its package brings along."""
+    return (files("plotly") / "package_data" / "plotly.min.js").read_text("utf-8")
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A picture on a page."""
+
+    name: str  #: Of its place on the page.
+    title: str  #: title, words: above it.
+    words: str
+    figure: Figure  #: What is drawn.
+
+
+@dataclass(frozen=True)
+class Figures:
+    """A table on a page."""
+
+    title: str  #: Above it.
+    heading: tuple[str, ...]  #: Names of the columns; those after the first are numbers, if they are not in `texts`.
+    rows: tuple[tuple[str, ...], ...]  #: Its cells, row by row.
+    texts: tuple[int, ...] = ()  #: Columns of words, from 0, whose cells go on in another line where there is no room.
+
+
+def picture_page(
+    title: str,
+    subtitle: str,
+    words: Sequence[str],
+    command: str,
+    of: object,
+    *,
+    pictures: Sequence[Drawing],
+    tables: Sequence[Figures] = (),
+    details: Sequence[Figures] = (),
+    notices: Sequence[Notice] = (),
+) -> str:
+    """Return the page.
+
+    Args:
+        title, subtitle: At its head.
+        words: What was found, a sentence each.
+        command: How to run it again.
+        of: The record that it tells about.
+        pictures, tables: What is shown.
+        details: Tables below the pictures.
+        notices: What to know about the result.
+    """
+    return page(
+        Path(__file__).with_name("pictures.html.jinja"),
+        {picture.name: picture.figure for picture in pictures},
+        of,
+        title=title,
+        subtitle=subtitle,
+        words=without_mark(words),
+        command=command,
+        pictures=pictures,
+        tables=tables,
+        details=details,
+        notices=worst_first(notices),
+    )

@@ -1,0 +1,179 @@
+"""Measurements that came from files of other programs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from truearm.engine.base.errors import Notice, as_html, counted, short_text, worst_first
+from truearm.engine.base.units import Marked, parts_of, with_mark
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.controller import JointsOf
+
+# What every result is: figures with a short text of their own.
+
+
+class Record(ABC):
+    """A result that a person can read: its text is what the command prints, its summary what JSON holds.
+
+    Where it holds data or a robot that are simulated, both begin with that, whatever the record's own class returns.
+    """
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        for name, marked in (("lines", _marked_lines), ("summary", _marked_summary)):
+            if name in vars(cls):
+                setattr(cls, name, marked(vars(cls)[name]))
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """What of it comes from a virtual instrument: ``data``, ``robot``, both or nothing.
+
+        A record that holds neither has a field ``simulated_from`` instead.
+        """
+        return parts_of(getattr(self, one.name) for one in fields(self))  # type: ignore[arg-type]
+
+    @abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as JSON holds them, units in the names."""
+
+    @abstractmethod
+    def lines(self) -> list[str]:
+        """Return the result in words and figures, line by line, as the command prints it."""
+
+    def __repr__(self) -> str:
+        return short_text(self.lines())
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self))
+
+
+def _marked_lines(lines: Callable[[Any], list[str]]) -> Callable[[Any], list[str]]:
+    @wraps(lines)
+    def marked(record: Record) -> list[str]:
+        return with_mark(lines(record), record.simulated_from)
+
+    return marked
+
+
+def _marked_summary(summary: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[str, Any]]:
+    @wraps(summary)
+    def marked(record: Record) -> dict[str, Any]:
+        parts, content = record.simulated_from, summary(record)
+        if not parts:
+            return content
+        schema = {name: content[name] for name in ("truearm",) if name in content}
+        return {**schema, "simulated": True, "simulated_parts": [*parts], **content}
+
+    return marked
+
+
+def joints_lines(joints_are: JointsOf) -> list[str]:
+    """Return what is to know about joint positions in files that are not the model's; nothing of those that are."""
+    if joints_are == "model":
+        return []
+    return ["Joint positions in the file are those that the robot's controller shows (axis_i)."]
+
+
+def notice_lines(notices: Sequence[Notice]) -> list[str]:
+    """Return what to know about a result, one line each, the worst first."""
+    return [f"{notice.level.capitalize()} ({notice.code}): {notice.message}" for notice in worst_first(notices)]
+
+
+def notice_summaries(notices: Sequence[Notice]) -> list[dict[str, str]]:
+    """Return what to know about a result as JSON holds it, the worst first."""
+    return [notice.summary() for notice in worst_first(notices)]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Imported(Record):
+    """Measurements that came from files of other programs."""
+
+    data: Dataset  #: The measurements.
+    out: Path | None = None  #: The canonical CSV file that holds them; None if none was written.
+    #: How many readings are missing of each point, where the file has places for them.
+    missing: Mapping[str, int] = field(default_factory=dict)
+    warnings: tuple[Notice, ...] = ()  #: What the data cannot hold of the files.
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "configurations": self.data.configurations,
+            "targets": list(self.data.targets),
+            "missing": dict(self.missing),
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was read."""
+        where = "" if self.out is None else f": {self.out}"
+        many = counted(self.data.configurations, "configuration")
+        text = [f"{many}, targets {', '.join(self.data.targets)}{where}"]
+        text += [f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items()]
+        return text + notice_lines(self.warnings)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedRoboDK(Record):
+    """Measurements that came from a table of RoboDK."""
+
+    data: Dataset  #: The measurements.
+    tool_points: Array  #: Where each target is in the flange frame, as RoboDK was told [m], ``(targets, 3)``.
+    out: Path | None = None  #: The canonical CSV file that holds them; None if none was written.
+    missing: int = 0  #: How many readings are missing.
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "configurations": self.data.configurations,
+            "tool_points_mm": {
+                name: (1e3 * point).tolist() for name, point in zip(self.data.targets, self.tool_points, strict=True)
+            },
+            "missing": self.missing,
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was read."""
+        where = "" if self.out is None else f": {self.out}"
+        text = [f"{counted(self.data.configurations, 'configuration')}{where}"]
+        for name, point in zip(self.data.targets, self.tool_points, strict=True):
+            text.append(f"  target {name}: tool point ({', '.join(f'{1e3 * v:g}' for v in point)}) mm")
+        return text + ([f"  {self.missing} missing {_nouns('reading', self.missing)}"] if self.missing else [])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedCircles(Record):
+    """Circles that a robot drew, as distances and heights."""
+
+    data: Dataset  #: The measurements.
+    pages: tuple[str, ...]  #: Names of the pages.
+    out: Path | None = None  #: The canonical CSV file that holds them; None if none was written.
+
+    @property
+    def gaps(self) -> int:
+        """How many distances are missing, where the line has gaps."""
+        return int(np.sum(~self.data.has_reading))
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {"configurations": self.data.configurations, "pages": list(self.pages), "missing": self.gaps}
+
+    def lines(self) -> list[str]:
+        """Return what was read."""
+        where = "" if self.out is None else f": {self.out}"
+        many = counted(self.data.configurations, "configuration")
+        text = [f"{many} on {counted(len(self.pages), 'page')}{where}"]
+        if self.gaps:
+            text.append(f"  {self.gaps} missing {_nouns('distance', self.gaps)}, where the line has gaps")
+        return text
+
+
+def _nouns(noun: str, count: int) -> str:
+    return noun if count == 1 else f"{noun}s"

@@ -1,0 +1,245 @@
+"""Figures as JSON and the command show them, in mm and mrad."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from truearm.engine.base.errors import counted, degrees, listed, millimetres
+from truearm.engine.base.units import from_si
+from truearm.engine.choosing.selection import Selection
+from truearm.engine.data.observations import OBSERVATIONS
+from truearm.engine.data.statistics import Errors, Spread
+from truearm.engine.diagnose.expected_error import Expectation, ExpectedError
+from truearm.engine.diagnose.gain import Repeatability
+from truearm.engine.fit.fit import Fit
+from truearm.engine.fit.refit import Refit
+from truearm.engine.robot.parts import Payload
+
+#: How configurations lie that are held out in blocks, in words.
+LAYOUT: Final = {
+    "path": "follow a path",
+    "grid": "lie on a grid",
+    "close": "lie close to each other",
+}
+#: What deviations of a bootstrap follow from, after their number.
+BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
+
+
+def selection_summary(selection: Selection) -> dict[str, Any]:
+    """Return how a model was chosen, as JSON holds it: errors in mm."""
+    return {
+        "geometric_mm": selection.geometric * 1e3,
+        "elastic_mm": None if selection.elastic is None else selection.elastic * 1e3,
+        "error_mm": selection.error * 1e3,
+        "layout": selection.layout,
+        "blocks": selection.blocks,
+        "candidates": [
+            {
+                "effect": one.effect,
+                "taken": one.taken,
+                "gain_mm": None if one.gain is None else one.gain.mean * 1e3,
+                "standard_error_mm": None if one.gain is None else one.gain.error * 1e3,
+                "reason": one.reason,
+            }
+            for one in selection.candidates
+        ],
+        "confirmations": [
+            {
+                "effects": list(one.effects),
+                "smaller": list(one.smaller),
+                "error_mm": one.error * 1e3,
+                "smaller_error_mm": one.smaller_error * 1e3,
+                "gain_mm": one.gain.mean * 1e3,
+                "standard_error_mm": one.gain.error * 1e3,
+            }
+            for one in selection.confirmations
+        ],
+        "lines": [
+            {
+                "joint": line.joint,
+                "periods": line.periods,
+                "aliases": list(line.aliases),
+                "amplitude_mdeg": math.degrees(line.amplitude) * 1e3,
+            }
+            for line in selection.lines
+        ],
+        "passed_over": [{"effects": list(effects), "status": status} for effects, status in selection.passed_over],
+    }
+
+
+def selection_lines(selection: Selection) -> list[str]:
+    """Return how a model was chosen, as the command prints it."""
+    text = [f"Chosen model: {selection.model.summary}"]
+    if selection.blocks:
+        text.append(
+            f"  judged on {selection.blocks} blocks of neighbours: the configurations {LAYOUT[selection.layout]}"
+        )
+    return text
+
+
+def errors_summary(errors: Errors) -> dict[str, Any]:
+    """Return error statistics in mm and mrad, as JSON holds them."""
+    made: dict[str, Any] = {"configurations": errors.configurations}
+    for key, spread, scale in (
+        ("position_mm", errors.position, 1e3),
+        ("orientation_mrad", errors.orientation, 1e3),
+        ("length_mm", errors.length, 1e3),
+    ):
+        if spread is not None:
+            made[key] = _scaled(spread, scale)
+    return made
+
+
+def refit_summary(found: Refit) -> dict[str, Any]:
+    """Return what was found anew, as JSON holds it, in mm and deg."""
+    return {
+        "moved": found.moved,
+        "readings": found.readings,
+        "parameters": found.parameters,
+        "shift_mm": found.shift * 1e3,
+        "turn_deg": None if found.turn is None else math.degrees(found.turn),
+        "shifts_mm": {name: shift * 1e3 for name, shift in found.shifts.items()},
+    }
+
+
+def refit_lines(found: Refit) -> list[str]:
+    """Return what was found anew, by how much it moved, and what that means for the errors."""
+    from_these = f"found anew from {counted(found.readings, 'reading')} ({counted(found.parameters, 'number')})"
+    turned = "" if found.turn is None else f" and turned by {degrees(found.turn)} deg"
+    moved = f"moved by {millimetres(found.shift)} mm"
+    each = listed([f"{name} {millimetres(shift)}" for name, shift in found.shifts.items()])
+    words = {
+        "base": f"The base was {from_these}: the readings {moved} at their middle{turned}.",
+        "tool": f"The tool was {from_these}: it {moved} at the middle of its targets{turned}.",
+        "targets": f"The targets were {from_these}; they moved on the flange by (mm): {each}.",
+    }
+    if found.moved == "base" and found.shifts:
+        words["base"] = f"The fixtures were {from_these}; they moved before the base by (mm): {each}."
+    return [words[found.moved], "The errors of each configuration are those of what is found without it."]
+
+
+def joint_error_text(fit: Fit) -> str:
+    """Return what readings of a configuration share as an error of each joint, empty if nothing; by kind of joint."""
+    found = dict[str, list[float]]()
+    for joint, error in zip(fit.robot.joints, fit.joint_error.tolist(), strict=True):
+        if error > 0.0:
+            found.setdefault("deg" if joint.kind == "revolute" else "mm", []).append(error)
+    shown = [f"{from_si(max(errors), unit):.2g} {unit}" for unit, errors in found.items()]
+    return " and ".join(shown)
+
+
+def noise_summary(fit: Fit, again: Repeatability | None) -> dict[str, Any]:
+    """Return the deviations of readings and joints, as JSON holds them: mm, mrad and deg.
+
+    That of the joints is one for all of a kind, as it is estimated.
+    """
+    units = {observation.name: observation.unit for observation in OBSERVATIONS}
+    of_kind: dict[str, list[int]] = {}
+    for number, joint in enumerate(fit.robot.joints, 1):
+        of_kind.setdefault(joint.kind, []).append(number)
+    return {
+        "sigma": {f"{name}_{'mm' if units[name] == 'm' else 'mrad'}": value * 1e3 for name, value in fit.sigma.items()},
+        "declared": fit.declared,
+        "excess": fit.excess,
+        "joint_error": [
+            {
+                "kind": kind,
+                "joints": joints,
+                "unit": (unit := "deg" if kind == "revolute" else "mm"),
+                "deviation": from_si(float(fit.joint_error[joints[0] - 1]), unit),
+            }
+            for kind, joints in of_kind.items()
+        ],
+        "scattered": fit.scattered,
+        **({"bootstrap": fit.bootstrap} if fit.bootstrap else {}),
+        "repeatability": None
+        if again is None
+        else {"rp_mm": again.rp * 1e3, "postures": again.postures, "visits": again.visits},
+    }
+
+
+def noise_lines(fit: Fit, again: Repeatability | None) -> list[str]:
+    """Return what readings of a configuration share, and how well the robot comes back, as lines."""
+    shared = joint_error_text(fit)
+    lines = []
+    if shared:
+        lines.append(
+            f"Shared by the readings of a configuration: errors of the joints of {shared}, repeatability plus what the "
+            "model leaves"
+        )
+    if fit.bootstrap:
+        lines.append(f"Deviations of the parameters: from {fit.bootstrap} {BOOTSTRAPPED}")
+    if again is not None:
+        lines.append(
+            f"Repeatability at {counted(again.postures, 'posture')} visited again, as RP of ISO 9283 but pooled over "
+            f"them and without the instrument's noise: {again.rp * 1e3:.2g} mm"
+        )
+    return lines
+
+
+def _scaled(spread: Spread, scale: float) -> dict[str, float]:
+    return {
+        "mean": spread.mean * scale,
+        "rms": spread.rms * scale,
+        "p95": spread.p95 * scale,
+        "max": spread.max * scale,
+    }
+
+
+def error_line(errors: Errors) -> str:
+    """Return the statistics of one set of errors as a line."""
+    parts = []
+    kinds = ((errors.position, "mm"), (errors.orientation, "mrad"), (errors.length, "mm of length"))
+    for spread, unit in kinds:
+        if spread is not None:
+            mean, rms, p95, largest = (value * 1e3 for value in (spread.mean, spread.rms, spread.p95, spread.max))
+            parts.append(f"mean {mean:.3f}  rms {rms:.3f}  95 % {p95:.3f}  max {largest:.3f} {unit}")
+    return "   ".join(parts) if parts else "no readings"
+
+
+def expected_summary(expected: ExpectedError) -> dict[str, Any]:
+    """Return the error to expect over the workspace in mm, as JSON holds it."""
+    return {
+        **_expectation(expected.overall, expected.lower_bound),
+        "lower_bound": expected.lower_bound,
+        "omissions": list(expected.omissions),
+        "targets": {
+            name: _expectation(of_target, expected.lower_bound) for name, of_target in expected.targets.items()
+        },
+        "frame": expected.frame,
+        "payload": payload_words(expected.payload),
+    }
+
+
+def _expectation(of: Expectation, lower_bound: bool) -> dict[str, Any]:
+    low, high = (end * 1e3 for end in of.interval_90)
+    return {"mean": of.mean * 1e3, "p95": of.p95 * 1e3, "interval_90": [low, None if lower_bound else high]}
+
+
+def expected_lines(expected: ExpectedError) -> list[str]:
+    """Return the error to expect over the workspace in words."""
+    mean, p95, low, high = (
+        figure * 1e3 for figure in (expected.overall.mean, expected.overall.p95, *expected.overall.interval_90)
+    )
+    places = max(3, -math.floor(math.log10(max(mean, 1e-6))) + 1)
+    if expected.lower_bound:
+        figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} or more), 95 % {p95:.{places}f} mm"
+    else:
+        figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), 95 % below {p95:.{places}f} mm"
+    lines = [f"Expected over the workspace: mean {figures}; {expected_of(expected)}"]
+    if expected.lower_bound:
+        lines.append(f"  may be larger: {'; '.join(expected.omissions)}")
+    return lines
+
+
+def expected_of(expected: ExpectedError) -> str:
+    """Return what the error to expect is one of: targets, frame and payload."""
+    names = [*expected.targets]
+    targets = f"{'target' if len(names) == 1 else 'targets'} {listed(names)}"
+    return f"{targets} in {expected.frame}, {payload_words(expected.payload)}"
+
+
+def payload_words(payload: Payload) -> str:
+    """Return what the robot carries."""
+    return f"payload {payload.mass:g} kg" if payload.mass else "no payload"

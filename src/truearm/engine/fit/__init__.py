@@ -1,0 +1,1 @@
+"""Identification: start values, the whitened problem, solver, losses, variance components, designs."""

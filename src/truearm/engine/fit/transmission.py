@@ -1,0 +1,212 @@
+"""Find gears that err periodically, in what a fit leaves over.
+
+The residuals of each joint are held against sines of its positions, one number of periods in a turn after the other: a
+periodogram on readings at uneven places (Lomb 1976, "Least-squares frequency analysis of unequally spaced data"). The
+strongest is taken out before the next one is looked for. A sine is looked for only where the readings could tell one of
+the size that gears have: a joint that hardly turns, or whose axis passes the only target, says nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.engine.base.errors import Notice, listed
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit.fit import Fit
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.robot import Robot
+
+#: Periods in a turn that are looked at; fewer than the first are the Fourier series' business.
+FEWEST: Final = 20
+_PERIODS: Final = np.arange(FEWEST, 401)
+#: A periodic error is believed if chance would show one as strong in any joint less often than this.
+_LARGEST_CHANCE: Final = 1e-3
+LEAST_CONFIGURATIONS: Final = 60  # configurations
+#: Largest standard deviation of an amplitude [rad] at which the readings see a gear; good ones err by less.
+_LARGEST_DEVIATION: Final = 5e-4
+#: Periods that a joint must pass through, or else a sine is the same as an offset or a gain.
+_LEAST_PERIODS: Final = 4.0
+#: Periods in a turn that are looked at for others that would look the same.
+_ALIASES: Final = np.arange(1, 1001)
+#: Share of a sine that another one has to follow to look the same, and how many are named.
+_SAME_WAVE: Final = 0.9
+_MOST_ALIASES: Final = 3
+
+
+@dataclass(frozen=True)
+class PeriodicError:
+    """A joint's residual that repeats."""
+
+    joint: int  #: Number of the joint, from 1.
+    periods: int  #: In a turn of the joint.
+    amplitude: float  #: Of the sine [rad].
+    share: float  #: Of the squared residuals that it explains.
+    chance: float  #: Probability that noise alone shows one as strong anywhere.
+    #: Other numbers of periods that look nearly the same at the positions that were measured, the nearest first.
+    aliases: tuple[int, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """What it is, in words."""
+        also = f" ({listed([str(n) for n in self.aliases])} would look the same)" if self.aliases else ""
+        return (
+            f"joint {self.joint} {self.periods} times in a turn{also}, "
+            f"by {np.rad2deg(self.amplitude) * 1e3:.1f} millidegrees"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Pulls:
+    """What residuals say of errors of the joints, summed over the readings of each configuration."""
+
+    joints: Array  #: Positions of the joints [rad or m], ``(n, joints)``.
+    #: pull, weight: j'r [m^2] and J'J [m^2], J the derivative by the joints, ``(n, joints)`` and ``(n, joints,
+    #: joints)``.
+    pull: Array
+    weight: Array
+    total: float  #: Sum of the squared residuals [m^2].
+    free: int  #: Equations beyond the parameters: targets of a configuration share its errors, and count as one.
+
+
+def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
+    """Return the periodic errors of joints whose gear the robot file does not describe, one a joint at most.
+
+    Args:
+        fit: What is left over is seen from it.
+        data: The readings it is held against; fewer than 60 configurations say nothing.
+    """
+    robot = fit.robot
+    if data.configurations < LEAST_CONFIGURATIONS or not data.has_position.any():
+        return ()
+    at = robot.loaded(data.postures)
+    count = len(robot.joints)
+    # Of each configuration, summed over its position readings: J'r and J'J by joints, r'r, and how many there are.
+    pull, weight = np.zeros((len(at), count)), np.zeros((len(at), count, count))
+    left, readings = np.zeros(len(at)), np.zeros(len(at))
+    for index, name in enumerate(data.targets):
+        mine = np.flatnonzero((data.target == index) & data.has_position)
+        where = data.configuration[mine]
+        kinematics = robot.forward_kinematics(at, name)
+        rate = kinematics.position_jacobian(robot.moving[:count])[..., where]
+        residual = data.position[mine].T - kinematics.position[:, where]
+        np.add.at(pull, where, np.einsum("jan,an->nj", rate, residual))
+        np.add.at(weight, where, np.einsum("jan,kan->njk", rate, rate))
+        np.add.at(left, where, (residual**2).sum(0))
+        np.add.at(readings, where, 1.0)
+    free = 3 * int((readings > 0).sum()) - len(fit.free.names)
+    return lines_of(robot, Pulls(at.joints, pull, weight, float(left.sum()), free))
+
+
+def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[PeriodicError, ...]:
+    """Return the periodic errors of a robot's joints whose gear it does not know, one a joint at most.
+
+    Fewer than 60 configurations say nothing.
+
+    Args:
+        fewest: Periods in a turn that are looked for, at least.
+    """
+    if len(pulls.joints) < LEAST_CONFIGURATIONS:
+        return ()
+    q, pull, weight, total, free = pulls.joints, pulls.pull.copy(), pulls.weight, pulls.total, pulls.free
+    open_joints = [
+        i for i, joint in enumerate(robot.joints) if joint.kind == "revolute" and joint.transmission_periods is None
+    ]
+    found: list[PeriodicError] = []
+    while open_joints:
+        noise = total / max(free, 1)
+        tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise, fewest), i) for i in open_joints]
+        explained, periods, a, b, joint = max(tried)
+        agreement = min(free * explained / total, _agreement(periods * q[:, joint], pull[:, joint]))
+        chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * agreement)
+        if chance >= _LARGEST_CHANCE:
+            break
+        wave = a * np.sin(periods * q[:, joint]) + b * np.cos(periods * q[:, joint])
+        aliases = _aliases(q[:, joint], wave, weight[:, joint, joint], periods)
+        found.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance, aliases))
+        pull -= weight[:, :, joint] * wave[:, None]
+        total -= explained
+        open_joints.remove(joint)
+    return tuple(sorted(found, key=lambda error: error.joint))
+
+
+def _strongest(q: Array, pull: Array, weight: Array, noise: float, fewest: int) -> tuple[float, int, float, float]:
+    """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad].
+
+    It explains nothing where the readings see none.
+
+    Args:
+        q: Positions of the joint [rad], ``(n,)``.
+        pull, weight: J'r [m^2] and J'J [m^2] of the joint, ``(n,)``.
+        noise: Variance of a coordinate of the residuals [m^2].
+        fewest: Periods in a turn that are looked for, at least.
+    """
+    among = _PERIODS[fewest - FEWEST :]
+    explained, a, b, least = _sines(q, pull, weight, among)
+    passed = among * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
+    seen = (least * _LARGEST_DEVIATION**2 > noise) & (passed > _LEAST_PERIODS)
+    explained = np.where(seen, explained, 0.0)
+    best = int(np.argmax(explained))
+    return float(explained[best]), int(among[best]), float(a[best]), float(b[best])
+
+
+def _sines(q: Array, pull: Array, weight: Array, periods: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
+    """Return what a sine of each number of periods explains [m^2], its two amplitudes [rad], and what is known of it.
+
+    The last is that of the phase that is known least [m^2]; where it is nothing, nothing is explained.
+    """
+    angle = periods[:, None] * q
+    s, c = np.sin(angle), np.cos(angle)
+    ss, sc, cc = (s * s) @ weight, (s * c) @ weight, (c * c) @ weight
+    ys, yc = s @ pull, c @ pull
+    least = 0.5 * (ss + cc) - np.hypot(0.5 * (ss - cc), sc)
+    known = least > 1e-9 * (ss + cc)
+    safe = np.where(known, ss * cc - sc * sc, 1.0)
+    a, b = (cc * ys - sc * yc) / safe, (ss * yc - sc * ys) / safe
+    return np.where(known, a * ys + b * yc, 0.0), a, b, least
+
+
+def _aliases(q: Array, wave: Array, weight: Array, periods: int) -> tuple[int, ...]:
+    """Return other numbers of periods whose sines pass through nearly the same values at the positions measured.
+
+    Args:
+        wave: What was found, ``(n,)``.
+        periods: In a turn; its neighbours, which the range of the joint does not tell from it, are not others.
+    """
+    explained = _sines(q, weight * wave, weight, _ALIASES)[0] / float(weight @ wave**2)
+    near = math.ceil(2.0 * math.pi / max(float(np.ptp(q)), 1e-3))
+    places = np.flatnonzero((explained >= _SAME_WAVE) & (np.abs(_ALIASES - periods) > near))
+    likest = np.argsort(-explained[places].round(6), kind="stable")  # of those that are the same the fewest periods
+    return tuple(_ALIASES[places[likest][:_MOST_ALIASES]].tolist())
+
+
+def _agreement(angle: Array, pull: Array) -> float:
+    """Return how far the pulls of all configurations agree on one sine, chi squared of two degrees by chance.
+
+    It takes the size of every pull as it is (White 1980, "A heteroskedasticity-consistent covariance matrix estimator
+    and a direct test for heteroskedasticity"). What a model cannot follow, the sag of a stretched arm for example, is
+    large at some configurations: a few of these agree on a sine far sooner than noise of one size does.
+    """
+    waves = np.stack([np.sin(angle), np.cos(angle)]) * pull
+    total = waves.sum(axis=1)
+    return float(total @ np.linalg.lstsq(waves @ waves.T, total, rcond=1e-10)[0])
+
+
+def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
+    """Return a notice if some joints err periodically."""
+    found = periodic_errors(fit, data)
+    if not found:
+        return []
+    told = "; ".join(error.words for error in found)
+    return [
+        Notice(
+            "transmission-error",
+            f"What is left over repeats with the joints' angles: {told}. Strain wave gears do that, twice in a turn "
+            "of their wave generator. `model=auto` tries to take the error out; any other model does with the effect "
+            "transmission-error, and transmission_periods of these joints in the robot file.",
+        )
+    ]

@@ -1,0 +1,220 @@
+"""Fake targets: what to write into a program so that the real robot goes where it says (Nubiola, 1.5).
+
+The controller believes in the nominal robot. It is sent to another pose: the one the nominal robot would have with the
+joint positions with which the calibrated robot reaches the wanted one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.inverse.pose_solver import JointSolutions, PoseStatus
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import homogeneous
+from truearm.engine.robot.ur_kinematics import controller_robot
+
+_OnBranch = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
+
+
+def nominal_robot(robot: Robot) -> Robot:
+    """Return the robot that the controller believes in: the table of the robot file, no joint effects, no base.
+
+    However often the robot was calibrated, the rows of its joints stay what they were; what was identified stands in
+    its parameters. A controller that computes with kinematics of its own, which are known, believes in those. The world
+    of the nominal robot is its base frame.
+
+    Raises:
+        InputError: If the robot is its nominal self, so that there is nothing to correct.
+    """
+    nominal = _nominal(robot)
+    controllers = controller_robot(nominal)
+    if not robot.effect_names and (_same_arm(robot, nominal) or _same_arm(robot, controllers)):
+        raise InputError(
+            "this robot is not calibrated: all its parameters are nominal, or those of its controller",
+            where=robot.name,
+            cure="Give the calibrated.yaml of truearm calibrate; a converted robot has lost its nominal values.",
+        )
+    return controllers
+
+
+def controllers_robot(robot: Robot) -> Robot:
+    """Return the robot that the controller believes in, also of one that was not calibrated."""
+    return controller_robot(_nominal(robot))
+
+
+def _nominal(robot: Robot) -> Robot:
+    return replace(
+        robot,
+        effect_names=(),
+        wrench=None,
+        base_quaternion=(1.0, 0.0, 0.0, 0.0),
+        known={},
+        targets=(),
+        fixtures=(),
+    )
+
+
+def _same_arm(robot: Robot, other: Robot) -> bool:
+    """Return whether an arm has the values of another one, wherever both stand."""
+    inside = (name for name, p in other.parameters.items() if p.group != "base")
+    return all(robot.values.get(name) == other.values[name] for name in inside)
+
+
+@dataclass(frozen=True, eq=False)
+class FakeTargets:
+    """Fake targets, one a pose."""
+
+    flange: Array  #: Where the nominal robot would have its flange in its base frame, ``(n, 4, 4)``: what to write.
+    #: Joint positions of the calibrated robot for the wanted poses, one row a pose, and how each was found.
+    solutions: JointSolutions
+
+    @property
+    def joints(self) -> Array:
+        """Joint positions with which the calibrated robot reaches the wanted poses [rad or m], ``(n, joints)``."""
+        return self.solutions.joints
+
+
+def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
+    """Return the fake targets of wanted poses.
+
+    Args:
+        robot: The calibrated robot, with its joint effects and payload.
+        flange: Wanted poses of the flange in the identified base frame, ``(n, 4, 4)`` [m], at least one.
+        near: Joint positions of the nominal robot at the wanted poses, ``(n, joints)`` [rad or m]: the answers are on
+            the same branch and in the same turns.
+
+    Raises:
+        InputError: If the robot is not calibrated or an array has the wrong shape.
+    """
+    nominal = nominal_robot(robot)
+    rule = branch_rule(robot)
+    position, rotation = flange[:, :3, 3], flange[:, :3, :3]
+    found = inverse(robot, position, rotation, seed=near)
+    if rule is None:
+        return FakeTargets(matrices(nominal, found.joints), found)
+    # The branch that counts is the controller's, of the nominal arm: next to a singular posture the calibrated arm may
+    # call the same joints by another name. So the nearest joints are taken, and all branches looked through where they
+    # are on another one.
+    wanted_branch = rule.numbers(nominal.forward_kinematics(near))
+
+    def on_branch(solutions: JointSolutions, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+        return np.asarray(rule.numbers(nominal.forward_kinematics(solutions.joints)) == wanted_branch[rows])
+
+    everyone = np.arange(len(flange))
+    # What is out of reach was looked for on all branches already.
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
+    missed = np.flatnonzero((~on_branch(found, everyone) | ~found.usable) & reached)
+    if len(missed):
+        again = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
+        found = _better(found, again, missed[again.pose], near, on_branch)
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
+    lost = np.flatnonzero(~on_branch(found, everyone) & reached)
+    for number in np.unique(wanted_branch[lost]).tolist():
+        rows = lost[wanted_branch[lost] == number]
+        again = inverse(robot, position[rows], rotation[rows], branch=BRANCHES[number], seed=near[rows])
+        found = _better(found, again, rows, near, on_branch)
+    same = on_branch(found, everyone)
+    status = []
+    for row, one in enumerate(found.status):
+        if one.usable and not same[row]:
+            status.append(PoseStatus.BRANCH_LOST)
+        elif one is PoseStatus.BRANCH_LOST and same[row]:  # only the calibrated arm calls it otherwise
+            status.append(PoseStatus.BEYOND_LIMIT if found.beyond[row].any() else PoseStatus.NEAR_SINGULAR)
+        else:
+            status.append(one)
+    branch = tuple(BRANCHES[number] for number in rule.numbers(nominal.forward_kinematics(found.joints)).tolist())
+    return FakeTargets(matrices(nominal, found.joints), replace(found, status=tuple(status), branch=branch))
+
+
+def fake_targets_of(robots: Sequence[Robot], which: NDArray[np.intp], flange: Array, near: Array) -> FakeTargets:
+    """Return the fake targets of wanted poses, for one calibrated robot with several loads.
+
+    Args:
+        robots: The robot with each load.
+        which: Index of the robot for each pose, ``(n,)``; `flange` and `near` as for :func:`fake_targets`.
+    """
+    if len(robots) == 1:
+        return fake_targets(robots[0], flange, near)
+    fakes, parts = np.empty_like(flange), []
+    for number in np.unique(which).tolist():
+        rows = np.flatnonzero(which == number)
+        found = fake_targets(robots[number], flange[rows], near[rows])
+        fakes[rows] = found.flange
+        parts.append((rows, found.solutions))
+    return FakeTargets(fakes, _merged(parts, len(flange)))
+
+
+def _better(
+    found: JointSolutions, again: JointSolutions, rows: NDArray[np.intp], near: Array, on_branch: _OnBranch
+) -> JointSolutions:
+    """Return solutions with others in their place that are on the branch where they are not, or can be used.
+
+    Args:
+        found: One solution a pose.
+        again, rows: Others, and the pose of each.
+        near: Joints to be near to, of every pose.
+        on_branch: Whether solutions of poses are on the branch of these.
+    """
+    agrees, usable = on_branch(again, rows), again.usable
+    away = np.abs(again.joints - near[rows]).max(axis=1)
+    order = np.lexsort((away, ~usable, ~agrees, rows))
+    best = order[np.unique(rows[order], return_index=True)[1]]
+    now = _picked(found, rows[best])
+    known, worked = on_branch(now, rows[best]), now.usable
+    best = best[agrees[best] & ~(known & worked) & (usable[best] | ~known)]
+    return _merged([(np.arange(len(near)), found), (rows[best], _picked(again, best))], len(near))
+
+
+def _picked(found: JointSolutions, rows: NDArray[np.intp]) -> JointSolutions:
+    """Return some solutions, one a pose."""
+    return replace(
+        found,
+        poses=len(rows),
+        pose=np.arange(len(rows)),
+        joints=found.joints[rows],
+        status=tuple(found.status[row] for row in rows.tolist()),
+        branch=tuple(found.branch[row] for row in rows.tolist()),
+        position_error=found.position_error[rows],
+        orientation_error=found.orientation_error[rows],
+        beyond=found.beyond[rows],
+        singular_value=found.singular_value[rows],
+    )
+
+
+def _merged(parts: list[tuple[NDArray[np.intp], JointSolutions]], count: int) -> JointSolutions:
+    """Return solutions ``(rows, solution of each)`` as those of all poses in their order; a later part counts more."""
+    place, offset = np.zeros(count, dtype=int), 0
+    for rows, _ in parts:
+        place[rows] = offset + np.arange(len(rows))
+        offset += len(rows)
+    every = [found for _, found in parts]
+
+    def joined(arrays: list[Array]) -> Array:
+        return np.asarray(np.concatenate(arrays)[place])
+
+    return JointSolutions(
+        poses=count,
+        pose=np.arange(count),
+        joints=joined([s.joints for s in every]),
+        status=tuple(np.concatenate([np.array(s.status, object) for s in every])[place].tolist()),
+        branch=tuple(np.concatenate([np.array(s.branch, object) for s in every])[place].tolist()),
+        position_error=joined([s.position_error for s in every]),
+        orientation_error=joined([s.orientation_error for s in every]),
+        beyond=np.concatenate([s.beyond for s in every])[place],
+        singular_value=joined([s.singular_value for s in every]),
+        joint_names=every[0].joint_names,
+    )
+
+
+def matrices(robot: Robot, joints: Array) -> Array:
+    """Return poses ``(n, 4, 4)`` [m] of the flange of a robot whose base is the world."""
+    position, rotation = robot.world_poses(joints)
+    return homogeneous(rotation, position)

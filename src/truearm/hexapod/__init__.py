@@ -1,0 +1,1 @@
+"""One ballbar between six cups: `truearm hexapod`."""

@@ -1,1 +1,0 @@
-"""From readings to the parameters of the real robot."""

@@ -1,1 +1,0 @@
-"""Calibration axis by axis, from circles."""

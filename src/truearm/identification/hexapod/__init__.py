@@ -1,1 +1,0 @@
-"""Calibration with the hexapod device: in two steps, and from several places."""

@@ -1,1 +1,0 @@
-"""Tilt, backlash and stiffness from inclinometers on the links."""

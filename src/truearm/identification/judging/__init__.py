@@ -1,1 +1,0 @@
-"""What to think of data and fits: plausibility, what residuals show, advice, Monte Carlo."""

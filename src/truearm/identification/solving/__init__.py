@@ -1,1 +1,0 @@
-"""What is minimised, and how: problem, losses, bounds, solver, fit, redundancy."""

@@ -1,1 +1,0 @@
-"""Where a fit starts: base, targets and fixtures from readings."""

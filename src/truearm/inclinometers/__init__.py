@@ -1,0 +1,1 @@
+"""Tilting, backlash and compliance from inclinometers: `truearm tilting`."""

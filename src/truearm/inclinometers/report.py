@@ -1,0 +1,204 @@
+"""What inclinometers told of the joints, and what that does to the errors of poses: one HTML file."""
+
+from __future__ import annotations
+
+import html
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truearm.engine.base.errors import worst_first
+from truearm.engine.document.drawing import (
+    AFTER,
+    BEFORE,
+    Figure,
+    axis,
+    deserved,
+    figure,
+    logarithmic_axis,
+    rounded,
+    significant,
+)
+from truearm.engine.document.page import page
+
+if TYPE_CHECKING:
+    from truearm.engine.data.statistics import Errors
+    from truearm.inclinometers.tilting import Tilting
+
+_COLOURS = {"clearance": "#3b7d3b", "backlash": AFTER, "compliance": "#8a6d1d"}
+_WORDS = {
+    "clearance": "tilt in the bearings, from the middle",
+    "backlash": "backlash, the whole play",
+    "compliance": "compliance about the axis",
+}
+
+
+def tilting_html(found: Tilting) -> str:
+    """Return the report of both stages."""
+    rows = found.constants()
+    figures = {"angles": angles_figure(rows), "compliances": compliances_figure(rows), "changes": changes_figure(found)}
+    spread = []
+    if found.geometry is not None and found.geometry_alone is not None:
+        figures["errors"] = errors_figure(found)
+        spread = [
+            {"robot": name, "figures": _figures(errors)}
+            for name, errors in _errors(found).items()
+            if errors.position is not None
+        ]
+    changed, left = (math.degrees(size) for size in found.sizes)
+    return page(
+        Path(__file__).with_name("tilting.html.jinja"),
+        figures,
+        found,
+        found=found,
+        rows=[_shown(row) for row in rows],
+        words=_WORDS,
+        spread=spread,
+        held=found.geometry is not None and found.geometry.validation is not None,
+        changed=significant(changed, 3),
+        left=significant(left, 2, 6),
+        seats=[
+            {
+                "name": seat["name"],
+                "turned": f"{seat['turned_deg']:.2f}",
+                "zeros": ", ".join(f"{axis} {zero:+.3f}" for axis, zero in seat["zero_deg"].items()),
+            }
+            for seat in found.seats()
+        ],
+        notices=worst_first(found.warnings),
+        source=Path(found.read.source).name,
+    )
+
+
+def _shown(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a constant with its figures as they are printed."""
+    texts = {
+        "value": deserved(row["value"], row["deviation"]),
+        "deviation": significant(row["deviation"], 2, 7),
+        "informed": f"{100 * (row['informed'] or 0.0):.0f}",
+    }
+    return row | {"words": _WORDS[row["effect"]], "texts": texts}
+
+
+def _errors(found: Tilting) -> dict[str, Errors]:
+    """Return errors by the robot that makes them, on configurations that no fit has seen where some were held out."""
+    if found.geometry is None or found.geometry_alone is None:
+        return {}
+    return {
+        "nominal": found.geometry_alone.nominal,
+        "geometry alone": found.geometry_alone.validation or found.geometry_alone.train,
+        "tilting first": found.geometry.validation or found.geometry.train,
+    }
+
+
+def _figures(errors: Errors) -> list[str]:
+    spread = errors.position
+    if spread is None:
+        return []
+    return [significant(value * 1e3, 3) for value in (spread.mean, spread.rms, spread.p95, spread.max)]
+
+
+def angles_figure(rows: list[dict[str, Any]]) -> Figure:
+    """Show tilt and backlash of each joint with two standard deviations to either side."""
+    return _bars(rows, ("clearance", "backlash"), "angle [deg]")
+
+
+def compliances_figure(rows: list[dict[str, Any]]) -> Figure:
+    """Show how far each joint gives way with two standard deviations to either side."""
+    return _bars(rows, ("compliance",), "compliance [mrad/(N m)]")
+
+
+def _bars(rows: list[dict[str, Any]], effects: tuple[str, ...], title: str) -> Figure:
+    traces = []
+    for effect in effects:
+        known = [row for row in rows if row["effect"] == effect and row["seen"]]
+        traces.append(
+            {
+                "type": "bar",
+                "name": _WORDS[effect],
+                "x": [f"joint {row['joint']}" for row in known],
+                "y": [float(f"{row['value']:.6g}") for row in known],
+                "error_y": {
+                    "type": "data",
+                    "array": [float(f"{2 * row['deviation']:.3g}") for row in known],
+                    "thickness": 1.4,
+                    "width": 5,
+                },
+                "marker": {"color": _COLOURS[effect], "line": {"width": 0}},
+                "opacity": 0.8,
+                "hovertemplate": f"%{{x}}: {_WORDS[effect]} %{{y}}<extra></extra>",
+            }
+        )
+    joints = [f"joint {joint}" for joint in dict.fromkeys(row["joint"] for row in rows)]
+    return figure(
+        traces,
+        330,
+        xaxis=axis("") | {"type": "category", "categoryorder": "array", "categoryarray": joints},
+        yaxis=axis(title) | {"rangemode": "tozero"},
+        barmode="group",
+        showlegend=True,
+    )
+
+
+def changes_figure(found: Tilting) -> Figure:
+    """Show the changes of inclination in the order of measurement, and what is left of them."""
+    used = np.isfinite(found.fit.left)
+    order = np.broadcast_to(np.arange(1, len(used) + 1)[:, None, None], used.shape)[used]
+    names = [f"{html.escape(name)}, {letter}" for name in found.read.instruments.names for letter in "xyz"]
+    labels = np.broadcast_to(np.array(names).reshape(1, -1, 3), used.shape)[used].tolist()
+    sizes = [np.abs(np.degrees(values[used])) for values in (found.changes.change, found.fit.left)]
+    low = 1e-5
+    traces: list[Figure] = [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": name,
+            "x": order.tolist(),
+            "y": rounded(np.maximum(values, low), 6),
+            "customdata": labels,
+            "marker": {"color": colour, "size": 5},
+            "hovertemplate": f"pair %{{x}}, %{{customdata}}: {name} %{{y:.3g}} deg<extra></extra>",
+        }
+        for name, values, colour in zip(
+            ("change that was read", "what is left of it"), sizes, (BEFORE, AFTER), strict=True
+        )
+    ]
+    high = max(float(sizes[0].max()), 10 * low) if len(order) else 1.0
+    return figure(
+        traces,
+        380,
+        xaxis=axis("pair of configurations"),
+        yaxis=logarithmic_axis("change of inclination [deg]", low, high),
+    )
+
+
+def errors_figure(found: Tilting) -> Figure:
+    """Show how errors are distributed, before, with geometry alone, and with tilting first."""
+    errors = {name: 1e3 * one.position_norms for name, one in _errors(found).items()}
+    errors = {name: values for name, values in errors.items() if len(values)}
+    every = np.concatenate([*errors.values()]) if errors else np.array([0.1, 1.0])
+    low, high = max(float(every.min()), 1e-4) * 0.9, max(float(every.max()), 1e-3) * 1.1
+    edges = np.geomspace(low, high, 41)
+    traces = [
+        {
+            "type": "bar",
+            "name": name,
+            "x": rounded(np.sqrt(edges[:-1] * edges[1:]), 6),
+            "width": rounded(np.diff(edges), 6),
+            "y": np.histogram(np.clip(values, low, high), edges)[0].tolist(),
+            "marker": {"color": colour, "line": {"width": 0}},
+            "opacity": 0.75,
+            "hovertemplate": f"{name}<br>%{{x:.3g}} mm: %{{y}} readings<extra></extra>",
+        }
+        for (name, values), colour in zip(errors.items(), (BEFORE, "#b3261e", AFTER), strict=False)
+    ]
+    return figure(
+        traces,
+        360,
+        xaxis=logarithmic_axis("position error [mm]", low, high),
+        yaxis=axis("readings"),
+        barmode="overlay",
+        bargap=0,
+    )

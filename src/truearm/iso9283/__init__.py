@@ -1,0 +1,1 @@
+"""Performance tests by ISO 9283: `truearm iso9283`."""

@@ -1,0 +1,1 @@
+"""Criteria of ISO 9283, from poses, samples and pushes."""

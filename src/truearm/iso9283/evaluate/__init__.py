@@ -1,0 +1,1 @@
+"""A campaign evaluated: files read, doubts, criteria, comparison, report."""

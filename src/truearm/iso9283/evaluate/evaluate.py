@@ -1,0 +1,419 @@
+"""Tests of a robot by ISO 9283, evaluated."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, get_args
+
+from truearm.engine.base.errors import InputError, Notice, counted, refusals_of
+from truearm.engine.base.files import noted_reads, path_argument
+from truearm.engine.base.manifest import written_differently
+from truearm.engine.base.writing import output_folder, write_files
+from truearm.engine.command.arguments import (
+    command_argument,
+    deviation_argument,
+    files_of,
+    folder_beside,
+    numbers_argument,
+    progress_argument,
+    python_call,
+)
+from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.motion.cube import Cube
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.alignment import Alignment, read_alignment, refuse_implausible
+from truearm.iso9283.criteria.rows import Component, Conditions, Instrument, Value, copied_blocks
+from truearm.iso9283.evaluate.comparison import Comparison, ReadFile, compared, plan_summary
+from truearm.iso9283.evaluate.evaluation import Evaluation, Measurements, evaluated
+from truearm.iso9283.evaluate.reading import read_attained_poses, read_pushes
+from truearm.iso9283.evaluate.samples import read_path_samples, read_settling_samples
+from truearm.iso9283.evaluate.table import (
+    HEADING,
+    UNITS,
+    conditions_summary,
+    copied_notices,
+    counted_criteria,
+    cube_notices,
+    cycle_notices,
+    row_notices,
+    worst_places,
+)
+from truearm.iso9283.evaluate.told import said_of_drift, said_of_pushes, said_of_rounding, said_of_streams
+from truearm.iso9283.plan.criteria import PerformancePlan
+from truearm.iso9283.plan.plan_file import read_plan
+
+# The criteria of ISO 9283 that a robot was tested by, each with its interval, and beside those of another result.
+
+RESULT: Final = "iso9283.json"
+REPORT: Final = "report.html"
+EVALUATION_FILES: Final = (RESULT, REPORT)
+SCHEMA: Final = "truearm-iso9283-result/1"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Iso9283Evaluation(Record):
+    """Tests of a robot's performance, evaluated."""
+
+    plan: PerformancePlan  #: What was commanded.
+    evaluation: Evaluation  #: All values, and what they come from.
+    instrument: Instrument  #: What is not known of its readings.
+    comparison: Comparison | None  #: Beside another result; None without one.
+    command: str  #: How to run it again.
+    warnings: tuple[Notice, ...] = ()  #: What to know about it.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    #: Their names and hashes, by the parameters that named them; ``robot`` is the robot file of the plan.
+    read: Mapping[str, ReadFile] = field(default_factory=dict)
+
+    @property
+    def values(self) -> tuple[Value, ...]:
+        """All values, in the order of the standard's table."""
+        return self.evaluation.values
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, units beside the values."""
+        tie = self.evaluation.alignment
+        return {
+            "truearm": SCHEMA,
+            "robot": self.plan.robot.name,
+            "alignment": {
+                "kind": tie.kind,
+                "standard": tie.is_standard,
+                "sigma_mm": tie.sigma * 1e3,
+                "sigma_rot_deg": math.degrees(tie.sigma_rot),
+            },
+            "instrument": {
+                "sigma_mm": self.instrument.sigma * 1e3,
+                "sigma_rot_deg": None if self.instrument.sigma_rot is None else math.degrees(self.instrument.sigma_rot),
+            },
+            "inputs": {name: one.model_dump() for name, one in self.read.items()},
+            "rated": {"load_kg": self.plan.rated_load, "velocity_mm_s": self.plan.rated_velocity * 1e3},
+            "plan": plan_summary(self.plan),
+            "criteria": [value_summary(value) for value in self.values],
+            **self._drawn(),
+            **({} if self.comparison is None else {"comparison": self.comparison.summary()}),
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def _drawn(self) -> dict[str, Any]:
+        """Return what another result draws beside its own: deviations along paths, and barycentres from commands."""
+        curves = [
+            {
+                "id": course.run.test,
+                "where": course.path,
+                "conditions": conditions_summary(course.run.conditions),
+                "along_mm": _millimetres(course.along),
+                "distance_mm": _millimetres(course.distance),
+            }
+            for course in self.evaluation.deviations
+        ]
+        offsets = [
+            {
+                "id": cloud.test,
+                "where": cloud.pose,
+                "conditions": conditions_summary(Conditions(cloud.velocity, cloud.load, cloud.robot)),
+                "offset_mm": _millimetres(cloud.barycentre - cloud.command),
+            }
+            for cloud in self.evaluation.clouds
+            if cloud.test == "AP"
+        ]
+        return {**({"curves": curves} if curves else {}), **({"offsets": offsets} if offsets else {})}
+
+    def lines(self) -> list[str]:
+        """Return each criterion at its worst place, at the fastest velocity and at others; the rest is in the files."""
+        measured = [value for value in self.values if value.status != "not-measured"]
+        absent = list(dict.fromkeys(value.id for value in self.values if value.status == "not-measured"))
+        absent = [id_ for id_ in absent if id_ not in {value.id for value in measured}]
+        criteria = len({value.id for value in measured})
+        text = [f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {counted_criteria(criteria)}."]
+        text.append(self.tied)
+        rows = [worst.cells for worst in worst_places(self.values)]
+        if rows:
+            text.append(
+                "Each at its worst place and fastest velocity, with its 95 % interval or the range of its cycles."
+            )
+        wide = [max((len(row[k]) for row in rows), default=0) for k in range(len(HEADING))]
+        text += ["  " + "  ".join(cell.ljust(wide[k]) for k, cell in enumerate(row)).rstrip() for row in rows]
+        if rows:
+            text.append(f"All places, axes and angles are in the report and in {RESULT}.")
+        if absent:
+            text.append(f"Not measured: {', '.join(absent)}.")
+        if self.comparison is not None:
+            text += self.comparison.lines()
+        return [*text, *notice_lines(self.warnings)]
+
+    @property
+    def tied(self) -> str:
+        """How the instrument was tied to the robot's base, in words."""
+        tie = self.evaluation.alignment
+        how = {
+            "base-features": "measured features of the base",
+            "controller-frame": "a frame of the controller",
+            "best-fit": "a best fit of the attained poses to the commanded ones, which the standard does not allow",
+        }[tie.kind]
+        known = f", known to {tie.sigma * 1e3:.3f} mm and {math.degrees(tie.sigma_rot):.4f} deg" if tie.sigma else ""
+        return f"The instrument was tied to the robot's base by {how}{known}."
+
+    def contents(self) -> dict[str, str]:
+        """Return the texts of all files by their names."""
+        from truearm.iso9283.evaluate.report import iso9283_report
+
+        return {RESULT: json.dumps(self.summary(), indent=1) + "\n", REPORT: iso9283_report(self)}
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write all files into a folder; return them."""
+        contents = self.contents()
+        out = output_folder(folder, contents, self.inputs, "folder")
+        write_files(out, contents, self.command)
+        return tuple(out / name for name in contents)
+
+
+def _millimetres(metres: Array) -> list[float | None]:
+    """Return lengths as JSON holds them, None where there is none."""
+    return [round(1e3 * value, 6) if math.isfinite(value) else None for value in metres.tolist()]
+
+
+def value_summary(value: Value) -> dict[str, Any]:
+    """Return a value as JSON holds it."""
+    unit, per_si = UNITS[value.quantity]
+
+    def shown(number: float | None) -> float | None:
+        return None if number is None or not math.isfinite(number) else number * per_si
+
+    least, largest = shown(value.least), shown(value.largest)
+    return {
+        "id": value.id,
+        "component": value.component,
+        "where": value.where,
+        "value": shown(value.value),
+        "unit": unit,
+        "interval_95": None if value.interval is None else [shown(end) for end in value.interval],
+        "cycles": value.cycles,
+        "conditions": conditions_summary(value.conditions),
+        "status": value.status,
+        **({} if least is None else {"range": [least, largest]}),
+        **({} if value.bandwidth is None else {"bandwidth_hz": value.bandwidth}),
+    }
+
+
+def iso9283_evaluate(
+    plan: str | Path,
+    *,
+    poses: str | Path | None = None,
+    paths: str | Path | None = None,
+    settling: str | Path | None = None,
+    forces: str | Path | None = None,
+    alignment: str | Path | None = None,
+    noise: float = 0.01e-3,
+    noise_rot: float = 1e-4,
+    compare: str | Path | None = None,
+    out: str | Path | None = None,
+    command: str | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Iso9283Evaluation:
+    """Evaluate the tests of a plan by ISO 9283, each value with a 95 % interval or the range of its cycles.
+
+    Parameters
+    ----------
+    plan
+        ``plan.yaml`` of :func:`truearm.iso9283_plan`, with ``robot.yaml`` beside it.
+    poses, paths, settling, forces
+        Files of what was measured, in the instrument's frame; None for what was not.
+    alignment
+        How the instrument was tied to the robot's base, a file (schema ``truearm-alignment/1``); None for the best fit
+        of the attained poses to the commanded ones, which hides what pose accuracy measures.
+    noise, noise_rot
+        Standard deviation of the instrument: of each coordinate [m], of each angle [rad].
+    compare
+        ``iso9283.json`` of another evaluation, set beside this one.
+    out
+        Folder for ``iso9283.json`` and ``report.html``; None writes nothing.
+    command
+        How to run it again, for the report; None writes the call in Python.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used or does not fit the plan; the message names the row.
+    """
+    progress_argument(progress)
+    given = {"poses": poses, "paths": paths, "settling": settling, "forces": forces}
+    files = {name: None if file is None else path_argument(file, name) for name, file in given.items()}
+    plan_path = path_argument(plan, "plan")
+    tie_path = None if alignment is None else path_argument(alignment, "alignment")
+    other = None if compare is None else path_argument(compare, "compare")
+    sigma = deviation_argument(noise, "noise")
+    (sigma_rot,) = numbers_argument([noise_rot], "noise_rot", 1, "a standard deviation above 0 [rad]")
+    inputs = files_of(plan_path, *files.values(), tie_path, other)
+    folder = None if out is None else folder_beside(EVALUATION_FILES, RESULT, out, *inputs)
+    call = command_argument(command) or python_call(
+        "iso9283_evaluate",
+        plan,
+        **given,
+        alignment=alignment,
+        noise=noise,
+        noise_rot=noise_rot,
+        compare=compare,
+    )
+    with noted_reads() as noted:
+        with refusals_of("plan"):
+            planned = read_plan(plan_path)
+        tie: Alignment | None = None
+        if tie_path is not None:
+            with refusals_of("alignment"):
+                tie = read_alignment(tie_path)
+        read: dict[str, Any] = {}
+        for name, file in files.items():
+            if file is None:
+                continue
+            progress(f"reading {file.name}")
+            with refusals_of(name):
+                read[name] = _READERS[name](file)
+        if tie is not None and read:
+            _refuse_far_files(tie, planned.cube, read, str(tie_path))
+        instrument = Instrument(sigma, sigma_rot)
+        found = evaluated(planned, Measurements(**read), tie, instrument, progress)
+        warnings = (
+            *_warnings(planned, found, read, instrument),
+            *_of_plan(plan_path),
+            *said_of_pushes(planned, found.pushes, instrument),
+            *said_of_drift(planned, found.drift),
+        )
+        made = Iso9283Evaluation(planned, found, instrument, None, call, warnings, inputs)
+        if other is not None:
+            with refusals_of("compare"):
+                made = replace(made, comparison=compared(made.summary(), other))
+            made = replace(made, warnings=(*made.warnings, *_warnings_of_comparison(made)))
+    named = {"plan": plan_path, **files, "alignment": tie_path, "compare": other}
+    made = replace(made, read=_read_files(named, noted))
+    if folder is not None:
+        progress("writing the report")
+        made.save(folder)
+    return made
+
+
+def _read_files(named: Mapping[str, Path | None], noted: Mapping[Path, Sequence[str]]) -> dict[str, ReadFile]:
+    """Return the files that were read, by their parameters; the one beside the plan that nobody named is the robot."""
+    given = {name: path for name, path in named.items() if path is not None}
+    beside = next(path.name for path in noted if path not in {one.absolute() for one in given.values()})
+    given["robot"] = given["plan"].parent / beside
+    return {name: ReadFile(file=str(path), sha256=noted[path.absolute()][0]) for name, path in given.items()}
+
+
+def _refuse_far_files(tie: Alignment, cube: Cube, read: Mapping[str, Any], where: str) -> None:
+    """Refuse a tie with which every file lies far from the cube, and a file that alone does so."""
+    far: dict[str, InputError] = {}
+    for name, one in read.items():
+        try:
+            with refusals_of("alignment"):
+                refuse_implausible(tie, cube, one.position, where)
+        except InputError as refusal:
+            far[name] = refusal
+    if not far:
+        return
+    name, first = next(iter(far.items()))
+    if len(far) == len(read):
+        raise first
+    raise InputError(
+        "this file lies far from the cube of the tests, where others do not",
+        parameter=name,
+        where=read[name].source,
+        came=first.came,
+        allowed=first.allowed,
+        cure="Check the units in its header, and that it was read in the same frame as the others.",
+    )
+
+
+_COMPONENTS: Final = get_args(Component)
+_READERS: Final[Mapping[str, Callable[[Path], object]]] = {
+    "poses": read_attained_poses,
+    "paths": read_path_samples,
+    "settling": read_settling_samples,
+    "forces": read_pushes,
+}
+
+
+def _warnings(
+    plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any], instrument: Instrument
+) -> tuple[Notice, ...]:
+    notices: list[Notice] = []
+    if not found.alignment.is_standard:
+        notices.append(
+            Notice(
+                "best-fit-alignment",
+                "The frame of the instrument was fitted to the attained poses. That hides a part of the error that "
+                "pose and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small. "
+                "Tie the instrument to the base and give `alignment`.",
+            )
+        )
+    notices += row_notices(found)
+    copied = [block for name in ("paths", "settling") if name in read for block in copied_blocks(read[name])]
+    notices += copied_notices(copied)
+    notices += cycle_notices(plan, found)
+    notices += cube_notices(plan, found)
+    coarse: dict[str, list[str]] = {}
+    for value in found.values:
+        if value.status == "instrument-too-coarse" and value.component not in coarse.setdefault(value.id, []):
+            coarse[value.id].append(value.component)
+    if coarse:
+        names = [
+            name if components == ["position"] else f"{name} ({', '.join(sorted(components, key=_COMPONENTS.index))})"
+            for name, components in coarse.items()
+        ]
+        notices.append(
+            Notice(
+                "instrument-too-coarse",
+                f"What instrument and tie leave open is more than a quarter of some values of {', '.join(names)}. "
+                "They say more about the measurement than about the robot.",
+            )
+        )
+    return (*notices, *said_of_streams(found), *said_of_rounding(found, instrument))
+
+
+def _of_plan(path: Path) -> tuple[Notice, ...]:
+    """Return that a plan was changed since truearm wrote it, where its manifest says so."""
+    try:
+        if not written_differently(path):
+            return ()
+    except InputError:  # what stands beside it is no manifest of truearm
+        return ()
+    return (
+        Notice(
+            "plan-changed",
+            f"{path.name} was changed since truearm wrote it, and programs and sheet beside it are not those of this "
+            "plan. Values are held against what it says now.",
+            "note",
+        ),
+    )
+
+
+def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
+    beside = made.comparison
+    if beside is None:
+        return ()
+    notices = []
+    if beside.left_out:
+        notices.append(
+            Notice(
+                "alignment-differs",
+                f"The two results were tied to the base in different ways: {', '.join(beside.left_out)} are not "
+                "compared.",
+            )
+        )
+    if beside.unlike:
+        told = "; ".join(f"{', '.join(ids)}: {why}" for why, ids in beside.unlike.items())
+        notices.append(Notice("plan-differs", f"Values that are not alike are not compared. {told}."))
+    if beside.unknown_plan:
+        notices.append(
+            Notice(
+                "plan-unknown",
+                "The other result does not say what was planned, as it was written by an older version: whether poses, "
+                "paths, tip and limit band were the same cannot be told. Evaluate its files again.",
+            )
+        )
+    return tuple(notices)

@@ -1,0 +1,410 @@
+"""What is said about the rows of a test by ISO 9283: wild rows, poses with two places of rest, places without a row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from truearm.engine.base.errors import Notice, counted
+from truearm.iso9283.criteria.compliance import WildPush
+from truearm.iso9283.criteria.rows import Conditions, CopiedBlock, Cycles, Quantity, Value
+from truearm.iso9283.criteria.wild_rows import Kind, TwoPlaces, WildRow
+from truearm.iso9283.evaluate.comparison import Entry, ResultFile
+from truearm.iso9283.evaluate.doubts import other_cube
+from truearm.iso9283.evaluate.evaluation import Evaluation
+from truearm.iso9283.plan.criteria import CRITERIA, TEST_OF, TESTS, PerformancePlan
+
+# The values of a test by ISO 9283 as cells of tables: for the command, and for the report.
+
+#: Unit of each kind of number at the edges, and how many of it one SI unit is.
+UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {
+    "length": ("mm", 1e3),
+    "angle": ("deg", math.degrees(1.0)),
+    "time": ("s", 1.0),
+    "ratio": ("%", 100.0),
+    "speed": ("mm/s", 1e3),
+    "compliance": ("mm/N", 1e3),
+}
+_DECIMALS: Final[Mapping[Quantity, int]] = {
+    "length": 4,
+    "angle": 4,
+    "time": 3,
+    "ratio": 3,
+    "speed": 2,
+    "compliance": 6,
+}
+#: Columns of :attr:`Worst.cells`.
+HEADING: Final = (
+    "Criterion",
+    "Worst place",
+    "Value",
+    "95 %, or range",
+    "Other velocities",
+    "Status",
+)
+#: Where the value is the worst of several places already.
+_ALL_PLACES: Final = "all poses"
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A criterion at its worst place at the fastest velocity."""
+
+    value: Value  #: The largest of them without its sign.
+    places: int  #: How many there are.
+    others: tuple[Value, ...]  #: The worst at each other velocity.
+    missing: tuple[str, ...] = ()  #: Other places at that velocity that have no value.
+    faster: float | None = None  #: A faster planned velocity at which there is no value; None if there is none.
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The cells of its row: criterion, place, value, interval, other velocities, status."""
+        value = self.value
+        where = value.where
+        if self.places > 1 and where != _ALL_PLACES:
+            where = f"{where}, worst of {self.places}"
+            if self.missing:
+                where += f" of {self.places + len(self.missing)}"
+        besides = [f"{velocity_words(other.conditions)}: {number_words(other)}" for other in self.others]
+        name = f"{value.id} {value.conditions.robot}".rstrip()
+        load = value.conditions.load
+        if load is not None and load < 1.0:
+            where = f"{where}, load {100 * load:g} %"
+        status = [str(value.status)] if value.status != "measured" else []
+        if self.missing:
+            status.append(f"not-measured: {', '.join(self.missing)}")
+        if self.faster is not None:
+            status.append(f"not-measured: {100 * self.faster:g} %")
+        return (
+            name,
+            where,
+            f"{number_words(value)} {UNITS[value.quantity][0]}",
+            beside_words(value),
+            ", ".join(besides),
+            "; ".join(status),
+        )
+
+
+def worst_places(values: Sequence[Value]) -> list[Worst]:
+    """Return each criterion of position at its worst place; loads and robots apart, in the order of the standard."""
+    groups: dict[tuple[str, float | None, str], dict[float, list[Value]]] = {}
+    for value in values:
+        if value.component == "position":
+            under = value.conditions
+            by_velocity = groups.setdefault((value.id, under.load, under.robot), {})
+            by_velocity.setdefault(under.velocity or 0.0, []).append(value)
+    found = []
+    for by_velocity in groups.values():
+        planned = sorted(by_velocity, reverse=True)
+        there = {velocity: [one for one in by_velocity[velocity] if math.isfinite(one.value)] for velocity in planned}
+        measured = [velocity for velocity in planned if there[velocity]]
+        if not measured:
+            continue
+        fastest, *others = (there[velocity] for velocity in measured)
+        places = len([value for value in fastest if value.where != _ALL_PLACES])
+        missing = [one.where for one in by_velocity[measured[0]] if math.isnan(one.value)]
+        faster = planned[0] if planned[0] != measured[0] else None
+        found.append(Worst(_worst(fastest), places, tuple(map(_worst, others)), tuple(missing), faster))
+    return sorted(found, key=lambda one: CRITERIA.index(one.value.id))
+
+
+def _worst(values: Sequence[Value]) -> Value:
+    whole = [value for value in values if value.where == _ALL_PLACES]
+    return max(whole or values, key=lambda value: abs(value.value))
+
+
+def number_words(value: Value) -> str:
+    """Return a value in its unit, without naming it."""
+    return _number(value.value, value.quantity)
+
+
+def beside_words(value: Value) -> str:
+    """Return its interval, or the range of its cycles where they are too few for one."""
+    if value.interval is not None:
+        low, high = (_number(end, value.quantity) for end in value.interval)
+        return f"{low} to {high}"
+    if value.least is not None and value.largest is not None:
+        low, high = (_number(end, value.quantity) for end in (value.least, value.largest))
+        return f"{low} to {high} in {counted(value.cycles, 'cycle')}"
+    return ""
+
+
+def velocity_words(under: Conditions) -> str:
+    """Return the velocity in percent."""
+    return "" if under.velocity is None else f"{100 * under.velocity:g} %"
+
+
+def conditions_words(value: Value) -> str:
+    """Return under what a value was measured, in words."""
+    under = value.conditions
+    parts = [velocity_words(under)] if under.velocity is not None else []
+    if under.load is not None:
+        parts.append(f"load {100 * under.load:g} %")
+    return ", ".join([*parts, under.robot] if under.robot else parts)
+
+
+def conditions_summary(under: Conditions) -> dict[str, float | str]:
+    """Return conditions as JSON holds them."""
+    found: dict[str, float | str] = {}
+    if under.velocity is not None:
+        found["velocity_percent"] = round(100.0 * under.velocity, 6)
+    if under.load is not None:
+        found["load_percent"] = round(100.0 * under.load, 6)
+    return {**found, "robot": under.robot} if under.robot else found
+
+
+def values_of(result: ResultFile) -> tuple[Value, ...]:
+    """Return the values of a result that was read again, in SI units."""
+    return tuple(map(_value, result.criteria))
+
+
+def conditions_of(conditions: Mapping[str, float | str]) -> Conditions:
+    """Return conditions as files have them: the inverse of :func:`conditions_summary`."""
+    velocity, load = (conditions.get(f"{name}_percent") for name in ("velocity", "load"))
+    return Conditions(
+        velocity / 100.0 if isinstance(velocity, float) else None,
+        load / 100.0 if isinstance(load, float) else None,
+        str(conditions.get("robot", "")),
+    )
+
+
+def _value(entry: Entry) -> Value:
+    quantity, per_si = next((name, per) for name, (unit, per) in UNITS.items() if unit == entry.unit)
+
+    def in_si(number: float | None) -> float | None:
+        return None if number is None else number / per_si
+
+    value = in_si(entry.value)
+    ends = entry.interval_95
+    least, largest = (None, None) if entry.range is None else map(in_si, entry.range)
+    return Value(
+        entry.id,
+        entry.component,
+        entry.where,
+        math.nan if value is None else value,
+        quantity,
+        None if ends is None else (ends[0] / per_si, ends[1] / per_si),
+        entry.cycles,
+        conditions_of(entry.conditions),
+        entry.status,
+        least,
+        largest,
+        entry.bandwidth_hz,
+    )
+
+
+def test_name(value: Value) -> str:
+    """Return the name of the test that a value belongs to."""
+    return TESTS[TEST_OF[value.id]].name
+
+
+def counted_criteria(count: int) -> str:
+    """Return how many criteria, in words."""
+    return f"{count} criteri{'on' if count == 1 else 'a'}"
+
+
+def _number(number: float, quantity: Quantity) -> str:
+    return f"{number * UNITS[quantity][1]:.{_DECIMALS[quantity]}f}"
+
+
+#: So many rows, poses and places are told one by one.
+_TOLD: Final = 3
+_TOLD_PLACES: Final = 8
+#: So many values are told with and without a row.
+_VALUES: Final = 2
+#: Criteria of which each cycle of a place counts once.
+_EACH_CYCLE: Final = ("AP", "AD", "AT", "AT-reorientation", "CR", "AV", "WS", "t", "posing-time")
+#: Mean orientations further off than this are told [rad].
+_FAR_TURNED: Final = math.radians(2.0)
+
+
+def row_notices(found: Evaluation) -> tuple[Notice, ...]:
+    """Return what is to be known about the rows of an evaluation."""
+    notices = []
+    wild, places = found.unusual.wild, found.unusual.two_places
+    if wild:
+        told = " ".join(_wild_words(row, "it" if len(wild) == 1 else "them") for row in wild[:_TOLD])
+        if len(wild) > _TOLD:
+            told += f" So do {counted(len(wild) - _TOLD, 'other row')}, on line "
+            told += f"{', '.join(str(int(row.of.line[0])) for row in wild[_TOLD:])}."
+        notices.append(
+            Notice(
+                "wild-row",
+                f"{told} The standard excludes no row, and none was left out. Look at the record, and measure the "
+                "pose again if the reading was at fault.",
+            )
+        )
+    if found.wild_pushes:
+        told = " ".join(_push_words(one) for one in found.wild_pushes)
+        notices.append(
+            Notice(
+                "wild-push",
+                f"{told} The standard excludes no reading, and none was left out. Look at the record, and push again "
+                "if the reading was at fault.",
+            )
+        )
+    if places:
+        told = "; ".join(_places_words(one) for one in places[:_TOLD])
+        more = f"; and {len(places) - _TOLD} more" if len(places) > _TOLD else ""
+        notices.append(
+            Notice(
+                "two-places",
+                f"The tip comes to rest in two places: {told}{more}. The values stand, but the intervals of RP and RD "
+                "may not hold. Look for play, or for something that changed during the test.",
+            )
+        )
+    if found.unusual.alike:
+        told = "; ".join(
+            f"{one.test}, {100 * one.velocity:g} %, load {100 * one.load:g} % (correlation {one.correlation:.2f}, of "
+            f"independent cycles up to {2 * one.usual:.2f})"
+            for one in found.unusual.alike[:_TOLD_PLACES]
+        )
+        notices.append(
+            Notice(
+                "cycles-alike",
+                f"Each cycle is like the one before it: {told}. Intervals assume that cycles are independent, and are "
+                "too narrow here. Let the robot warm up longer, and see whether robot or instrument creeps.",
+            )
+        )
+    turned = [v for v in found.values if v.id == "AP" and v.quantity == "angle" and abs(v.value) > _FAR_TURNED]
+    if turned:
+        worst = max(turned, key=lambda value: abs(value.value))
+        notices.append(
+            Notice(
+                "orientation-far-off",
+                f"Orientations are off by up to {number_words(worst)} deg (AP {worst.component} of {worst.where}). "
+                "Robots are seldom off by a degree: check that they are those of the plan's tip, and the rotation of "
+                "the alignment.",
+            )
+        )
+    if found.missing:
+        told = "; ".join(found.missing[:_TOLD_PLACES])
+        more = f"; and {len(found.missing) - _TOLD_PLACES} more" if len(found.missing) > _TOLD_PLACES else ""
+        notices.append(
+            Notice(
+                "places-missing",
+                f"Planned and without a row: {told}{more}. The worst of the others is not what the standard asks for. "
+                "Measure them, or plan the test without them.",
+            )
+        )
+    return tuple(notices)
+
+
+def cycle_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
+    """Return what is to be known about cycles that are fewer or more than planned."""
+    few, more = dict[str, None](), dict[str, None]()
+    for value in found.values:
+        planned = plan.test(TEST_OF[value.id])
+        if planned is None or value.component != "position" or value.status == "not-measured":
+            continue
+        words = f"{value.id} {value.where}: {value.cycles} of {planned.cycles}"
+        if value.status == "too-few-cycles":
+            few[words] = None
+        elif value.id in _EACH_CYCLE and value.cycles > planned.cycles:
+            more[words] = None
+    notices = []
+    if few:
+        notices.append(
+            Notice("too-few-cycles", f"Fewer cycles than planned were measured: {_some(few)}. Their values stand.")
+        )
+    if more:
+        notices.append(
+            Notice(
+                "more-cycles",
+                f"More cycles than planned were measured: {_some(more)}. All of them are in the values; check that "
+                "none belongs to another test.",
+                "note",
+            )
+        )
+    return notices
+
+
+def cube_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
+    """Return what is to be known where the poses are those of another cube."""
+    other = other_cube(found.clouds, plan.cube.side)
+    if other is None:
+        return []
+    side = 1e3 * plan.cube.side
+    return [
+        Notice(
+            "other-cube",
+            f"The poses of {other.test} lie as those of a cube of {side * other.scale:.1f} mm, where the plan has "
+            f"{side:.1f} mm, with its middle {1e3 * other.aside:.1f} mm aside. No robot is off like that: were they "
+            "measured for another plan, or is the tie to the base another one? Give the plan.yaml that was measured.",
+        )
+    ]
+
+
+def _some(words: Collection[str]) -> str:
+    told = list(words)
+    more = f"; and {len(told) - _TOLD_PLACES} more" if len(told) > _TOLD_PLACES else ""
+    return "; ".join(told[:_TOLD_PLACES]) + more
+
+
+def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:
+    """Return what is to be known about samples that two cycles share."""
+    if not blocks:
+        return []
+    told = "; ".join(_copied_words(block) for block in blocks[:_TOLD])
+    more = f"; and {len(blocks) - _TOLD} more" if len(blocks) > _TOLD else ""
+    return [
+        Notice(
+            "copied-samples",
+            f"Cycles have samples at the same places to the last digit: {told}{more}. No robot does that: one was "
+            "copied from the other, or the readings are simulated without noise. RT and what else says how cycles "
+            "differ is too small. Write what was measured, or remove the copy.",
+        )
+    ]
+
+
+def _copied_words(block: CopiedBlock) -> str:
+    one, other = block.cycles
+    cycles = f"cycles {one} and {other} of " if one and other else ""
+    return f"{cycles}{block.test} {block.place}, {block.count} samples from lines {block.lines[0]} and {block.lines[1]}"
+
+
+def _wild_words(row: WildRow, without: str) -> str:
+    away, scatter = (_size(number, row.kind) for number in (row.away, row.scatter))
+    what = "The orientation of cycle" if row.kind == "orientation" else "Cycle"
+    changes = "; ".join(_change_words(*pair, without) for pair in row.changes[:_VALUES])
+    return (
+        f"{what} {int(row.of.cycle[0])} of {_under_words(row.of)}, on line {int(row.of.line[0])} lies {away} from the "
+        f"others, which scatter by {scatter}{': ' if changes else ''}{changes}."
+    )
+
+
+def _push_words(one: WildPush) -> str:
+    unit, per_si = UNITS["compliance"]
+    return (
+        f"The push of {one.force:g} N along {one.direction} in cycle {one.cycle}, on line {one.line}, lies "
+        f"{1e3 * one.away:.3g} mm from the line of the others: compliance is {one.value * per_si:.6f} {unit}, "
+        f"without it {one.without * per_si:.6f}."
+    )
+
+
+def _change_words(value: Value, other: Value, without: str) -> str:
+    part = "" if value.component == "position" else f" {value.component}"
+    left = number_words(other) if other.status != "not-measured" else "nothing"
+    return f"{value.id}{part} is {number_words(value)} {UNITS[value.quantity][0]}, without {without} {left}"
+
+
+def _places_words(one: TwoPlaces) -> str:
+    what = "orientations, " * (one.kind == "orientation")
+    lines = ", ".join(map(str, one.lines[:_TOLD_PLACES])) + ", .." * (len(one.lines) > _TOLD_PLACES)
+    return (
+        f"{_under_words(one.of)} ({what}{one.rows[0]} and {one.rows[1]} cycles, {_size(one.apart, one.kind)} apart; "
+        f"the {one.rows[0]} on lines {lines})"
+    )
+
+
+def _under_words(one: Cycles) -> str:
+    robot = f" of {one.robot}" if one.robot else ""
+    approach = f" from {one.approach}" if one.approach else ""
+    return f"{one.test} {one.pose}{approach}{robot}, {100 * one.velocity:g} %, load {100 * one.load:g} %"
+
+
+def _size(number: float, kind: Kind) -> str:
+    unit, per_si = UNITS["length" if kind == "position" else "angle"]
+    return f"{number * per_si:.3g} {unit}"

@@ -1,0 +1,449 @@
+"""What is to be said of samples over time, and of the figures that come from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.engine.base.errors import Notice, listed
+from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.compliance import GRAVITY, PushLine
+from truearm.iso9283.criteria.drift import DriftCourse
+from truearm.iso9283.criteria.paths import wild_cycle
+from truearm.iso9283.criteria.rows import Instrument
+from truearm.iso9283.criteria.runs import Run
+from truearm.iso9283.criteria.streams import Clock, pace_along
+from truearm.iso9283.evaluate.doubts import unusual_samples
+from truearm.iso9283.evaluate.evaluation import Evaluation
+from truearm.iso9283.plan.criteria import PerformancePlan
+
+# What is to be said of the times over which drift was watched.
+
+#: From the first group to the last drift is watched for at least and at most this share of the planned time.
+_SHORTEST: Final = 0.9
+_LONGEST: Final = 1.25
+#: Times in other units, by how many seconds they have.
+_UNITS: Final = {"minutes": 60.0, "hours": 3600.0, "milliseconds": 1e-3}
+
+
+def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tuple[Notice, ...]:
+    """Return what is to be said of courses that are one group alone, or do not last as long as planned."""
+    planned = 3600.0 * plan.hours
+    single, other, timeless = [], [], False
+    for one in courses:
+        name = (
+            f"{one.pose}{f' of {one.robot}' if one.robot else ''}, {100 * one.velocity:g} %, load {100 * one.load:g} %"
+        )
+        if len(one.cycles) < 2:
+            single.append(f"{name} ({one.cycles[0]} cycles)")
+        elif not np.isfinite(one.time).all():
+            timeless = True
+        else:
+            lasts = float(one.time[-1] - one.time[0])
+            if not _fits(lasts, planned):
+                units = [unit for unit, seconds in _UNITS.items() if _fits(lasts * seconds, planned)]
+                asked = f" (are the times in {units[0]}?)" if units else ""
+                other.append(f"{name}: {len(one.cycles)} groups over {lasts / 3600.0:.3g} h{asked}")
+    made = []
+    if single:
+        made.append(
+            Notice(
+                "single-drift-group",
+                f"All cycles of drift are one group at {'; '.join(single)}: there is no change to be told. A group "
+                "begins where the numbers of the cycles begin anew, or after a pause.",
+            )
+        )
+    if other or timeless:
+        told = "; ".join(other) or "the rows of dAP have no times"
+        made.append(
+            Notice(
+                "drift-time",
+                f"Drift is planned over {plan.hours:g} h; measured: {told}. dAP and dRP tell the change over the time "
+                "that was measured, and are not those of the plan.",
+            )
+        )
+    return tuple(made)
+
+
+def _fits(lasts: float, planned: float) -> bool:
+    return _SHORTEST * planned <= lasts <= _LONGEST * planned
+
+
+# What is to be said of the forces by which the tip was pushed.
+
+#: The largest force of a direction is low below this share of the rated load's weight.
+_LOW: Final = 0.85
+#: Forces are kilograms if the largest is the rated load within this share.
+_ROUNDED: Final = 0.06
+#: A slope is more than noise above so many standard errors.
+_ABOVE_NOISE: Final = 6.0
+
+
+def said_of_pushes(plan: PerformancePlan, pushes: Sequence[PushLine], instrument: Instrument) -> tuple[Notice, ...]:
+    """Return what is to be said of pushes: forces far below the rated ones, and directions that cannot be right."""
+    found = (_low(plan, pushes), _sideways(pushes, instrument))
+    return tuple(notice for notice in found if notice is not None)
+
+
+def _low(plan: PerformancePlan, pushes: Sequence[PushLine]) -> Notice | None:
+    test = plan.test("compliance")
+    if test is None or not plan.rated_load > 0:
+        return None
+    most = GRAVITY * plan.rated_load * max(test.loads)
+    largest: dict[str, float] = {}
+    for one in pushes:
+        largest[one.direction] = max(largest.get(one.direction, 0.0), float(one.force.max()))
+    low = [direction for direction, force in largest.items() if force < _LOW * most]
+    if not low:
+        return None
+    kilograms = all(abs(largest[name] * GRAVITY / most - 1.0) < _ROUNDED for name in low)
+    asked = (
+        f" Their largest number is that of the load in kg: are these kg? Then compliance is {GRAVITY:.2f} times too "
+        "large; multiply them by that."
+        if kilograms
+        else " Push up to the rated load, or check the unit."
+    )
+    told = ", ".join(f"{name} {largest[name]:.4g} N" for name in low)
+    return Notice(
+        "low-forces",
+        f"The largest forces are well below the weight of the rated load, {most:.4g} N: {told}.{asked}",
+    )
+
+
+def _sideways(pushes: Sequence[PushLine], instrument: Instrument) -> Notice | None:
+    """Return directions along which the tip moves less than at right angles, where no arm can do so.
+
+    An arm at rest gives way by a symmetric matrix without negative eigenvalues, and may well move more at right angles
+    to a force than along it. Forces under the names of other axes change columns of that matrix: then it has a negative
+    one. Where not all axes were pushed along, the matrix is not known.
+    """
+    names = tuple(dict.fromkeys(one.direction for one in pushes))
+    error = {name: _standard_error(pushes, name, instrument) for name in names}
+    slope = {name: np.mean([one.slopes for one in pushes if one.direction == name], axis=0) for name in names}
+    by_axis = {
+        axis: [(1.0 if name[0] == "+" else -1.0) * slope[name] for name in names if name[1] == axis] for axis in "xyz"
+    }
+    if all(by_axis.values()):
+        matrix = np.stack([np.mean(by_axis[axis], axis=0) for axis in "xyz"], axis=1)
+        least = float(np.linalg.eigvalsh((matrix + matrix.T) / 2)[0])
+        if least > -_ABOVE_NOISE * max(error.values()):
+            return None
+    told = []
+    for name in names:
+        k = "xyz".index(name[1])
+        along, across = float(abs(slope[name][k])), np.delete(slope[name], k)
+        sideways = float(np.linalg.norm(across))
+        if sideways - along > _ABOVE_NOISE * error[name]:
+            most = [axis for axis in "xyz" if axis != name[1]][int(np.abs(across).argmax())]
+            told.append(f"{name} ({1e3 * sideways:.3g} mm/N, most along {most}; along it {1e3 * along:.3g})")
+    if not told:
+        return None
+    return Notice(
+        "sideways-push",
+        f"The tip moves more at right angles to the force than along it: {listed(told)}. Check that the directions "
+        "are axes of the robot's base, not of the instrument, and that none are exchanged.",
+    )
+
+
+def _standard_error(pushes: Sequence[PushLine], name: str, instrument: Instrument) -> float:
+    squares: list[float] = []
+    for one in pushes:
+        if one.direction == name:
+            about: Array = one.force - one.force.mean()
+            squares.append(float(about @ about))
+    return instrument.sigma / float(np.sqrt(sum(squares)))
+
+
+# What is to be said of readings and times that were written with few decimals.
+
+#: So many records are named.
+_NAMED = 4
+
+
+def said_of_rounding(found: Evaluation, instrument: Instrument) -> tuple[Notice, ...]:
+    """Return what is to be said of rounding.
+
+    Args:
+        instrument: As stated, without what rounding adds.
+    """
+    notices = (_readings(found, instrument), _times(found, instrument))
+    return tuple(notice for notice in notices if notice is not None)
+
+
+def _readings(found: Evaluation, instrument: Instrument) -> Notice | None:
+    told = []
+    for name, reading in found.readings.items():
+        if reading.rounding > instrument.sigma:
+            step = 1e3 * math.sqrt(12.0) * reading.rounding
+            told.append(f"positions of {name} to {step:.3g} mm ({1e3 * reading.rounding:.2g} mm)")
+        if instrument.sigma_rot is not None and reading.rounding_rot > instrument.sigma_rot:
+            step = math.sqrt(3.0) * reading.rounding_rot
+            told.append(f"quaternions of {name} to {step:.2g} ({math.degrees(reading.rounding_rot):.2g} deg)")
+    if not told:
+        return None
+    return Notice(
+        "readings-rounded",
+        f"Readings are rounded more coarsely than the instrument reads: {', '.join(told)}. What that leaves open "
+        "as a standard deviation, in brackets, stands in place of the instrument's. Write more decimals.",
+        "note",
+    )
+
+
+def _times(found: Evaluation, instrument: Instrument) -> Notice | None:
+    told: dict[str, str] = {}
+    for of, clock, pace in _clocks(found):
+        off = pace * clock.resolution / math.sqrt(12.0)
+        if off > instrument.sigma and of not in told:
+            even = "on an even clock" if clock.even else "no even clock fits"
+            told[of] = f"{of} to {clock.resolution:g} s, {1e3 * pace * clock.resolution:.2g} mm ({even})"
+    if not told:
+        return None
+    more = f", and {len(told) - _NAMED} more" if len(told) > _NAMED else ""
+    return Notice(
+        "times-rounded",
+        f"Times are rounded to more than the tip is known to move in: {', '.join(list(told.values())[:_NAMED])}{more}. "
+        "Samples that an even clock fits were placed on it; where none does, rounding counts as noise, and what it "
+        "leaves open is marked. Write the times with more decimals.",
+        "note",
+    )
+
+
+def _clocks(found: Evaluation) -> Iterator[tuple[str, Clock, float]]:
+    """Yield whose each clock is, and how fast the tip is there: at rest where it enters the band [m/s]."""
+    runs = [one.run for one in found.velocities] + [one.run for one in found.deviations]
+    runs += [one.run for one in found.corners] + [one.run for one in found.weaves]
+    for run in runs:
+        for clock in {id(cycle.clock): cycle.clock for cycle in run.cycles}.values():
+            yield f"{run.test} on {run.path.path.name}", clock, run.velocity
+    for curve in found.settling:
+        row = int(np.clip(np.searchsorted(curve.time, curve.entry), 1, len(curve.time) - 1))
+        pace = abs(np.diff(curve.distance)[row - 1]) / max(curve.time[row] - curve.time[row - 1], 1e-9)
+        yield f"{curve.test} at {curve.where}", curve.clock, float(pace)
+
+
+#: So many samples are named.
+_NAMED_PATHS = 5
+#: A path that is run at less than this share of the commanded velocity is said: on circles and weaves the robot slows
+#: down by itself.
+_SLOW = {"polyline": 0.5, "circle": 0.1, "weave": 0.1}
+#: Samples of a cycle on the way, its ends left aside, among which a corner is not taken for a wild sample.
+_LEAST_MOVING, _END = 90, 0.02
+#: Samples are missing where two are further apart than this share of the path, and than so many usual steps.
+_GAP, _GAP_STEPS = 0.06, 6.0
+#: A corner that lies as far beside as this share of CR is said.
+_ASIDE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class _Record:
+    """Cycles of one place that are compared with each other: lines, times, positions, where in the cycle, rounding."""
+
+    name: str
+    numbers: tuple[int, ...]
+    lines: tuple[NDArray[np.intp], ...]
+    times: tuple[Array, ...]
+    positions: tuple[Array, ...]
+    places: tuple[Array, ...]
+    rounding: float
+
+
+def said_of_streams(found: Evaluation) -> tuple[Notice, ...]:
+    """Return what is to be said of paths and settling."""
+    runs = _runs(found)
+    notices = (
+        _unusual(_records(found, runs)),
+        _wild(found),
+        _gaps(runs),
+        _slow(runs),
+        _sparse(found),
+        _bandwidth(found),
+        _aside(found),
+    )
+    return tuple(notice for notice in notices if notice is not None)
+
+
+def _runs(found: Evaluation) -> list[Run]:
+    runs = [curve.run for curve in found.deviations] + [curve.run for curve in found.corners]
+    runs += [curve.run for curve in found.velocities] + [curve.run for curve in found.weaves]
+    return list({id(run): run for run in runs}.values())
+
+
+def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
+    of_paths, of_settling = (
+        found.readings[name].rounding if name in found.readings else 0.0 for name in ("paths", "settling")
+    )
+    records = []
+    for run in runs:
+        cycles = run.cycles
+        if _angular(run) and min(_moving(cycle.along, run.path.length) for cycle in cycles) < _LEAST_MOVING:
+            continue
+        numbers, lines = tuple(c.number for c in cycles), tuple(c.lines for c in cycles)
+        times, positions = tuple(c.time for c in cycles), tuple(c.position for c in cycles)
+        places = tuple(c.along for c in cycles)
+        records.append(_Record(_called(run), numbers, lines, times, positions, places, of_paths))
+    settling: dict[tuple[object, ...], list[int]] = {}
+    for row, curve in enumerate(found.settling):
+        settling.setdefault((curve.test, curve.where, curve.conditions), []).append(row)
+    for rows in settling.values():
+        curves = [found.settling[row] for row in rows]
+        # half of the way is passed at one time in each cycle: the clocks are set by it
+        half = [float(c.time[int((c.distance < 0.5 * c.distance[0]).argmax())]) for c in curves]
+        records.append(
+            _Record(
+                f"{curves[0].test} at {curves[0].where}",
+                tuple(c.cycle for c in curves),
+                tuple(c.lines for c in curves),
+                tuple(c.time for c in curves),
+                tuple(c.position for c in curves),
+                tuple(c.time - begin for c, begin in zip(curves, half, strict=True)),
+                of_settling,
+            )
+        )
+    return records
+
+
+def _angular(run: Run) -> bool:
+    return run.path.path.kind == "weave" or len(run.path.vertices) > 2
+
+
+def _moving(along: Array, length: float) -> int:
+    """Return how many samples a cycle has between its ends."""
+    return int(((along > _END * length) & (along < (1 - _END) * length)).sum())
+
+
+def _unusual(records: Sequence[_Record]) -> Notice | None:
+    named = []
+    for record in records:
+        for one in unusual_samples(record.times, record.positions, record.places, record.rounding):
+            line = int(record.lines[one.cycle][one.sample])
+            text = f"line {line} (cycle {record.numbers[one.cycle]} of {record.name}, {1e3 * one.distance:.2g} mm)"
+            named.append((one.distance, text))
+    if not named:
+        return None
+    return Notice(
+        "unusual-samples",
+        f"Samples lie apart from those about them, as in no other cycle there: {_worst(named)}. If it was the "
+        "instrument, remove these lines: samples may be missing. If it was the robot, they belong into the figures.",
+    )
+
+
+def _worst(named: Sequence[tuple[float, str]]) -> str:
+    """Return the texts with the largest numbers, and how many more there are."""
+    shown = [text for _, text in sorted(named, key=lambda both: -both[0])[:_NAMED_PATHS]]
+    return ", ".join([*shown, f"and {len(named) - _NAMED_PATHS} more"] if len(named) > _NAMED_PATHS else shown)
+
+
+def _called(run: Run) -> str:
+    return f"{run.test} on {run.path.path.name}"
+
+
+def _slow(runs: Sequence[Run]) -> Notice | None:
+    told = []
+    for run in runs:
+        pace = float(np.median([pace_along(run.path, cycle.time, cycle.along) for cycle in run.cycles]))
+        if pace < _SLOW[run.path.path.kind] * run.velocity:
+            told.append(f"{_called(run)} at {1e3 * pace:.4g} of {1e3 * run.velocity:.4g} mm/s")
+    if not told:
+        return None
+    more = f", and {len(told) - _NAMED_PATHS} more" if len(told) > _NAMED_PATHS else ""
+    return Notice(
+        "slow-path",
+        f"Paths were run much slower than commanded: {', '.join(told[:_NAMED_PATHS])}{more}. If the robot cannot, that "
+        "is what AV says; otherwise check velocity [%] and the rated velocity of the plan.",
+    )
+
+
+def _sparse(found: Evaluation) -> Notice | None:
+    told: dict[str, None] = {}
+    for path in found.deviations:
+        if path.sparse:
+            told |= dict.fromkeys((path.run.test, path.run.test.replace("AT", "RT", 1)))
+    for corner in found.corners:
+        told |= dict.fromkeys(id_ for id_, far in zip(("CR", "CO"), corner.sparse, strict=True) if far)
+    for curve in found.settling:
+        ids = ("t", "OV") if curve.test == "t" else ("posing-time",)
+        told |= dict.fromkeys(id_ for id_, far in zip(ids, curve.sparse, strict=False) if far)
+    if not told:
+        return None
+    return Notice(
+        "sampled-too-slowly",
+        f"Samples are too far apart for some values of {listed(tuple(told))}: what lies between two of them is not "
+        "seen. Those values are marked; sample faster.",
+    )
+
+
+def _wild(found: Evaluation) -> Notice | None:
+    named = []
+    for path in found.deviations:
+        wild = wild_cycle(path)
+        if wild is None:
+            continue
+        cycle, far, accuracy, repeatability = wild
+        now = f"RT is {1e3 * float(path.spread.max()):.4f} mm, without it {1e3 * repeatability:.4f}"
+        now += f"; AT is {1e3 * float(path.distance.max()):.4f} mm, without it {1e3 * accuracy:.4f}"
+        number = path.run.cycles[cycle].number
+        named.append((far, f"cycle {number} of {_called(path.run)} by {1e3 * far:.4f} mm ({now})"))
+    if not named:
+        return None
+    return Notice(
+        "wild-cycle",
+        f"Cycles lie apart from the others of their path as a whole: {_worst(named)}. The standard excludes no cycle, "
+        "and none was left out. Look at the record, and measure the cycle again if the instrument or its mount moved.",
+    )
+
+
+def _gaps(runs: Sequence[Run]) -> Notice | None:
+    """Return where samples are missing over more than a part of a path."""
+    named = []
+    for run in runs:
+        length = run.path.length
+        for cycle in run.cycles:
+            gap = np.diff(np.clip(cycle.along, 0.0, length))
+            moving = gap[gap > 0.1 * length / len(gap)]
+            usual = float(np.median(moving)) if len(moving) else 0.0
+            worst = int(gap.argmax())
+            if gap[worst] > max(_GAP * length, _GAP_STEPS * usual):
+                lines = f"lines {cycle.lines[worst]} and {cycle.lines[worst + 1]}"
+                text = f"{1e3 * gap[worst]:.3g} mm between {lines} (cycle {cycle.number} of {_called(run)})"
+                named.append((float(gap[worst]), text))
+    if not named:
+        return None
+    return Notice(
+        "gap-in-path",
+        f"Samples are missing on a part of the way: {_worst(named)}. Values there come from straight lines between the "
+        "samples before and behind. Measure these cycles again, or leave them out.",
+    )
+
+
+def _bandwidth(found: Evaluation) -> Notice | None:
+    bandwidths = [curve.bandwidth for curve in found.velocities]
+    if not bandwidths:
+        return None
+    low, high = min(bandwidths), max(bandwidths)
+    upto = f"{high:.2g} Hz" if high < 1.1 * low else f"{low:.2g} to {high:.2g} Hz"
+    return Notice(
+        "velocity-bandwidth",
+        f"FV and its interval tell what fluctuates with up to {upto}: faster fluctuation is smoothed away together "
+        "with the instrument's noise. Compare robots at the same bandwidth.",
+        "note",
+    )
+
+
+def _aside(found: Evaluation) -> Notice | None:
+    there = [corner for corner in found.corners if corner.offset > _ASIDE * float(corner.rounding.mean())]
+    if not there:
+        return None
+    worst = max(there, key=lambda corner: corner.offset)
+    return Notice(
+        "corner-offset",
+        f"At {len(there)} of {len(found.corners)} corners the path as a whole lies beside its command by more than "
+        f"half of CR, which CR and CO contain. At {worst.where} it lies {1e3 * worst.offset:.3f} mm beside, and CR of "
+        f"{1e3 * float(worst.rounding.mean()):.3f} mm would be {1e3 * float(worst.own.mean()):.3f} mm from its own "
+        "corner.",
+        "note",
+    )

@@ -1,0 +1,1 @@
+"""A campaign on the twin that moves."""

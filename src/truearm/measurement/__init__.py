@@ -1,1 +1,0 @@
-"""What was measured, what is compared, and what simulates it."""

@@ -1,1 +1,0 @@
-"""A ChArUco board that a camera sees: pictures, the lens, and where the board is."""

@@ -1,0 +1,1 @@
+"""A plan measured reading by reading: `truearm measure`."""

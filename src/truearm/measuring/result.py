@@ -1,0 +1,185 @@
+"""What came of measuring a plan: what is kept, what was set aside and why, and how the nests moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.base.units import Marked
+from truearm.engine.base.writing import write_files
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.data.readers.rows import Configurations
+from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.measuring.campaign import NestDrift, nest_drift
+from truearm.measuring.kept_readings import StatedSigma, kept_readings, stated_sigma
+from truearm.measuring.reading_log import About
+from truearm.measuring.session import REASONS, Session
+
+DATA: Final = "measurements.csv"
+PAGE: Final = "measure.html"
+#: How a measuring goes on that is not finished.
+GOES_ON: Final = "The same command goes on there."
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Measured(Record):
+    """A plan as it was measured so far."""
+
+    title: str  #: What the robot is called.
+    plan: str  #: The plan, for messages.
+    session: Session  #: All readings.
+    configurations: Configurations  #: Those of the plan.
+    about: About  #: What it was measured with.
+    instrument: str  #: Where the readings came from, in words.
+    folder: Path  #: In which the files are.
+    command: str  #: How to go on, or to write the files again.
+    told: tuple[Notice, ...] = ()  #: What to know about how it was measured.
+    simulated: bool = False  #: Whether a virtual instrument reads.
+
+    @property
+    def data(self) -> Dataset | None:
+        """The readings that are kept; None if there is none of a target."""
+        return kept_readings(self.session, self.configurations, str(self.folder / DATA), self.simulated)
+
+    @property
+    def simulated_from(self) -> tuple[Marked, ...]:
+        """``data``, if a virtual instrument reads."""
+        return ("data",) if self.simulated else ()
+
+    @property
+    def drift(self) -> NestDrift | None:
+        """How the nests moved; None before one was read."""
+        return nest_drift(self.session)
+
+    @property
+    def sigma(self) -> StatedSigma:
+        """With which standard deviation the measurements are written."""
+        return stated_sigma(self.session)
+
+    @property
+    def finished(self) -> bool:
+        """Whether nothing is left to be measured."""
+        return self.session.done
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know about the measurements."""
+        return (*self._unfinished(), *self._moved(), *self.told, *self.about.notices())
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files that are written: none before a reading of a target is kept."""
+        return () if self.data is None else (DATA, PAGE)
+
+    def write(self) -> None:
+        """Write measurements and report into the folder, if there are any."""
+        from truearm.measuring.report import measure_report
+
+        data = self.data
+        if data is not None:
+            write_files(self.folder, {DATA: csv_text(data), PAGE: measure_report(self)}, self.command)
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm."""
+        session, drift = self.session, self.drift
+        return {
+            "finished": self.finished,
+            "configurations": {"measured": self._measured(), "planned": len(session.labels)},
+            "targets": list(session.targets),
+            "kept": {"targets": self._kept(), "nests": len(session.kept) - self._kept()},
+            "set_aside": session.aside_by_reason,
+            "left_out": len(session.left_out),
+            "outstanding": session.outstanding,
+            "nests": None
+            if drift is None
+            else {
+                "names": list(drift.names),
+                "rounds": len(drift.rounds),
+                "largest_mm": drift.largest * 1e3,
+                "together_mm": self._together(drift) * 1e3,
+                "sigma_mm": None if drift.sigma is None else drift.sigma * 1e3,
+            },
+            "sigma_mm": None if self.sigma.value is None else self.sigma.value * 1e3,
+            "sigma_from": self.sigma.words,
+            "about": {**self.about.fixed, "environment": [air.__dict__ for air in self.about.environment]},
+            "files": list(self.files),
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        session = self.session
+        text = [
+            f"{self._measured()} of {counted(len(session.labels), 'configuration')} measured, "
+            f"{counted(self._kept(), 'reading')} of {counted(len(session.targets), 'target')} kept."
+        ]
+        counts: Mapping[str, int] = session.aside_by_reason
+        total = sum(counts.values())
+        if total:
+            why = ", ".join(f"{count} {reason} ({REASONS[reason]})" for reason, count in counts.items())
+            text.append(f"{counted(total, 'reading')} set aside: {why}.")
+        if session.left_out:
+            places = listed([f"{label}/{name}" for label, name in session.left_out])
+            text.append(f"{counted(len(session.left_out), 'reading')} left out (configuration/target): {places}.")
+        if (drift := self.drift) is not None:
+            text.append(f"Nests {listed(drift.names)} in {counted(len(drift.rounds), 'round')}: {self._how(drift)}.")
+        if self._kept():
+            size = "" if self.sigma.value is None else f"{self.sigma.value * 1e3:.4f} mm, "
+            text.append(f"Standard deviation in the file: {size}{self.sigma.words}.")
+        return [*text, *notice_lines(self.warnings)]
+
+    def _kept(self) -> int:
+        return sum(not entry.is_nest for entry in self.session.kept)
+
+    def _measured(self) -> int:
+        return len({entry.label for entry in self.session.kept if not entry.is_nest})
+
+    def _how(self, drift: NestDrift) -> str:
+        if len(drift.rounds) == 1:
+            return "whether they move shows from the second round on"
+        repeat = "" if drift.sigma is None else f"; they repeat to {drift.sigma * 1e3:.4f} mm in a coordinate"
+        return (
+            f"moved by up to {drift.largest * 1e3:.4f} mm, together by up to {self._together(drift) * 1e3:.4f} mm"
+            f"{repeat}. No reading is corrected for it"
+        )
+
+    @staticmethod
+    def _together(drift: NestDrift) -> float:
+        return float((drift.common**2).sum(axis=1).max() ** 0.5)
+
+    def _unfinished(self) -> list[Notice]:
+        step = self.session.next
+        if step is None:
+            return []
+        return [
+            Notice(
+                "unfinished",
+                f"{counted(self.session.outstanding, 'reading')} are still to be taken; next is {step.label}, "
+                f"{step.names[0]}. {GOES_ON}",
+            )
+        ]
+
+    def _moved(self) -> list[Notice]:
+        drift = self.drift
+        if drift is None or (noise := drift.noise((self.sigma.own and self._stated()) or None)) is None:
+            return []
+        far = self._together(drift)
+        if far <= 5.0 * noise * math.sqrt(2.0 / len(drift.names)):
+            return []
+        return [
+            Notice(
+                "nests-moved",
+                f"The nests moved together by up to {far * 1e3:.3f} mm, and by chance a coordinate of a reading is off "
+                f"by no more than {noise * 1e3:.4f} mm: instrument or floor moved. The readings are not corrected for "
+                "it. Wait until the instrument is warm, fix its stand, and measure again.",
+            )
+        ]
+
+    def _stated(self) -> float:
+        found = [e.reading.sigma for e in self.session.kept if e.reading is not None and e.reading.sigma is not None]
+        return math.sqrt(sum(value**2 for value in found) / len(found)) if found else 0.0

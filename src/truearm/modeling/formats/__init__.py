@@ -1,1 +1,0 @@
-"""Files that hold robots: truearm's own YAML, URDF, DH tables, JSON, Python."""

@@ -1,1 +1,0 @@
-"""Which configurations to measure: observability, exchange search, predicted accuracy."""

@@ -1,1 +1,0 @@
-"""Where an arm may be measured."""

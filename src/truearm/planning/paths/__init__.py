@@ -1,1 +1,0 @@
-"""Paths, time laws and the joint motions along them."""

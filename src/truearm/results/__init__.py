@@ -1,1 +1,0 @@
-"""Frozen records of what was found: reports and commands read them and copy nothing."""

@@ -1,0 +1,1 @@
+"""Robots of the library and their files: `truearm robots`, `show`, `ik`, `convert`, `export`."""

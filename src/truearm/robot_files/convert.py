@@ -1,0 +1,254 @@
+"""Measurements as the tables of RoboDK's robot calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from truearm.engine.base.errors import InputError, Notice, counted, did_you_mean, refusals_of
+from truearm.engine.base.units import Marked
+from truearm.engine.base.writing import write_new_text
+from truearm.engine.command.arguments import (
+    choice_argument,
+    joints_argument,
+    new_file_for,
+    readings_argument,
+    robot_argument,
+)
+from truearm.engine.command.split import told_of
+from truearm.engine.data.controller_joints import in_controller_joints
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.readers.robodk import robodk_csv
+from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.robot.controller import JointsOf
+from truearm.engine.robot.conversion import CONVERSIONS, converted
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.wrench import refuse_pushed
+from truearm.robot_files.formats import FORMATS
+
+# A robot in another kinematic convention.
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConvertedRobot(Record):
+    """A robot in another kinematic convention, every pose the same."""
+
+    robot: Robot  #: In the other convention. Its history ends with what was done.
+    file: Path | None = None  #: Its robot file; None if none was written.
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "file": None if self.file is None else str(self.file),
+            "robot": self.robot.name,
+            "convention": self.robot.convention_name,
+            "history": self.robot.history[-1],
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was done."""
+        text = f"{self.robot.name}, {self.robot.history[-1]}."
+        return [text if self.file is None else f"{self.file}: {text}"]
+
+
+# A robot in another kinematic convention.
+
+
+def convert(robot: Robot | str | Path, convention: str, *, out: str | Path | None = None) -> ConvertedRobot:
+    """Write a robot in another kinematic convention, every pose the same.
+
+    Parameters
+    ----------
+    robot
+        A robot, or what :func:`truearm.load_robot` takes. Its values become the nominal ones.
+    convention
+        One of :data:`truearm.engine.robot.conversion.CONVERSIONS` by name.
+    out
+        Robot file to write, which must not exist yet; None writes nothing.
+
+    Raises
+    ------
+    InputError
+        If there is no such convention, or it cannot describe the robot, or the file exists.
+    """
+    choice_argument(convention, "convention", CONVERSIONS)
+    file = None if out is None else new_file_for(out)
+    with refusals_of("robot"):
+        made = converted(robot_argument(robot), convention)
+    if file is not None:
+        write_new_text(file, robot_text(made))
+    return ConvertedRobot(made, file)
+
+
+# A robot for other programs.
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportedRobot(Record):
+    """A robot for other programs, and what the format cannot hold."""
+
+    robot: Robot  #: The robot.
+    format: str  #: Name of the format.
+    text: str  #: Content of the file.
+    frames: str  #: Which frames its numbers refer to.
+    left_out: tuple[str, ...]  #: What the format cannot hold, one sentence each.
+    file: Path | None = None  #: The file; None if none was written.
+    told: tuple[Notice, ...] = ()  #: What speaks against the calibration of the robot.
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know about it: what the format cannot hold, and what speaks against the calibration."""
+        return (*(Notice("left-out", message) for message in self.left_out), *self.told)
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "file": None if self.file is None else str(self.file),
+            "format": self.format,
+            "frames": self.frames,
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was written, and then what was left out."""
+        text = f"{self.robot.name} as {self.format}. {self.frames}"
+        return [text if self.file is None else f"{self.file}: {text}", *self.left_out, *notice_lines(self.told)]
+
+
+# A robot for other programs.
+
+
+def export(robot: Robot | str | Path, format: str, *, out: str | Path | None = None) -> ExportedRobot:
+    """Write a robot, nominal or calibrated, for other programs, and say what the format cannot hold.
+
+    Parameters
+    ----------
+    robot
+        A robot, or what :func:`truearm.load_robot` takes.
+    format
+        ``dh`` (standard DH table), ``mdh`` (modified DH table), ``hayati`` (standard DH table with beta between nearly
+        parallel axes), ``urdf``, ``json`` (everything, schema ``truearm-model/1``), ``python`` (a module for forward
+        and inverse kinematics that needs only NumPy) or ``ur-kinematics`` (the kinematics file of the ROS driver of
+        Universal Robots).
+    out
+        File to write, which must not exist yet; None writes nothing.
+
+    Raises
+    ------
+    InputError
+        If there is no such format, or it cannot describe the robot, or the file exists.
+    """
+    exported = choice_argument(format, "format", FORMATS)
+    file = None if out is None else new_file_for(out)
+    loaded = robot_argument(robot)
+    refuse_pushed(loaded)
+    with refusals_of("robot"):
+        made = exported(loaded)
+    if file is not None:
+        write_new_text(file, made.text)
+    return ExportedRobot(loaded, format, made.text, made.frames, made.left_out, file, tuple(told_of(loaded)))
+
+
+# Measurements for other programs.
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportedMeasurements(Record):
+    """Measurements for other programs."""
+
+    text: str  #: Content of the file.
+    configurations: int  #: configurations, readings: how many there are.
+    readings: int
+    joints_are: JointsOf  #: Whose joint positions the file holds.
+    file: Path | None = None  #: The file; None if none was written.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "file": None if self.file is None else str(self.file),
+            "configurations": self.configurations,
+            "readings": self.readings,
+            "joints_are": self.joints_are,
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was written."""
+        where = "" if self.file is None else f"{self.file}: "
+        many = f"{counted(self.configurations, 'configuration')}, {counted(self.readings, 'reading')}"
+        return [f"{where}{many}", *joints_lines(self.joints_are)]
+
+
+def export_robodk(
+    robot: Robot | str | Path,
+    data: Dataset | str | Path,
+    *,
+    joints: JointsOf | None = None,
+    out: str | Path | None = None,
+) -> ExportedMeasurements:
+    """Write measurements as RoboDK's robot calibration has them.
+
+    Parameters
+    ----------
+    robot
+        A robot with the targets of the data on its tool, or what :func:`truearm.load_robot` takes: a calibrated one, or
+        one whose file has a tool with targets of these names.
+    data
+        Positions, or poses, in the instrument's frame, or a canonical CSV file.
+    joints
+        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
+        controller's where the robot file says that they differ.
+    out
+        File to write, which must not exist yet; None writes nothing.
+
+    Raises
+    ------
+    InputError
+        If the robot has not six turning joints or not these targets, or the data are no positions.
+    """
+    file = None if out is None else new_file_for(out)
+    arm = robot_argument(robot)
+    if [joint.kind for joint in arm.joints] != ["revolute"] * 6:
+        raise InputError(
+            "RoboDK calibrates arms of six turning joints",
+            parameter="robot",
+            where=arm.name,
+            cure="Use the canonical CSV.",
+        )
+    joints_are = joints_argument(joints, arm)
+    readings = readings_argument(arm, data)
+    with refusals_of("data"):
+        if not readings.has_position.any() or (readings.against >= 0).any():
+            raise InputError(
+                "RoboDK's table holds positions in the instrument's frame",
+                where=readings.source,
+                cure="Export data that have them, without fixtures.",
+            )
+        seen = (
+            arm if arm.targets or not arm.tools else arm.with_frames(arm.base, next(iter(arm.tools.values())).targets)
+        )
+        known = {target.name: seen.forward_kinematics(np.zeros((1, 6)), target.name) for target in seen.targets}
+        for name in readings.targets:
+            if name not in known:
+                raise InputError(
+                    "the robot has no target of this name on its tool",
+                    where=readings.source,
+                    came=name,
+                    allowed=", ".join(known) or None,
+                    cure=did_you_mean(name, list(known)) or "Give the calibrated robot.",
+                )
+    flange = seen.forward_kinematics(np.zeros((1, 6)))
+    turned = flange.matrix()[0]
+    points = [turned.T @ (known[name].position[:, 0] - flange.position[:, 0]) for name in readings.targets]
+    rotations = [turned.T @ known[name].matrix()[0] for name in readings.targets]
+    shown = in_controller_joints(arm, readings) if joints_are == "controller" else readings
+    text = robodk_csv(shown, points, rotations)
+    if file is not None:
+        write_new_text(file, text)
+    return ExportedMeasurements(
+        text, readings.configurations, len(text.splitlines()) - 1, joints_are, file, readings.simulated_from
+    )

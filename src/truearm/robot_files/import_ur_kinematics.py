@@ -1,0 +1,162 @@
+"""A robot with the kinematics that its controller computes with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from truearm.engine.base.errors import InputError, Notice, refusals_of
+from truearm.engine.base.files import path_argument
+from truearm.engine.base.writing import write_new_text
+from truearm.engine.command.arguments import new_file_for, robot_argument
+from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.robot.library import library, load_robot
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.engine.robot.ur_kinematics import (
+    FactoryKinematics,
+    mean_distance,
+    read_kinematics,
+    refuse_far,
+    with_kinematics,
+)
+
+# A robot with the kinematics that its controller computes with.
+
+#: Joint zeros that are so many times smaller speak for another type: of published files they are 8 times and more, or
+#: less than twice.
+_CLEARLY: Final = 5.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedKinematics(Record):
+    """A robot with the kinematics that its controller computes with."""
+
+    robot: Robot  #: Its values are the controller's, its nominal values the type's.
+    type: Robot  #: The type of arm, as its maker publishes it.
+    distance: float  #: How far the flange is from the type's on average, at random joint positions [m].
+    #: Other types of the library that the file fits as well, with the largest joint zero that it has of them [rad].
+    fitting: Mapping[str, float] = field(default_factory=dict)
+    file: Path | None = None  #: The robot file; None if none was written.
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know about it: types that cannot be told apart by the file."""
+        if not self.fitting:
+            return ()
+        best, zero = min(self.fitting.items(), key=lambda one: one[1])
+        ours = largest_zero(self.robot)
+        if zero < ours / _CLEARLY:
+            return (
+                Notice(
+                    "type-doubtful",
+                    f"The file is rather of an arm of type {best}. The factory's joint zeros are nearly nothing, and "
+                    f"they are up to {math.degrees(zero):.2g} deg for {best} and {math.degrees(ours):.2g} deg for "
+                    f"{self.type.name}. Read the type on the arm.",
+                ),
+            )
+        return (
+            Notice(
+                "type-not-told",
+                f"The file fits {' and '.join(self.fitting)} as well as {self.type.name}: it has differences to a "
+                "table that it does not name. Read the type on the arm; with the wrong one lengths are off by what "
+                "the data sheets differ.",
+                "note",
+            ),
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "file": None if self.file is None else str(self.file),
+            "robot": self.robot.name,
+            "identity": dict(self.robot.controller.kinematics.identity),
+            "mean_distance_from_type_mm": self.distance * 1e3,
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was read."""
+        text = (
+            f"{self.robot.name} with the kinematics of its controller, flange {self.distance * 1e3:.2f} mm from the "
+            "type's on average"
+        )
+        identity = self.robot.controller.kinematics.identity
+        return [
+            text if self.file is None else f"{self.file}: {text}",
+            *(f"  {name}: {value}" for name, value in identity.items()),
+            *notice_lines(self.warnings),
+        ]
+
+
+def largest_zero(robot: Robot) -> float:
+    """Return the largest joint zero of a robot [rad]."""
+    return max(abs(parameter.value) for parameter in robot.parameters.values() if parameter.group == "joint zero")
+
+
+def import_ur_kinematics(
+    file: str | Path, robot: Robot | str | Path, *, out: str | Path | None = None
+) -> ImportedKinematics:
+    """Read the kinematics that the controller of a Universal Robots arm computes with, as a robot.
+
+    Parameters
+    ----------
+    file
+        ``calibration.conf`` of the controller, or the kinematics file of the ROS driver.
+    robot
+        The arm's type: a robot with the maker's table, or what :func:`truearm.load_robot` takes.
+    out
+        Robot file to write, which must not exist yet; None writes nothing.
+
+    Returns
+    -------
+    imported
+        The robot: its values are what the controller computes with. Its nominal values, masses, limits and tools are
+        those of the type, in frames beside the type's.
+
+    Raises
+    ------
+    InputError
+        If the file is no such file, is not whole, or is of an arm of another type; if the type is no arm of this kind;
+        or if `out` exists.
+    """
+    path = path_argument(file, "file")
+    target = None if out is None else new_file_for(out)
+    type_ = robot_argument(robot)
+    with refusals_of("file"):
+        found = read_kinematics(path)
+    with refusals_of("robot"):
+        made = with_kinematics(type_, found)
+    fitting = _fitting(found, type_)
+    try:
+        refuse_far(made, type_, str(path))
+    except InputError as error:
+        if fitting:
+            words = f"Of the library, {' and '.join(fitting)} {'fits' if len(fitting) == 1 else 'fit'}."
+            error = InputError(
+                error.what, where=error.where, came=error.came, allowed=error.allowed, cure=f"{error.cure} {words}"
+            )
+        error.parameter = "robot"
+        raise error from None
+    if target is not None:
+        write_new_text(target, robot_text(made))
+    return ImportedKinematics(made, type_, mean_distance(made, type_), fitting, target)
+
+
+def _fitting(found: FactoryKinematics, type_: Robot) -> dict[str, float]:
+    """Return the other types of the library that a file fits as well, with their largest joint zero [rad]."""
+    names = {}
+    for name in library():
+        other = load_robot(name)
+        if name == type_.name:
+            continue
+        try:
+            made = with_kinematics(other, found)
+            refuse_far(made, other, name)
+        except InputError:  # no arm of this kind, or far from this one
+            continue
+        names[name] = largest_zero(made)
+    return names

@@ -1,0 +1,291 @@
+"""The joints that bring a robot to poses."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from truearm.engine.base.arrays import axes
+from truearm.engine.base.errors import InputError, Notice, refusals_of, wrong_kind
+from truearm.engine.base.files import path_argument
+from truearm.engine.base.units import Marked
+from truearm.engine.base.writing import write_text
+from truearm.engine.command.arguments import (
+    array_argument,
+    choice_argument,
+    file_for,
+    gravity_argument,
+    joints_argument,
+    payload_argument,
+    pushed_argument,
+    robot_argument,
+    wrench_argument,
+)
+from truearm.engine.command.split import told_of
+from truearm.engine.data.readers.configurations import read_poses
+from truearm.engine.diagnose.external_force import check_force
+from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.controller import Controller, JointsOf
+from truearm.engine.robot.frames import FRAMES, Frame, frame_and_tip
+from truearm.engine.robot.inverse.kinematics import inverse as inverse_kinematics
+from truearm.engine.robot.inverse.pose_solver import JointSolutions, Orientation, PoseStatus
+from truearm.engine.robot.parts import Joint, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY, rotation_from_quaternion
+from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
+from truearm.engine.robot.wrench import Wrench, WrenchFrame
+
+# Joint tables: the answers of inverse kinematics as CSV.
+
+
+def joints_csv(
+    solutions: JointSolutions, labels: Sequence[str], joints: Sequence[Joint], controller: Controller | None = None
+) -> str:
+    """Return solutions as CSV, one row a pose and branch, joints in deg or mm.
+
+    Args:
+        labels: Name of each pose.
+        joints: Of the robot.
+        controller: Who shows the joint positions, ``axis_i``; None for the model's, ``joint_i``.
+    """
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(
+        [
+            "pose",
+            "branch",
+            "status",
+            *joint_headings(joints, controller),
+            "position_error [mm]",
+            "orientation_error [mrad]",
+        ]
+    )
+    for row, positions in enumerate(joint_cells(solutions.joints, joints, controller)):
+        angle = float(solutions.orientation_error[row])
+        writer.writerow(
+            [
+                labels[solutions.pose[row]],
+                solutions.branch[row],
+                solutions.status[row].value,
+                *positions,
+                f"{solutions.position_error[row] * 1e3:.6g}",
+                "" if math.isnan(angle) else f"{angle * 1e3:.6g}",
+            ]
+        )
+    return stream.getvalue()
+
+
+# Joints for poses, and which poses the robot cannot or should not just go to.
+
+#: Poses explained one by one where a person reads.
+_EXPLAINED: Final = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JointTable(Record):
+    """Joints for poses."""
+
+    labels: tuple[str, ...]  #: Name of each pose.
+    solutions: JointSolutions  #: What was found, one row a pose, or one a pose and branch.
+    warnings: tuple[Notice, ...] = ()  #: What speaks against the calibration of the robot.
+    #: Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
+    joints_are: JointsOf = "model"
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
+
+    @property
+    def joints(self) -> Array:
+        """Joint positions of each row, of the model [rad; m for prismatic joints], ``(rows, joints)``."""
+        return self.solutions.joints
+
+    @property
+    def status(self) -> tuple[PoseStatus, ...]:
+        """How the search for each row ended."""
+        return self.solutions.status
+
+    @property
+    def complete(self) -> bool:
+        """Whether the robot can go to every pose."""
+        return self.solutions.complete
+
+    @property
+    def attention(self) -> tuple[dict[str, str], ...]:
+        """Every pose that the robot cannot or should not just go to: its name, branch and status, and what to do."""
+        found = self.solutions
+        reached = set(found.pose[found.usable].tolist())
+        return tuple(
+            {
+                "pose": self.labels[pose],
+                "branch": found.branch[row],
+                "status": status.value,
+                "advice": found.advice(row),
+            }
+            for row, (pose, status) in enumerate(zip(found.pose.tolist(), found.status, strict=True))
+            if status.value != "reached" and (status.usable or pose not in reached)
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return counts by status, and what needs attention, as JSON holds them."""
+        found = self.solutions
+        return {
+            "poses": found.poses,
+            "poses_reached": len(set(found.pose[found.usable].tolist())),
+            "rows": len(found.status),
+            "joints_are": self.joints_are,
+            "status": dict(Counter(status.value for status in found.status)),
+            "attention": list(self.attention),
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return how many poses are reached, and what is wrong with the others."""
+        summary = self.summary()
+        counts = ", ".join(f"{count} {status}" for status, count in summary["status"].items())
+        text = [f"{summary['poses_reached']} of {summary['poses']} poses reached. Rows: {counts}"]
+        for entry in self.attention[:_EXPLAINED]:
+            name = f"{entry['pose']} ({entry['branch']})" if entry["branch"] else entry["pose"]
+            text.append(f"  {name}: {entry['status']}. {entry['advice']}")
+        if len(self.attention) > _EXPLAINED:
+            text.append(f"  and {len(self.attention) - _EXPLAINED} more; the JSON summary lists all")
+        return text + joints_lines(self.joints_are) + notice_lines(self.warnings)
+
+
+def inverse(
+    robot: Robot | str | Path,
+    poses: Array | str | Path,
+    rotations: Array | None = None,
+    *,
+    out: str | Path | None = None,
+    branch: str | None = None,
+    seed: Array | Sequence[float] | None = None,
+    target: str | None = None,
+    frame: Frame = "base",
+    orientation: Orientation = "full",
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+    wrench: Wrench | Sequence[float] | str | None = None,
+    wrench_frame: WrenchFrame | None = None,
+    joints: JointsOf | None = None,
+) -> JointTable:
+    """Find the joints that bring a robot to poses, with its calibration and joint effects.
+
+    The arm is at rest; what depends on the way it came or on temperature is left out.
+
+    Parameters
+    ----------
+    robot
+        A robot, or what :func:`truearm.load_robot` takes.
+    poses
+        Positions [m], ``(n, 3)``, or a CSV file with the columns pose, x [mm], y [mm], z [mm], and qw, qx, qy, qz.
+    rotations
+        Rotation matrices, ``(n, 3, 3)``; None with a file, which has its own, or with ``orientation="free"``.
+    out
+        CSV file to write; None writes nothing.
+    branch
+        A branch by name, as ``front-up-noflip``; ``all``; or None for the one nearest to the seed within the limits.
+    seed
+        Joint positions of the model ``(joints,)`` or ``(n, joints)`` [rad; m for prismatic joints] near which the
+        answer shall lie; zero if None.
+    target
+        Name of the target that shall be there; the flange if None.
+    frame
+        What the poses are given in: ``base``, the robot's base; ``world``, the instrument's frame; or ``controller``,
+        the base frame of the robot's controller. There the flange is the controller's too, where a tool is all zeros.
+    orientation
+        ``full``; ``axis`` if only the direction of the z axis counts; ``free`` if only the position does.
+    payload, gravity
+        What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
+        [m/s^2]; None for what its file says.
+    wrench
+        External force and moment on what goes to the poses, the target or the flange: six numbers [N, N m], a text such
+        as ``0N,0N,80N,0Nm,0Nm,1.5Nm``, or an object; None for none.
+    wrench_frame
+        Whose axes it is given in: ``base`` (also for None), ``tool``, those of the target or the flange, ``world`` or
+        ``controller``.
+    joints
+        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
+        controller's where the robot file says that they differ.
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be used, with a message that says what to do.
+    """
+    file = None if out is None else file_for(out, robot, poses)
+    choice_argument(frame, "frame", dict.fromkeys(FRAMES))
+    choice_argument(orientation, "orientation", dict.fromkeys(("full", "axis", "free")))
+    pushed = wrench_argument(wrench, wrench_frame)
+    arm = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
+    joints_are = joints_argument(joints, arm)
+    if target is not None:
+        choice_argument(target, "target", {known.name: known for known in arm.targets})
+    tip = frame_and_tip(arm, frame, None)[1] if target is None and frame == "controller" else arm.tool_place(target)
+    arm = pushed_argument(arm, pushed, tip)
+    if branch is not None and not isinstance(branch, str):
+        raise wrong_kind("the name of a branch belongs here", branch, "branch", "front-up-noflip, for example, or all")
+    labels, positions, turned = _poses(poses, rotations)
+    if turned is None and orientation != "free":
+        given = isinstance(poses, str | Path)
+        raise InputError(
+            "the poses have no orientation",
+            parameter="poses" if given else "rotations",
+            where=str(poses) if given else None,
+            allowed="the columns qw, qx, qy, qz" if given else "rotation matrices, (n, 3, 3)",
+            cure="Add them, or use `orientation=free`.",
+        )
+    near = None
+    if seed is not None:
+        one = axes(seed) != 2
+        shape = (len(arm.joints),) if one else (len(positions), len(arm.joints))
+        near = array_argument(seed, "seed", shape, f"{len(arm.joints)} numbers, one for each joint of {arm.name}")
+    with refusals_of("robot"):
+        solutions = inverse_kinematics(
+            arm, positions, turned, target=target, frame=frame, branch=branch, seed=near, orientation=orientation
+        )
+    if file is not None:
+        write_text(file, joints_csv(solutions, labels, arm.joints, counting(arm, joints_are)))
+    told = (*told_of(arm), *check_force([(arm, solutions.joints[solutions.usable])]))
+    return JointTable(labels, solutions, (*told, *_other_frame(arm, frame, target)), joints_are, arm.simulated_from)
+
+
+def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]:
+    """Say if poses were taken in the model's base frame, and a pendant would show them in another."""
+    controller = robot.controller
+    alike = controller.base == IDENTITY and (target is not None or controller.flange == IDENTITY)
+    if frame != "base" or alike:
+        return []
+    return [
+        Notice(
+            "model-frame",
+            "The poses were taken as those of the model's flange in its base frame. The controller has them elsewhere "
+            "('truearm show' says where): for poses that the pendant shows use `frame=controller`.",
+            "note",
+        )
+    ]
+
+
+def _poses(poses: object, rotations: object) -> tuple[tuple[str, ...], Array, Array | None]:
+    """Return names, positions and rotations of poses from a file or from arrays."""
+    if isinstance(poses, str | Path):
+        with refusals_of("poses"):
+            read = read_poses(path_argument(poses, "poses"))
+        if rotations is not None:
+            raise InputError(
+                "the file says how the poses are turned",
+                parameter="rotations",
+                cure="Leave `rotations` out, or give positions.",
+            )
+        turned = None if read.quaternion is None else rotation_from_quaternion(read.quaternion)
+        return read.labels, read.position, turned
+    positions = array_argument(poses, "poses", ("n", 3), "positions in m, (n, 3), or a CSV file")
+    labels = tuple(str(number + 1) for number in range(len(positions)))
+    if rotations is None:
+        return labels, positions, None
+    allowed = f"rotation matrices, ({len(positions)}, 3, 3)"
+    return labels, positions, array_argument(rotations, "rotations", (len(positions), 3, 3), allowed)

@@ -1,1 +1,0 @@
-"""Campaigns with the hexapod device on a digital twin."""

@@ -1,0 +1,1 @@
+"""Where to begin: `truearm example`, `demo`, `new-robot`, `study`."""

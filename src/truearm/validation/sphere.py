@@ -1,0 +1,360 @@
+"""The sphere test: a ballbar between the tool and a fixed ball."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.engine.base.errors import InputError, Notice, counted, refusals_of
+from truearm.engine.base.units import Marked, parts_of
+from truearm.engine.base.writing import output_file, write_text
+from truearm.engine.command.arguments import (
+    command_argument,
+    file_for,
+    files_of,
+    gravity_argument,
+    lengths_argument,
+    name_argument,
+    payload_argument,
+    python_call,
+    readings_argument,
+    refuse_swapped,
+    robot_argument,
+)
+from truearm.engine.command.split import changed_since, told_of
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.programs.fake_targets import nominal_robot
+from truearm.engine.programs.gauge import best_agreement
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY
+
+# A ballbar between the tool and a fixed ball: how far the tool is from the sphere it was sent to (Nubiola, 2.6.3).
+#
+# One end of the bar is at a target of the tool, the other at a ball on the table. Whatever the robot does, the bar
+# reads the distance between the two; the robot's model predicts it. No tracker is needed, and no common frame but the
+# centre.
+
+_STEPS: Final = 50
+_SETTLED: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class SphereTest:
+    """Errors of distances from the centre of a sphere."""
+
+    errors: Array  #: Measured minus predicted distance of each reading [m], ``(n,)``.
+    centre: Array  #: The centre that was used, in the robot's world [m], ``(3,)``.
+
+    @property
+    def mean(self) -> float:
+        """Mean of the signed errors [m]."""
+        return float(self.errors.mean())
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the errors about their mean [m]."""
+        return float(self.errors.std(ddof=1))
+
+    @property
+    def largest(self) -> float:
+        """Largest absolute error [m]."""
+        return float(np.abs(self.errors).max())
+
+
+def sphere_test(
+    robot: Robot, joints: ArrayLike | Postures, lengths: ArrayLike, target: str, centre: ArrayLike | None = None
+) -> SphereTest:
+    """Compare lengths that a ballbar read with those that a model predicts.
+
+    Args:
+        robot: The model to judge.
+        joints: Joint positions at which the bar was read [rad or m], ``(n, joints)``, or postures.
+        lengths: What the bar read [m], ``(n,)``; NaN where it was beyond its range, which is left out.
+        target: The target of the tool at which the bar is attached.
+        centre: The fixed ball in the robot's world [m], ``(3,)``: where the model says the robot was when it was
+            taught. If None, the centre that makes the sum of squared errors least; an error in teaching then does not
+            count.
+
+    Raises:
+        InputError: If there are not as many lengths as configurations, fewer than two are left, or fewer than five to
+            find the centre from; or if they lie so that it cannot be found.
+    """
+    q = joints if isinstance(joints, Postures) else Postures(np.asarray(joints, float))
+    read = np.asarray(lengths, float)
+    if read.shape != (len(q),):
+        raise InputError(
+            "every configuration needs one length",
+            where="lengths",
+            came=f"{read.shape} for {len(q)} configurations",
+            allowed=f"({len(q)},)",
+        )
+    inside = np.isfinite(read)
+    needed = 2 if centre is not None else 5
+    if inside.sum() < needed:
+        raise InputError(
+            "too few lengths within the range of the ballbar",
+            where="lengths",
+            came=int(inside.sum()),
+            allowed=f"{needed} or more",
+            cure="Send the tool to more points of the sphere." if inside.all() else "Calibrate the robot first.",
+        )
+    points, _ = robot.world_poses(q.at(np.flatnonzero(inside)), target)
+    middle = _centre(points, read[inside]) if centre is None else np.asarray(centre, float)
+    return SphereTest(read[inside] - np.linalg.norm(points - middle, axis=1), middle)
+
+
+def _centre(points: Array, lengths: Array) -> Array:
+    """Return the point whose distances from others are nearest to given ones, by least squares."""
+    # Differences of squared distances are linear in the centre: a start that needs no guess.
+    about = points.mean(axis=0)
+    p = points - about
+    size = float(np.linalg.norm(p, axis=1).max())
+    A = np.column_stack([2 * p / size, np.ones(len(p))])
+    spread = np.linalg.svd(A, compute_uv=False)
+    if not spread[-1] > 1e-6 * spread[0]:
+        raise InputError(
+            "the centre cannot be found: the points lie in one plane",
+            where="centre",
+            cure="Give the centre, or spread the points over the sphere.",
+        )
+    centre = np.linalg.lstsq(A, ((p**2).sum(axis=1) - lengths**2) / size, rcond=None)[0][:3]
+    for _ in range(_STEPS):
+        away = p - centre
+        distance = np.linalg.norm(away, axis=1)
+        step = np.linalg.lstsq(-away / distance[:, None], lengths - distance, rcond=None)[0]
+        centre = centre + step
+        if math.sqrt(step @ step) < _SETTLED:
+            break
+    return np.asarray(centre + about)
+
+
+# Sphere tests: a ballbar's lengths beside those that a robot's models predict, before and after calibration.
+
+
+@dataclass(frozen=True, eq=False)
+class OneSphere:
+    """The test of one target about one ball."""
+
+    target: str  #: At which the bar is attached.
+    fixture: str  #: The fixed ball.
+    lengths: Array  #: What the bar read [m], ``(n,)``.
+    left_out: int  #: How many configurations have no length: there the bar was beyond its range.
+    before: SphereTest | None  #: By the nominal robot; None for a robot that is not calibrated.
+    after: SphereTest  #: By the robot.
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SphereTests(Record):
+    """Every sphere of a file of measurements."""
+
+    robot: Robot  #: The robot that is judged.
+    source: str  #: The measurements, for messages.
+    spheres: tuple[OneSphere, ...]  #: One for each target and ball.
+    #: Name of the configuration at which the robot was taught where the ball is; None where the centre that fits best
+    #: was taken.
+    taught: str | None
+    command: str  #: How to run it again.
+    warnings: tuple[Notice, ...] = ()  #: What speaks against the calibration of the robot.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+    simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm."""
+        return {
+            "centre": "found" if self.taught is None else "taught",
+            "spheres": [
+                {
+                    "target": one.target,
+                    "fixture": one.fixture,
+                    "readings": len(one.lengths),
+                    "left_out": one.left_out,
+                    **({} if one.before is None else {"nominal_mm": _figures(one.before)}),
+                    "robot_mm": _figures(one.after),
+                }
+                for one in self.spheres
+            ],
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints: mean, deviation and largest error of each sphere."""
+        text = [
+            "Measured less predicted distance from the centre that fits best:"
+            if self.taught is None
+            else f"Measured less predicted distance from the centre that was taught at configuration {self.taught}:"
+        ]
+        for one in self.spheres:
+            lost = f", {one.left_out} beyond the range of the bar" if one.left_out else ""
+            text.append(f"{one.target} about {one.fixture}, {counted(len(one.lengths), 'reading')}{lost}")
+            if one.before is not None:
+                text.append(f"  nominal     {_words(one.before)}")
+            text.append(f"  {'calibrated' if one.before is not None else 'this robot'}  {_words(one.after)}")
+        return [*text, *notice_lines(self.warnings)]
+
+    def save(self, file: str | Path) -> Path:
+        """Write a page with the errors of every reading; return the file."""
+        from truearm.validation.sphere_page import sphere_page
+
+        page = output_file(file, self.inputs)
+        write_text(page, sphere_page(self))
+        return page
+
+
+def _figures(test: SphereTest) -> dict[str, float]:
+    return {"mean": test.mean * 1e3, "deviation": test.deviation * 1e3, "largest": test.largest * 1e3}
+
+
+def _words(test: SphereTest) -> str:
+    mean, deviation, largest = (value * 1e3 for value in (test.mean, test.deviation, test.largest))
+    return f"mean {mean:.3f}  deviation {deviation:.3f}  largest {largest:.3f} mm"
+
+
+def sphere(
+    robot: Robot | str | Path,
+    data: Dataset | str | Path,
+    *,
+    taught: str | None = None,
+    tip: Sequence[float] | None = None,
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+    out: str | Path | None = None,
+    command: str | None = None,
+) -> SphereTests:
+    """Judge a robot by a ballbar between its tool and a fixed ball, before and after calibration.
+
+    Parameters
+    ----------
+    robot
+        Usually calibrated, or what :func:`truearm.load_robot` takes. A calibrated robot is judged beside its nominal
+        self.
+    data
+        Readings of distances, or a canonical CSV file. Each pair of a target and a fixture is a sphere. A
+        configuration without a length was beyond the range of the bar and is left out.
+    taught
+        Name of the configuration at which the target was brought to the ball by hand, so that the centre is where a
+        model says it was; errors in teaching then count. It is not judged itself. None takes the centre that fits best.
+    tip
+        Where the bar is attached in the flange frame [m], if the robot does not know the target.
+    payload, gravity
+        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
+        [m/s^2]; None for what its file says.
+    out
+        HTML file with the error of every reading; None writes nothing.
+    command
+        How to run it again, for the page; None writes the call in Python.
+
+    Raises
+    ------
+    InputError
+        If there are no distances, too few of them, or the robot does not know where the bar is attached.
+    """
+    refuse_swapped(robot, data, "sphere")
+    page = None if out is None else file_for(out, robot, data)
+    call = command_argument(command) or python_call(
+        "sphere", robot, data, taught=taught, tip=tip, payload=payload_argument(payload), gravity=gravity
+    )
+    arm = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
+    measured = readings_argument(arm, data)
+    if measured.distance is None or not np.isfinite(measured.distance).any():
+        raise InputError(
+            "there are no distances of a ballbar",
+            parameter="data",
+            where=measured.source,
+            allowed="the columns target, fixture and distance [mm]",
+            cure="Give what the bar read, one row a configuration.",
+        )
+    if tip is not None:
+        place = lengths_argument(tip, "tip", 3)
+        arm = arm.with_frames(arm.base, dict.fromkeys(measured.targets, place))
+    with refusals_of("data"):
+        for name in measured.targets:
+            arm.target(name)
+    nominal = _nominal(arm)
+    at_ball = None if taught is None else _taught(measured, name_argument(taught, "taught"))
+    spheres = []
+    for number, fixture in enumerate(measured.fixtures):
+        for index, target in enumerate(measured.targets):
+            rows = np.flatnonzero((measured.target == index) & (measured.against == number))
+            if at_ball is not None:
+                rows = rows[measured.configuration[rows] != at_ball]
+            if not len(rows):
+                continue
+            lengths = measured.distance[rows]
+            inside = np.isfinite(lengths)
+            before = None if nominal is None else _judged(nominal, measured, rows, target, at_ball)
+            after = _judged(arm, measured, rows, target, at_ball)
+            spheres.append(OneSphere(target, fixture, lengths[inside], int((~inside).sum()), before, after))
+    found = SphereTests(
+        arm,
+        measured.source,
+        tuple(spheres),
+        taught,
+        call,
+        (*changed_since(robot), *told_of(arm)),
+        files_of(robot, data),
+        parts_of((arm, measured)),
+    )
+    if page is not None:
+        found.save(page)
+    return found
+
+
+def _judged(model: Robot, data: Dataset, rows: NDArray[np.intp], target: str, at_ball: int | None) -> SphereTest:
+    """Return the test of some readings by a model."""
+    assert data.distance is not None
+    centre = None if at_ball is None else _centre_sphere(model, data, at_ball)
+    with refusals_of("data"):
+        return sphere_test(model, data.postures.at(data.configuration[rows]), data.distance[rows], target, centre)
+
+
+def _nominal(robot: Robot) -> Robot | None:
+    """Return the nominal robot with the targets where its own flange has them; None if the robot is nominal itself."""
+    try:
+        nominal = nominal_robot(robot)
+    except InputError:
+        return None
+    flange = np.linalg.inv(best_agreement(robot)[1])
+    places = {}
+    for target in robot.targets:
+        at = np.array([robot.values[target.parameter(axis)] for axis in "xyz"])
+        places[target.name] = flange[:3, :3] @ at + flange[:3, 3]
+    return nominal.with_frames(IDENTITY, places)
+
+
+def _taught(data: Dataset, name: str) -> int:
+    """Return which configuration has a name, or refuse one at which it is not clear what was at the ball."""
+    if name not in data.labels:
+        raise InputError(
+            "the measurements have no configuration of this name",
+            parameter="taught",
+            where=data.source,
+            came=name,
+            cure="Name the configuration at which the target was brought to the ball.",
+        )
+    number = data.labels.index(name)
+    targets = np.unique(data.target[data.configuration == number])
+    if len(targets) > 1:
+        raise InputError(
+            "it is not clear which target was brought to the ball",
+            parameter="taught",
+            where=f"{data.source}, configuration {name}",
+            came=", ".join(data.targets[k] for k in targets),
+            cure="Leave the row of that target alone in this configuration.",
+        )
+    return number
+
+
+def _centre_sphere(model: Robot, data: Dataset, number: int) -> Array:
+    """Return where a model says that the ball is [m], ``(3,)``."""
+    target = data.targets[int(data.target[data.configuration == number][0])]
+    return np.asarray(model.world_poses(data.postures.at(np.array([number])), target)[0][0])

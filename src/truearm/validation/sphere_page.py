@@ -1,0 +1,65 @@
+"""The page of sphere tests: the error of every reading, before and after (Nubiola, figures 2.13 to 2.16)."""
+
+from __future__ import annotations
+
+import html
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truearm.engine.base.units import without_mark
+from truearm.engine.document.drawing import AFTER, BEFORE, Figure, axis, figure, rounded
+from truearm.engine.document.page import Drawing, Figures, picture_page
+
+if TYPE_CHECKING:
+    from truearm.validation.sphere import OneSphere, SphereTest, SphereTests
+
+
+def sphere_page(tests: SphereTests) -> str:
+    """Return the page."""
+    rows = []
+    for one in tests.spheres:
+        for name, test in (("nominal", one.before), ("calibrated" if one.before else "this robot", one.after)):
+            if test is not None:
+                figures = (f"{value * 1e3:.3f}" for value in (test.mean, test.deviation, test.largest))
+                rows.append((f"{one.target} about {one.fixture}, {name}", str(len(one.lengths)), *figures))
+    heading = ("sphere", "readings", "mean [mm]", "deviation [mm]", "largest [mm]")
+    return picture_page(
+        f"Ballbar on a sphere: {tests.robot.title}",
+        f"Measurements of {tests.source}.",
+        [without_mark(tests.lines())[0].replace(":", ".")],
+        tests.command,
+        tests,
+        tables=[Figures("Errors of the distance", heading, tuple(rows))],
+        pictures=[
+            Drawing(
+                f"sphere{number}",
+                f"{one.target} about {one.fixture}",
+                "Measured less predicted distance of each reading, in the order of the file.",
+                _errors(one),
+            )
+            for number, one in enumerate(tests.spheres)
+        ],
+        notices=tests.warnings,
+    )
+
+
+def _errors(one: OneSphere) -> Figure:
+    traces = []
+    if one.before is not None:
+        traces.append(_trace("nominal", one.before, BEFORE))
+    traces.append(_trace("calibrated" if one.before is not None else "this robot", one.after, AFTER))
+    return figure(traces, 340, xaxis=axis("reading"), yaxis=axis("error of the distance [mm]"))
+
+
+def _trace(name: str, test: SphereTest, colour: str) -> Figure:
+    return {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "name": html.escape(name),
+        "x": np.arange(1, len(test.errors) + 1).tolist(),
+        "y": rounded(test.errors * 1e3, 5),
+        "line": {"color": colour, "width": 1.2},
+        "marker": {"color": colour, "size": 5},
+        "hovertemplate": f"{html.escape(name)}, reading %{{x}}: %{{y:.3f}} mm<extra></extra>",
+    }

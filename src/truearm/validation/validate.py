@@ -1,0 +1,406 @@
+"""The errors of a calibrated robot on new measurements."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final
+
+from truearm.engine.base.errors import InputError, Notice, counted, has_error, refusals_of
+from truearm.engine.base.files import path_argument, read_bytes
+from truearm.engine.base.manifest import sets_in
+from truearm.engine.base.writing import output_folder, write_files
+from truearm.engine.choosing.zones import zoned_robot
+from truearm.engine.command.arguments import (
+    choice_argument,
+    command_argument,
+    data_argument,
+    files_of,
+    gravity_argument,
+    notes_argument,
+    payload_argument,
+    pushed_at_argument,
+    python_call,
+    readings_argument,
+    refuse_swapped,
+    robot_argument,
+    wrench_argument,
+)
+from truearm.engine.command.split import changed_since, training_of
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import Errors, Spread, errors_of
+from truearm.engine.diagnose.external_force import check_force, check_payload
+from truearm.engine.diagnose.next_step import NextStep
+from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.summaries import error_line, errors_summary, refit_lines, refit_summary
+from truearm.engine.fit.refit import MOVED, Refit
+from truearm.engine.fit.refit import refit as find_moved
+from truearm.engine.robot.effects.warm_up import LEFT
+from truearm.engine.robot.parts import Payload
+from truearm.engine.robot.proof import BASE
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.wrench import Wrench, WrenchFrame
+from truearm.validation.frames import check_frames, check_names, check_proof
+from truearm.validation.region import (
+    OrientationErrors,
+    RegionDistances,
+    distance_lines,
+    distance_summary,
+    orientation_errors,
+    orientation_lines,
+    orientation_summary,
+    region_distances,
+)
+
+# How a robot agrees with measurements it was not identified from.
+
+#: What a validation writes into its folder.
+VALIDATION_FILES: Final = ("result.json", "report.html")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Validation(Record):
+    """Errors of a robot on measurements."""
+
+    source: str  #: The measurements, for messages.
+    errors: Errors  #: Predicted minus measured, reading by reading.
+    warnings: tuple[Notice, ...] = ()  #: What to know about them, in plain words.
+    #: What was found anew from these measurements, if anything was; `errors` then judge each configuration by what is
+    #: found without it.
+    refit: Refit | None = None
+    notes: dict[str, str] = field(default_factory=dict)  #: What the user noted, by its name.
+    #: Orientation errors by their parts; None if no orientation was read.
+    orientations: OrientationErrors | None = None
+    #: How far the readings lie from where the robot was calibrated; None where it does not know.
+    distances: RegionDistances | None = None
+    next: tuple[NextStep, ...] = ()  #: What to do next.
+    robot: Robot | None = None  #: robot, data: what was compared.
+    data: Dataset | None = None
+    #: For each zone, and for elsewhere by an empty name, how many configurations lie in it and their mean error [m];
+    #: None of a robot without zones.
+    zones: dict[str, tuple[int, float]] | None = None
+    command: str = ""  #: How to run it again.
+    inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+
+    @property
+    def position(self) -> Spread | None:
+        """Statistics of position errors over single readings [m]; None where no position was read."""
+        return self.errors.position
+
+    @property
+    def orientation(self) -> Spread | None:
+        """Statistics of orientation errors over single readings [rad]; None where no orientation was read."""
+        return self.errors.orientation
+
+    @property
+    def length(self) -> Spread | None:
+        """Statistics of errors of distances and heights [m]; None where none was read."""
+        return self.errors.length
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm and mrad."""
+        return {
+            **errors_summary(self.errors),
+            **({} if self.orientations is None else {"orientation_parts_deg": orientation_summary(self.orientations)}),
+            **({} if self.distances is None else {"distance_from_training": distance_summary(self.distances)}),
+            **({} if self.zones is None else {"zones": self._zones()}),
+            **({} if self.refit is None else {"refit": refit_summary(self.refit)}),
+            **({"notes": self.notes} if self.notes else {}),
+            "next": [step.summary() for step in self.next],
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        return [
+            f"On {counted(self.errors.configurations, 'configuration')} of {self.source}:",
+            f"  {error_line(self.errors)}",
+            *orientation_lines(self.orientations),
+            *distance_lines(self.distances),
+            *(
+                f"  {'elsewhere' if row['zone'] is None else 'zone ' + row['zone']}: {row['mean_mm']:.3f} mm on "
+                f"{counted(row['configurations'], 'configuration')}"
+                for row in self._zones()
+            ),
+            *([] if self.refit is None else refit_lines(self.refit)),
+            *(f"{name}: {said}" for name, said in self.notes.items()),
+            *(step.line for step in self.next),
+            *notice_lines(self.warnings),
+        ]
+
+    def _zones(self) -> list[dict[str, Any]]:
+        return [
+            {"zone": name or None, "configurations": count, "mean_mm": mean * 1e3}
+            for name, (count, mean) in (self.zones or {}).items()
+        ]
+
+    @staticmethod
+    def folder(out: str | Path, inputs: Iterable[Path] = (), parameter: str = "folder") -> Path:
+        """Return the folder for a validation, or refuse one whose result.json or report.html are of something else."""
+        folder = output_folder(out, VALIDATION_FILES, tuple(inputs), parameter, ours=True)
+        for one in sets_in(folder):
+            others = [name for name in one.files if name not in VALIDATION_FILES]
+            if others and any(name in one.files for name in VALIDATION_FILES):
+                raise InputError(
+                    "result.json and report.html there belong to another result",
+                    parameter=parameter,
+                    where=str(folder),
+                    came=f"the folder of {others[0]}",
+                    cure="Choose another folder.",
+                )
+        return folder
+
+    def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
+        """Write ``result.json`` and ``report.html`` into a folder.
+
+        Returns:
+            The files written.
+        """
+        from truearm.validation.report import validation_html
+
+        folder = self.folder(folder, self.inputs)
+        progress("drawing the report")
+        content = {"truearm": "truearm-validation/1", "source": self.source, **self.summary(), "command": self.command}
+        files = {
+            "result.json": json.dumps(content, indent=2, allow_nan=False) + "\n",
+            "report.html": validation_html(self),
+        }
+        progress("writing the files")
+        write_files(folder, files, self.command)
+        return tuple(folder / name for name in files)
+
+
+def validate(
+    robot: Robot | str | Path,
+    data: Dataset | str | Path,
+    *,
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+    wrench: Wrench | Sequence[float] | str | None = None,
+    wrench_frame: WrenchFrame | None = None,
+    wrench_at: str | None = None,
+    refit: str | None = None,
+    out: str | Path | None = None,
+    notes: Mapping[str, str] | None = None,
+    command: str | None = None,
+) -> Validation:
+    """Judge a calibrated robot on new data taken in the same frames.
+
+    Parameters
+    ----------
+    robot
+        A calibrated robot, or its file; or the ``zones.yaml`` of a calibration by zones: each configuration is then
+        judged by the robot of its zone.
+    data
+        Readings, or a canonical CSV file.
+    payload, gravity
+        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
+        [m/s^2] this time, if they differ from the calibration.
+    wrench, wrench_frame
+        External force and moment while it was measured, the same at every configuration, and whose axes it is given in,
+        as for :func:`truearm.inverse`; None where none acted, or the data have their own (``force_x`` to ``moment_z``).
+    wrench_at
+        The target on which it acted, or ``flange``; None where there is one target.
+    refit
+        What was moved since and is found anew from these readings, while everything else stays: ``base`` (the
+        instrument, or the robot's base), ``targets`` (each by itself), or ``tool`` (all targets as one rigid body). The
+        errors of each configuration are then those of what was found without it.
+    out
+        Folder for result.json and report.html; None writes nothing.
+    notes
+        What to write beside the figures, by its name: ``date``, ``serial``, ``operator``, ``instrument``, or any other.
+    command
+        How to run it again, for the report; None writes the call in Python.
+
+    Raises
+    ------
+    InputError
+        If the robot has no targets, the data name others, or there are too few of them for `refit`.
+    """
+    refuse_swapped(robot, data, "validate")
+    zoned = zoned_robot(robot)
+    moved = None if refit is None else choice_argument(refit, "refit", {kind: kind for kind in MOVED})
+    notes = notes_argument(notes)
+    call = command_argument(command) or python_call(
+        "validate",
+        robot,
+        data,
+        payload=payload,
+        gravity=gravity,
+        wrench=wrench,
+        wrench_frame=wrench_frame,
+        wrench_at=wrench_at,
+        refit=refit,
+        notes=notes or None,
+    )
+    inputs = files_of(robot, data)
+    folder = None if out is None else Validation.folder(out, inputs, "out")
+    digest = None
+    if isinstance(data, str | Path):
+        with refusals_of("data"):
+            digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+    if zoned is not None:
+        if moved is not None:
+            raise InputError(
+                "what moved is found with one robot, not with zones",
+                parameter="refit",
+                came=moved,
+                cure=f"Give {zoned.file.name} instead of the zones.",
+            )
+        robot = zoned.file
+    changed = changed_since(robot)
+    pushed = wrench_argument(wrench, wrench_frame)
+    as_calibrated = robot_argument(robot)
+    robot, data = as_measured(robot, data, payload, gravity)
+    robot = _pushed(robot, data, pushed, wrench_at)
+    data, other_session = _of_another_session(robot, data)
+    as_calibrated = as_calibrated.with_wrench(robot.wrench)
+    identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
+    found_or_held = "base" in identified or (robot.proof is not None and BASE in robot.proof.held)
+    if moved != "base" and data.anchored and robot.fixtures and identified and not found_or_held:
+        raise InputError(
+            "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
+            parameter="data",
+            where=data.source,
+            cure="Find its place with `refit=base`, calibrate the calibrated robot with `model=frames`, or compare "
+            "distances with 'truearm distances'.",
+        )
+    errors, found = errors_of(robot, data), None
+    judged, mistaken = robot, list[Notice]()
+    if moved is not None:
+        # Names that were exchanged would pass for targets that moved.
+        mistaken = [] if moved == "base" else check_names(robot, data, errors)
+        with refusals_of("refit"):
+            found = find_moved(robot, data, moved)
+        judged, errors = found.robot, found.errors
+    # Configurations that decide much alone err more without themselves: that is no sign of anything else.
+    agreed = errors if found is None else errors_of(judged, data)
+    mistaken = (
+        mistaken
+        or check_names(judged, data, agreed)
+        or check_frames(judged, data, agreed, moved)
+        or check_proof(as_calibrated, data, agreed)
+    )
+    of_zones = None
+    if zoned is not None:
+        errors = zoned.errors(robot, data)
+        of_zones = zoned.means(data, errors)
+    warnings = (
+        *changed,
+        *mistaken,
+        *other_session,
+        *check_payload(robot),
+        *check_force([(robot, data.postures)]),
+        *_seen_in_training(robot, data, digest),
+    )
+    distances = region_distances(judged, data, errors)
+    validation = Validation(
+        source=data.source,
+        errors=errors,
+        warnings=warnings,
+        refit=found,
+        notes=notes,
+        orientations=orientation_errors(judged, data, errors),
+        distances=distances,
+        next=() if has_error(warnings) else measure_farther(distances),
+        robot=judged,
+        data=data,
+        zones=of_zones,
+        command=call,
+        inputs=inputs,
+    )
+    if folder is not None:
+        validation.save(folder)
+    return validation
+
+
+def _of_another_session(robot: Robot, data: Dataset) -> tuple[Dataset, list[Notice]]:
+    """Return readings without their numbers, where these would say how warm the arm was in the session of the fit."""
+    if data.number is None or LEFT not in robot.parameters:
+        return data, []
+    words = (
+        "The robot grew while it warmed up in the session that it was calibrated in. How warm it was in this one "
+        "nobody knows, so it is judged as in the middle of that session."
+    )
+    return replace(data, number=None), [Notice("other-session", words, "note")]
+
+
+def measure_farther(distances: RegionDistances | None) -> tuple[NextStep, ...]:
+    """Return the advice to measure where errors grow with the distance from where the robot was calibrated."""
+    growth = None if distances is None else distances.growth
+    if growth is None or not growth[2]:
+        return ()
+    near, far, _ = growth
+    message = (
+        f"Calibrate with configurations that reach farther: the third of the readings that is farthest from where the "
+        f"robot was calibrated ({far.low * 1e3:.0f} mm or more) is off by {far.mean * 1e3:.2g} mm on average, the "
+        f"nearest third by {near.mean * 1e3:.2g} mm."
+    )
+    return (NextStep("measure-more", message),)
+
+
+def _pushed(robot: Robot, data: Dataset, wrench: Wrench | None, at: str | None) -> Robot:
+    """Return the robot with what acted on it, or refuse data that say that themselves."""
+    if wrench is not None and data.wrench is not None:
+        raise InputError(
+            "the data say what acted on the flange",
+            parameter="wrench",
+            where=data.source,
+            came="the columns force_x to moment_z",
+            cure="Leave `wrench` out, or take the columns out.",
+        )
+    return pushed_at_argument(robot, wrench, at)
+
+
+def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
+    """Say if the readings are those that the robot was calibrated with, and how many it was trained on."""
+    found = training_of(robot, data, digest)
+    if found is None:
+        return []
+    (count, used, _), left_out = found.split, found.left_out
+    of = used + left_out
+    rest = f"; {left_out} were left out" if left_out else ""
+    held_out = (
+        f"{rest}; the rest was held out, and its errors are in the result of the calibration" if used > count else rest
+    )
+    return [
+        Notice(
+            "training-data",
+            f"The robot was calibrated with these readings: {count} of their {of} configurations are those it was "
+            f"trained on{held_out}. These errors flatter it. Validate with measurements that were not used.",
+        )
+    ]
+
+
+def as_measured(robot: object, data: object, payload: object, gravity: object) -> tuple[Robot, Dataset]:
+    """Return the robot with what it carried when data were measured, and those, or refuse what cannot be judged."""
+    measured, robot = data_argument(data), robot_argument(robot)
+    if not robot.targets:
+        raise InputError(
+            "the robot has no targets, so its positions cannot be compared with the readings",
+            parameter="robot",
+            where=robot.name,
+            cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
+        )
+    data = readings_argument(robot, measured)
+    robot = robot.with_payload(payload_argument(payload), gravity_argument(gravity))
+    if data.temperature is None and any(effect.warmed for effect in robot.effects):
+        raise InputError(
+            "the robot was calibrated with its temperature, and the data hold no temperature",
+            parameter="data",
+            where=data.source,
+            cure="Add the column temperature [degC].",
+        )
+    with refusals_of("data"):
+        for name in data.targets:
+            robot.target(name)
+        for name in data.fixtures:
+            robot.fixture(name)
+    if not data.has_reading.any():
+        raise InputError(
+            "there is no reading", parameter="data", where=data.source, cure="Fill in x, y and z, or distance."
+        )
+    return robot, data

@@ -195,7 +195,7 @@ def test_records_stand_before_their_programs(
         "plate.mod.truearm.json",
         "plate.mod",
         "compensation.html",
-        "truearm.engine.base.manifest.json",
+        "truearm.manifest.json",
     ]
 
 

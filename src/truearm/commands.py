@@ -33,7 +33,7 @@ from truearm.planning.command import plan, poses
 from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
 from truearm.simulation.command import devices, influence, simulate
 from truearm.starting.command import demo, example, new_robot, study, study_help
-from truearm.studio.command_studio import studio
+from truearm.studio.command import studio
 from truearm.validation.command import distances, lines, sphere, tolerance, validate
 
 # A calibration's matrices are small: a second BLAS thread gains nothing on a quiet machine and waits for its turn on

@@ -85,7 +85,7 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
         "compensation.html",
         "plate.mod",
         "plate.mod.truearm.json",
-        "truearm.engine.base.manifest.json",
+        "truearm.manifest.json",
     ]
     record = json.loads((cell / "out" / "plate.mod.truearm.json").read_text())
     assert record["applied"]["frames"] == "assumed"

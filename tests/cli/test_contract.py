@@ -90,7 +90,7 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
         "calibrated.yaml",
         "report.html",
         "result.json",
-        "truearm.engine.base.manifest.json",
+        "truearm.manifest.json",
     ]
     result = json.loads((out / "result.json").read_text())
     assert {k: result[k] for k in summary} == summary
@@ -336,7 +336,7 @@ def test_a_model_that_cannot_tilt_parallel_axes_says_what_would(truearm: Truearm
 def test_data_of_a_small_part_of_the_workspace_end_with_exit_code_3(truearm: Truearm, tmp_path: Path) -> None:
     narrow = tmp_path / "narrow.yaml"
     limits = ([5, 15], [15, 25], [5, 15], [15, 25], [35, 45], [5, 15])
-    text = (Path(package.__file__).parent / "library" / "irb120.yaml").read_text()
+    text = (Path(package.__file__).parent / "engine" / "robot" / "library" / "irb120.yaml").read_text()
     for number, pair in enumerate(limits, start=1):
         text = re.sub(rf"(name: axis_{number},.*limits: )\[[^]]*\]", rf"\g<1>{pair}", text)
     narrow.write_text(text)

@@ -33,7 +33,7 @@ def test_a_set_is_written_as_other_commands_read_it(truearm: Truearm, tmp_path: 
     assert run.out.startswith("6 poses of the set diagonal in the cube of 200 mm about (350, 0, 350) mm.")
     assert {path.name for path in tmp_path.iterdir()} == {
         *("set.csv", "set-poses.csv", "set.html"),
-        "truearm.engine.base.manifest.json",
+        "truearm.manifest.json",
     }
     data, read = read_csv(out), read_poses(tmp_path / "set-poses.csv")
     robot = package.load_robot("irb120")

@@ -41,7 +41,7 @@ def test_both_stages_from_files_into_files(truearm: Truearm, campaign: Path, tmp
         "geometry.html",
         "report.html",
         "result.json",
-        "truearm.engine.base.manifest.json",
+        "truearm.manifest.json",
     ]
     shown = json.loads(truearm("show", tmp_path / "calibrated.yaml", "--json").out)
     assert shown["name"] == "katana450"
@@ -156,7 +156,7 @@ def test_influence_with_and_without_data(truearm: Truearm, campaign: Path, tmp_p
         "influence.csv",
         "report.html",
         "result.json",
-        "truearm.engine.base.manifest.json",
+        "truearm.manifest.json",
     ]
     run = truearm("influence", "katana450", campaign / "poses.csv", "--poses", 3)
     assert run.code == 2

@@ -314,7 +314,7 @@ def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
         plan.write_text(plan.read_text() + "\n")
         return experiment(asked, where)
 
-    monkeypatch.setattr("truearm.fleets.manifest.experiment", late)
+    monkeypatch.setattr("truearm.fleets.fleet.experiment", late)
     file = manifest(tmp_path, configurations="plan.csv")
     told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
     assert ("changed while it was read" in str(told), told.where) == (True, "plan.csv")

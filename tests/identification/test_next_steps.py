@@ -374,7 +374,7 @@ def test_more_configurations_come_after_a_model_that_gains_far_more() -> None:
 def test_curves_that_leave_few_equations_are_no_lack_of_readings(monkeypatch: pytest.MonkeyPatch) -> None:
     data = elastic(poses=14)
     fit = identify(load_robot("irb120").with_payload(LOAD), data, named_model("elastic"))
-    monkeypatch.setattr("truearm.engine.diagnose.curves.has_curves", lambda _: True)
+    monkeypatch.setattr("truearm.engine.diagnose.next_steps.has_curves", lambda _: True)
     said = _end(LeftOver.of(fit, data)).message
     assert "The curves leave too few equations" in said
     assert "too few readings" not in said

@@ -430,7 +430,7 @@ def test_curves_whose_size_cannot_be_found_are_left_out(monkeypatch: pytest.Monk
     def without_maximum(*_: Any, **__: Any) -> Any:
         raise np.linalg.LinAlgError("Matrix is not positive definite")
 
-    monkeypatch.setattr("truearm.engine.fit.curves.curve_variances", without_maximum)
+    monkeypatch.setattr("truearm.engine.choosing.candidates.curve_variances", without_maximum)
     chosen = select(arm(), seen(twin_of(), 20, 8), candidates=("joint-curve",))
     assert "joint-curve" not in chosen.model.effects
     assert reason(chosen, "joint-curve") == "what is left over does not repeat with the joints' angles"

@@ -211,7 +211,7 @@ def test_a_plan_that_was_changed_by_hand_is_said(tmp_path: Path) -> None:
     (tmp_path / PLAN).write_text((tmp_path / PLAN).read_text().replace("limit_band: 0.1", "limit_band: 0.2"))
     (said,) = [one for one in truearm.iso9283_evaluate(tmp_path / PLAN, **given).warnings if one.code == "plan-changed"]
     assert said.level == "note"
-    (tmp_path / "truearm.engine.base.manifest.json").write_text("no manifest")
+    (tmp_path / "truearm.manifest.json").write_text("no manifest")
     assert "plan-changed" not in notices(truearm.iso9283_evaluate(tmp_path / PLAN, **given))
 
 

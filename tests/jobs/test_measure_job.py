@@ -81,7 +81,7 @@ def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(
     assert {*reasons} == {"beam-break", "not-settled", "scatter"}
     assert sum(reasons.values()) > 3
     assert [(notice.code, notice.level) for notice in found.warnings] == [("not-seen", "note"), ("not-said", "note")]
-    assert {p.name for p in tmp_path.iterdir()} == {BEGUN, DATA, LOG, PAGE, "truearm.engine.base.manifest.json"}
+    assert {p.name for p in tmp_path.iterdir()} == {BEGUN, DATA, LOG, PAGE, "truearm.manifest.json"}
     data = read_csv(tmp_path / DATA)
     assert data.sigma is not None
     assert set(data.sigma[data.has_reading].tolist()) == {VIRTUAL["tracker"].sigma}

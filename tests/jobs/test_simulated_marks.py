@@ -108,7 +108,7 @@ SAYS = {
     ".src": r"SIMULATED: no real calibration",
 }
 #: Files that are of something else than data and robots: what was asked, and how it began.
-BESIDE = {"truearm.engine.base.manifest.json", "record.json", "measuring.json"}
+BESIDE = {"truearm.manifest.json", "record.json", "measuring.json"}
 
 
 def check_files(folder: Path, *, marked: bool) -> int:

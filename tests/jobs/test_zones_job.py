@@ -71,7 +71,7 @@ def test_what_is_kept_is_written_and_read(cut: tuple[Path, Calibration]) -> None
     assert run.zones is not None
     names = {path.name for path in (folder / "out").iterdir()}
     kept = [verdict.box.name for verdict in run.zones.kept]
-    assert names == {*run.files, "truearm.engine.base.manifest.json"}
+    assert names == {*run.files, "truearm.manifest.json"}
     assert {f"zone-{name}.yaml" for name in kept} < names
     found = json.loads((folder / "out" / "result.json").read_text())["zones"]
     assert found["kept"] == kept

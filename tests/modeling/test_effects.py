@@ -251,23 +251,17 @@ def test_the_python_file_computes_it_or_says_that_it_does_not(effect: type[Effec
 
 #: Modules outside of truearm.engine.robot.effects that name several effects, and why.
 NAMED_ELSEWHERE = {
-    "identification/solving/models.py": "a model is a choice of effects",
-    "identification/inclinometers/fit.py": "so is the first stage of the method with inclinometers",
-    "identification/judging/next_steps.py": "a list of notices, one of which is called like an effect",
-    "identification/judging/unmodelled.py": "compliance is what a payload that nobody gave is seen by",
-    "modeling/formats/robot_file/": "a truth of a robot file has constants of joints, by what they are",
-    "simulation/truths.py": "and a twin is made with them",
-    "results/tilting.py": "what the method with inclinometers finds, in words",
-    "reporting/tilting_report.py": "and its pictures",
-    "studies/": "a study chooses models as its document does",
+    "engine/fit/models.py": "a model is a choice of effects",
+    "engine/diagnose/next_steps.py": "a list of notices, one of which is called like an effect",
+    "engine/diagnose/unmodelled.py": "compliance is what a payload that nobody gave is seen by",
+    "engine/robot/robot_file/": "a truth of a robot file has constants of joints, by what they are",
+    "engine/twin/truths.py": "and a twin is made with them",
+    "inclinometers/": "the method with inclinometers has a model of its own, and tells what it found",
     "studio/cell_rules.py": "what keeps clear of a cell is called like an effect",
     "studio/plan_fields.py": "and its field",
     "studio/planned.py": "and its option",
-    "planning/driving/": "a stop of a tour is called like an effect",
-    "planning/iso9283/": "a criterion of ISO 9283 is called like an effect",
-    "validation/iso9283/": "and its value",
-    "measurement/performance/": "and what is measured for it",
-    "measurement/readers/performance_poses.py": "and the files of that",
+    "engine/motion/": "a stop of a tour is called like an effect",
+    "iso9283/": "a criterion of ISO 9283 is called like an effect",
 }
 
 
@@ -293,7 +287,7 @@ def test_no_other_module_lists_effects() -> None:
     found = [
         f"{path.relative_to(package)}:{line}"
         for path in sorted(package.rglob("*.py"))
-        if package / "modeling" / "effects" not in path.parents
+        if package / "engine" / "robot" / "effects" not in path.parents
         for line in spelled_lists(path.read_text("utf-8"), names)
     ]
     assert [place for place in found if not place.startswith(tuple(NAMED_ELSEWHERE))] == []

@@ -71,7 +71,7 @@ def test_chosen_pairs_tell_more_than_twice_as_many_at_random(monkeypatch: pytest
     def first_come(rows: Array, count: int, known: Array, interest: int) -> list[int]:
         return list(range(count))
 
-    monkeypatch.setattr("truearm.engine.fit.design.most_informative", first_come)
+    monkeypatch.setattr("truearm.inclinometers.pairs.most_informative", first_come)
     assert volume(chosen) < volume(planned(inclined=48, posed=16))
 
 

@@ -222,7 +222,7 @@ def test_a_plan_file_that_cannot_be_used_is_refused(
 def test_the_largest_cube_is_that_of_the_robot_whichever_tests_are_planned(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = truearm.load_robot("irb120")
     found = Cube([0.3036, 0.0, 0.3036], 0.4239)  # AP alone would be planned in it
-    monkeypatch.setattr("truearm.engine.motion.largest_cube.largest_cube", lambda *_, **__: found)
+    monkeypatch.setattr("truearm.iso9283.plan.choosing.largest_cube", lambda *_, **__: found)
     sides = {
         tests: performance_plan(robot, tests=tests, rated_load=3.0, rated_velocity=1.0).cube.side
         for tests in (("AP",), ("AT", "vAP"))

@@ -479,7 +479,7 @@ def test_an_effect_that_the_twin_does_not_compute_is_refused(monkeypatch: pytest
         def parameters(self) -> tuple[Parameter, ...]:
             return (self.parameter("wobble_1", "rad", 1e-3),)
 
-    monkeypatch.setattr("truearm.engine.robot.effects.EFFECTS", (Wobble,))
+    monkeypatch.setattr("truearm.engine.robot.robot_data.EFFECTS", (Wobble,))
     with pytest.raises(InputError, match=r"does not compute this joint effect; got 'wobble_1'"):
         joint_truths(replace(load_robot("irb120"), effect_names=("wobble",)))
 

@@ -164,7 +164,7 @@ def test_workers_do_the_seeds_with_the_same_outcomes() -> None:
 
 def test_what_studies_do_once_a_seed_can_go_to_another_process() -> None:
     seen = 0
-    for file in (Path(truearm.__file__).parent / "studies").rglob("*.py"):
+    for file in (Path(truearm.__file__).parents[2] / "papers").rglob("*.py"):
         tree = ast.parse(file.read_text())
         functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
         functions |= {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}

@@ -77,7 +77,7 @@ def test_a_demonstration_that_was_changed_is_opened_as_it_is(tmp_path: Path) -> 
 def test_without_the_extra_it_says_what_to_install(
     truearm: Truearm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys.modules["truearm.studio.command_studio"], "find_spec", lambda _: None)
+    monkeypatch.setattr(sys.modules["truearm.studio.command"], "find_spec", lambda _: None)
     run = truearm("studio", tmp_path / "new", "--no-open")
     assert run.code == 2
     assert "the studio needs the extra truearm[studio]. Install it: pip install 'truearm[studio]'." in run.err

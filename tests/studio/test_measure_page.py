@@ -31,7 +31,7 @@ from truearm.studio.pages.measure import MeasurePage
 from truearm.studio.serving import Studio
 from truearm.studio.window import Window
 
-FILES = ("measuring.json", "readings.csv", "measurements.csv", "measure.html", "truearm.engine.base.manifest.json")
+FILES = ("measuring.json", "readings.csv", "measurements.csv", "measure.html", "truearm.manifest.json")
 ARM: dict[str, Any] = {
     "plan": "plan.csv",
     "device": "measurement-arm",

@@ -328,7 +328,7 @@ def test_a_plan_that_the_command_has_written_is_compared_as_well(
     window.edit(plan={"poses": "8", "candidates": 41})
     assert "was made with candidates 40. Chosen now: candidates 41." in told(page)
 
-    manifest, table = folder / "truearm.engine.base.manifest.json", folder / "plan.csv"
+    manifest, table = folder / "truearm.manifest.json", folder / "plan.csv"
     record, text = manifest.read_text(), table.read_text()
     content = json.loads(record)
     del content["sets"][0]["inputs"]

@@ -202,7 +202,7 @@ def test_what_another_program_writes_between_looking_and_writing_is_not_overwrit
         return called
 
     with monkeypatch.context() as there:
-        there.setattr("truearm.engine.base.writing.write_text_over", late(write_text_over))
+        there.setattr("truearm.studio.project.write_text_over", late(write_text_over))
         with pytest.raises(InputError, match="another program has changed this file"):
             project.edit({"list.csv": "mine\n"}, exclude="list.csv")
     project.undo()
@@ -210,7 +210,7 @@ def test_what_another_program_writes_between_looking_and_writing_is_not_overwrit
     file.unlink()
     project.edit({"list.csv": "mine\n"}, exclude="list.csv")
     with monkeypatch.context() as there:
-        there.setattr("truearm.engine.base.writing.remove_known", late(remove_known))
+        there.setattr("truearm.studio.project.remove_known", late(remove_known))
         with pytest.raises(InputError, match="another program has changed this file"):
             project.undo()
     assert (file.read_bytes(), project.settings.exclude) == (theirs, "list.csv")
@@ -238,7 +238,7 @@ def test_of_two_files_of_an_edit_both_are_written_or_none(project: Project, monk
             path.write_text("theirs\n")
         write_text_over(path, *arguments)
 
-    monkeypatch.setattr("truearm.engine.base.writing.write_text_over", late)
+    monkeypatch.setattr("truearm.studio.project.write_text_over", late)
     with pytest.raises(InputError, match="another program has changed this file"):
         project.edit({"a.csv": "two\n", "b.csv": "two\n"})
     assert (project.folder / "a.csv").read_text() == "one\n"
@@ -285,7 +285,7 @@ def test_files_taken_in_replace_nothing(project: Project) -> None:
         ".hidden",
         "",
         PROJECT_FILE,
-        "truearm.engine.base.manifest.json",
+        "truearm.manifest.json",
         "a\nb",
         "x\\y",
     ):

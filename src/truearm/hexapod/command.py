@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truearm.engine.command.arguments import read_lengths, read_numbers
 from truearm.engine.command.options import Commands, JointsText, Json, print_json, print_line, print_record
+from truearm.engine.command.texts import read_lengths, read_numbers
 
 if TYPE_CHECKING:
     from truearm.hexapod.jobs import HexapodFrame, HexapodPlan, HexapodPoses, HexapodSolution, HexapodUncertainty

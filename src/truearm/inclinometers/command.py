@@ -40,7 +40,7 @@ def plan_pairs(
 ) -> None:
     """Plan what inclinometers read: ``truearm plan --device inclinometers``."""
     from truearm.engine.base.units import sized_si
-    from truearm.engine.command.arguments import read_seed
+    from truearm.engine.command.texts import read_seed
     from truearm.inclinometers.pairs import plan_inclinometers
 
     deviation = sized_si(noise, "mm", parameter="noise", deviation=True)

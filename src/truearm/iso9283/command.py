@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from truearm.engine.command.arguments import read_lengths, read_numbers
 from truearm.engine.command.options import (
     Ahead,
     Commands,
@@ -23,6 +22,7 @@ from truearm.engine.command.options import (
     print_record,
     progress,
 )
+from truearm.engine.command.texts import read_lengths, read_numbers
 
 _PERCENT = "percent, as 100,50,10"
 

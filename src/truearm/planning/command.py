@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-from truearm.engine.command.arguments import read_lengths, read_numbers, read_poses, read_region, read_seed, read_speed
 from truearm.engine.command.options import (
     Ahead,
     Floor,
@@ -28,6 +27,7 @@ from truearm.engine.command.options import (
     read_gravity,
     refuse_pull,
 )
+from truearm.engine.command.texts import read_lengths, read_numbers, read_poses, read_region, read_seed, read_speed
 
 # ``truearm plan``.
 

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.command.arguments import read_joints, read_seed
 from truearm.engine.command.options import (
     GravityText,
     JointsText,
@@ -21,6 +20,7 @@ from truearm.engine.command.options import (
     print_record,
     read_gravity,
 )
+from truearm.engine.command.texts import read_joints, read_seed
 
 # ``truearm convert``.
 

@@ -79,7 +79,8 @@ def study(
     if json:
         print_json(finished.summary())
     else:
-        print_record(finished)
-        from papers.study import STUDY_FILES
+        from papers.study import STUDY_FILES, Study
 
+        assert isinstance(finished, Study)
+        print_record(finished)
         print_line(f"Written to {out}: {', '.join((*STUDY_FILES, *finished.files))}")

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from truearm.engine.base.errors import InputError, refusals_of
 from truearm.engine.base.files import path_argument
@@ -20,10 +19,8 @@ from truearm.engine.command.arguments import (
     progress_argument,
     python_call,
 )
+from truearm.engine.document.records import Record
 from truearm.starting.published import find_papers
-
-if TYPE_CHECKING:
-    from papers.study import Study
 
 
 def study(
@@ -36,7 +33,7 @@ def study(
     executor: Executor | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
-) -> Study:
+) -> Record:
     """Make a published experiment again and set our figures beside the printed ones.
 
     Parameters

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.engine.base.units import sized_si
-from truearm.engine.command.arguments import read_region, read_seed, read_speed
+from truearm.engine.command.texts import read_region, read_seed, read_speed
 
 _Text = Annotated[str, Field(min_length=1)]
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

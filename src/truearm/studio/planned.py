@@ -52,7 +52,7 @@ def planned(
         fields: What the page says.
         cell, constraints, payload: Of the project.
     """
-    from truearm.engine.command.arguments import read_poses
+    from truearm.engine.command.texts import read_poses
     from truearm.planning.plan import plan
 
     os.chdir(folder)

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from truearm.engine.command.arguments import read_lengths
 from truearm.engine.command.options import (
     GravityText,
     JointsText,
@@ -25,6 +24,7 @@ from truearm.engine.command.options import (
     read_gravity,
     read_notes,
 )
+from truearm.engine.command.texts import read_lengths
 
 # ``truearm distances``.
 

@@ -22,7 +22,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.base.version import __version__
 
 #: What was written together into a folder, with hashes.
-MANIFEST: Final = "truearm.engine.base.manifest.json"
+MANIFEST: Final = "truearm.manifest.json"
 #: Stands in a folder as long as a run replaces files there.
 UNFINISHED: Final = "truearm.unfinished.json"
 _SCHEMAS: Final = {MANIFEST: "truearm-manifest/1", UNFINISHED: "truearm-unfinished/1"}

@@ -1,4 +1,4 @@
-"""Numbers that a person writes as a text, in mm and deg: what options of commands and fields of pages hold."""
+"""What jobs accept, and how they refuse the rest: every refusal names the parameter."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, TypeGuard, TypeVar
+from typing import TYPE_CHECKING, Final, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -33,8 +33,6 @@ from truearm.engine.robot.wrench import WRENCH_FRAMES, Wrench
 if TYPE_CHECKING:
     from truearm.engine.twin.devices.device import Device
 
-
-# What jobs accept, and how they refuse the rest: every refusal names the parameter.
 
 T = TypeVar("T")
 
@@ -492,101 +490,3 @@ def _written(value: object) -> str:
         return repr(value)
     plain = value is None or isinstance(value, str | bool | int | float)
     return repr(value) if plain else type(value).__name__.upper()
-
-
-def read_joints(text: str, robot: Robot, parameter: str) -> list[float]:
-    """Return joint positions [rad or m] of a text in deg or mm, in the units of the robot's joints."""
-    from truearm.engine.base.units import to_si
-
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(
-            "numbers separated by commas belong here", parameter=parameter, came=text, allowed="0,-30,45, .."
-        ) from None
-    if len(numbers) != len(robot.joints):
-        raise InputError(
-            "there are not as many numbers as joints",
-            parameter=parameter,
-            came=f"{len(numbers)} number{'' if len(numbers) == 1 else 's'}",
-            allowed=f"{len(robot.joints)}, one for each joint of {robot.name}",
-        )
-    units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
-    return [to_si(value, unit) for value, unit in zip(numbers, units, strict=True)]
-
-
-def read_lengths(text: str, parameter: str) -> float | list[float]:
-    """Return lengths [m] of a text in mm, a single one as a number."""
-    from truearm.engine.base.units import sized_si
-
-    found = [sized_si(number, "mm", parameter=parameter) for number in read_numbers(text, parameter, "numbers in mm")]
-    return found[0] if len(found) == 1 else found
-
-
-def read_numbers(text: str, parameter: str, allowed: str) -> list[float]:
-    """Return the numbers of a text in which commas separate them."""
-    from truearm.engine.base.units import as_number
-
-    numbers = [as_number(part.strip()) for part in text.split(",")]
-    known = [number for number in numbers if number is not None]
-    if len(known) < len(numbers):
-        raise InputError("numbers separated by commas belong here", parameter=parameter, came=text, allowed=allowed)
-    return known
-
-
-def read_poses(text: str) -> int | Literal["auto"]:
-    """Return how many poses a text names, or ``auto``.
-
-    Raises:
-        InputError: If it is neither, or there cannot be so many.
-    """
-    from truearm.engine.base.units import as_number
-
-    if text.strip() == "auto":
-        return "auto"
-    number = as_number(text.strip())
-    if number is None or not number.is_integer():
-        raise InputError(
-            "a number of poses belongs here", parameter="poses", came=text, allowed="a whole number, or auto"
-        )
-    return count_argument(int(number), "poses")
-
-
-def read_seed(robot: str | Path, text: str | None, joints: str | None, parameter: str = "seed") -> list[float] | None:
-    """Return the model's joint positions [rad or m] that a text in deg or mm names, of the kind that is written."""
-    if text is None:
-        return None
-    import numpy as np
-
-    loaded = robot_argument(robot)
-    given = np.array([read_joints(text, loaded, parameter)])
-    if joints_argument(joints, loaded) == "controller":
-        given = loaded.controller.to_model(given)
-    return [float(value) for value in given[0]]
-
-
-def read_speed(text: str | None) -> list[float] | None:
-    """Return speed [m/s] and share of a text in mm/s and percent."""
-    from truearm.engine.base.units import sized_si
-
-    if text is None:
-        return None
-    speed, *shares = read_numbers(text, "speed", "mm/s, and percent of the joints' speed: 250,10")
-    return [sized_si(speed, "mm", parameter="speed"), *(share / 100.0 for share in shares)]
-
-
-def read_region(text: str | None) -> list[list[float]] | None:
-    """Return lowest and highest x, y and z [m] of a text in mm."""
-    from truearm.engine.base.units import as_number, sized_si
-
-    if text is None:
-        return None
-    ranges = [[as_number(end.strip()) for end in part.split("..")] for part in text.split(",")]
-    if len(ranges) != 3 or any(len(one) != 2 or None in one for one in ranges):
-        raise InputError(
-            "three ranges in mm belong here",
-            parameter="region",
-            came=text,
-            allowed="LOW..HIGH for x, y and z: 300..600,-200..200,100..400",
-        )
-    return [[sized_si(end, "mm", parameter="region") for end in one if end is not None] for one in ranges]

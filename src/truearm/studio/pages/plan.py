@@ -10,7 +10,7 @@ import numpy as np
 
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.manifest import MANIFEST
-from truearm.engine.command.arguments import read_poses
+from truearm.engine.command.texts import read_poses
 from truearm.engine.fit.design import INDICES
 from truearm.engine.fit.models import MODELS
 from truearm.engine.robot.chain import Array

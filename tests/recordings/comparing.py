@@ -1,0 +1,79 @@
+"""What differs between two recordings."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Iterator
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+import truearm
+
+_NUMBER: Final = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w])")
+#: The value of a parameter in a robot file, or the turn of its base.
+_VALUE: Final = re.compile(r" value: [^,}]*|(?<=^base_quaternion: ).*")
+
+
+def differences(old: Any, new: Any, place: str = "") -> Iterator[str]:
+    """Yield what differs: where, the old value, the new one."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in [*old, *(key for key in new if key not in old)]:
+            yield from differences(old.get(key), new.get(key), f"{place} > {key}")
+    elif isinstance(old, list) and isinstance(new, list):
+        if same_robot(old, new):
+            return
+        for number, (one, other) in enumerate(zip_longest(old, new)):
+            yield from differences(one, other, f"{place}[{number}]")
+    elif not equal(old, new):
+        yield f"{place}: {old!r} -> {new!r}"
+
+
+def same_robot(old: list[Any], new: list[Any]) -> bool:
+    """Say whether two robot files differ in parameter values alone, and not in where the flange and the targets are.
+
+    A fit leaves the values of redundant parameters where they happen to be; what they predict together is known.
+    """
+    if old == new or not old or old[0] != "truearm: truearm-robot/1":
+        return False
+    others = ([_VALUE.sub("", line) for line in lines] for lines in (old, new))
+    if len(old) != len(new) or not all(map(equal, *others)):
+        return False
+    one, other = predictions(old), predictions(new)
+    return bool(np.all(np.abs(other - one) <= 1e-9 * np.abs(one) + 1e-12))
+
+
+def predictions(lines: list[str]) -> np.ndarray:
+    """Return where the flange and the targets of a robot file are in some configurations, in a row [m]."""
+    text = re.sub(r"(?m)^proof:\n(?:  .*\n|\d.*\n)+", "", "\n".join(lines) + "\n")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.yaml"
+        path.write_text(text, "utf-8")
+        robot = truearm.load_robot(path)
+    spread = np.random.default_rng(0).uniform(-1.0, 1.0, (20, len(robot.joints)))
+    places = [robot.forward(spread, frame="world", target=name) for name in (None, *(t.name for t in robot.targets))]
+    return np.concatenate([np.ravel(part) for place in places for part in place])
+
+
+def equal(old: Any, new: Any) -> bool:
+    """Say whether two numbers or texts are equal."""
+    if isinstance(old, str) and isinstance(new, str):
+        if old == new:
+            return True
+        return _NUMBER.sub("#", old) == _NUMBER.sub("#", new) and all(
+            close(float(one), float(other))
+            for one, other in zip(_NUMBER.findall(old), _NUMBER.findall(new), strict=True)
+        )
+    if isinstance(old, bool) or isinstance(new, bool) or old is None or new is None:
+        return old is new
+    if isinstance(old, int | float) and isinstance(new, int | float):
+        return close(old, new)
+    return bool(old == new)
+
+
+def close(old: float, new: float) -> bool:
+    """Say whether two numbers agree."""
+    return abs(new - old) <= 1e-9 * abs(old) + 1e-12

@@ -100,7 +100,7 @@ def session(group: Group, folder: Path) -> dict[str, Any]:
 
 
 def _prepare(step: dict[str, list[str]]) -> None:
-    """Do what a user does between two commands: copy a file or a folder, replace a text in a file, write or remove one."""
+    """Do what a user does between two commands: copy a file or a folder, replace a text, write or remove a file."""
     ((what, words),) = step.items()
     first = Path(words[0])
     if what == "copy":
@@ -241,6 +241,10 @@ def _rounded(value: Any) -> Any:
     return "\n".join(_lines(value)) if isinstance(value, str) and value else value
 
 
+#: Elements of a page that begin a line.
+_BLOCKS: Final = ("p", "h1", "h2", "h3", "tr", "dt", "li", "div", "pre", "caption", "figcaption", "summary", "section")
+
+
 class _Page(HTMLParser):
     """The visible texts of a page, and its figures."""
 
@@ -253,21 +257,7 @@ class _Page(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         if tag in ("script", "style", "svg"):
             self._within = "figures" if ("id", "figures") in attrs else tag
-        elif tag in (
-            "p",
-            "h1",
-            "h2",
-            "h3",
-            "tr",
-            "dt",
-            "li",
-            "div",
-            "pre",
-            "caption",
-            "figcaption",
-            "summary",
-            "section",
-        ):
+        elif tag in _BLOCKS:
             self.texts.append("")
 
     def handle_endtag(self, tag: str) -> None:
@@ -286,10 +276,8 @@ def _page(text: str) -> dict[str, Any]:
     page.feed(text)
     texts = [" ".join(line.split()) for line in page.texts]
     figures = json.loads(page.figures) if page.figures else {}
-    return {
-        "texts": _lines("\n".join(filter(None, texts)) + "\n"),
-        "figures": {k: _figure(v) for k, v in figures.items()},
-    }
+    shown = _lines("\n".join(filter(None, texts)) + "\n")
+    return {"texts": shown, "figures": {name: _figure(figure) for name, figure in figures.items()}}
 
 
 def _figure(figure: dict[str, Any]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Iterator
+from difflib import SequenceMatcher
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +15,8 @@ import numpy as np
 import truearm
 
 _NUMBER: Final = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w])")
+#: Characters of a value that are shown.
+_LONGEST: Final = 200
 #: The value of a parameter in a robot file, or the turn of its base.
 _VALUE: Final = re.compile(r" value: [^,}]*|(?<=^base_quaternion: ).*")
 
@@ -24,12 +27,34 @@ def differences(old: Any, new: Any, place: str = "") -> Iterator[str]:
         for key in [*old, *(key for key in new if key not in old)]:
             yield from differences(old.get(key), new.get(key), f"{place} > {key}")
     elif isinstance(old, list) and isinstance(new, list):
-        if same_robot(old, new):
-            return
-        for number, (one, other) in enumerate(zip_longest(old, new)):
-            yield from differences(one, other, f"{place}[{number}]")
+        if not same_robot(old, new):
+            for number, (one, other) in enumerate(_beside(old, new), 1):
+                yield from differences(one, other, f"{place}[{number}]")
     elif not equal(old, new):
-        yield f"{place}: {old!r} -> {new!r}"
+        at = 0
+        if isinstance(old, str) and isinstance(new, str):  # from shortly before the first character that differs
+            at = max(0, next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), 0) - 30)
+        yield f"{place}: {_shown(old, at)} -> {_shown(new, at)}"
+
+
+def _beside(old: list[Any], new: list[Any]) -> Iterator[tuple[Any, Any]]:
+    """Yield what of two lists belongs together; lines that came or went stand beside None."""
+    if len(old) == len(new) or not all(isinstance(line, str) for line in (*old, *new)):
+        yield from zip_longest(old, new)
+        return
+    lines = [[_NUMBER.sub("#", line) for line in lines] for lines in (old, new)]
+    for kind, a, b, c, d in SequenceMatcher(None, *lines, autojunk=False).get_opcodes():
+        if kind == "equal":
+            yield from zip(old[a:b], new[c:d], strict=True)
+        else:
+            yield from ((line, None) for line in old[a:b])
+            yield from ((None, line) for line in new[c:d])
+
+
+def _shown(value: Any, at: int) -> str:
+    text = f"...{value[at:]}" if at else value
+    shown = repr(text)
+    return shown if len(shown) <= _LONGEST else f"{shown[:_LONGEST]}..."
 
 
 def same_robot(old: list[Any], new: list[Any]) -> bool:

@@ -136,7 +136,7 @@ def command(line: str, folder: Path) -> dict[str, Any]:
     after = _standing(folder)
     done: dict[str, Any] = {"exit": code}
     if code == 2:
-        done["refusal"] = {"kind": type(refusal).__name__, "parameter": getattr(refusal, "parameter", None)}
+        done["refusal"] = _refused(refusal)
     printed = out.getvalue()
     done["out"] = _rounded(json.loads(printed)) if printed.startswith("{") else _lines(printed)
     done["err"] = _lines(err.getvalue())
@@ -146,6 +146,15 @@ def command(line: str, folder: Path) -> dict[str, Any]:
     _say_once(done)
     done["removed"] = sorted(before.keys() - after.keys())
     return {key: value for key, value in done.items() if value or key == "exit"}
+
+
+def _refused(by: BaseException | None) -> dict[str, str | None]:
+    """Return what a job or the command line refused: the kind of refusal, and the parameter."""
+    if by is not None and by.__cause__ is not None and not hasattr(by, "parameter"):
+        told = _refused(by.__cause__)
+        if told["kind"] == "InputError" or told["parameter"]:
+            return told
+    return {"kind": type(by).__name__, "parameter": getattr(by, "parameter", None)}
 
 
 def _say_once(done: dict[str, Any]) -> None:

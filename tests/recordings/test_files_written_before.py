@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.answered import compensate
 from tests.recordings.comparing import differences
 
 import truearm
@@ -77,13 +78,11 @@ def test_the_proof_holds(written: Path) -> None:
 
 
 def test_a_program_is_corrected_with_the_robot_and_the_cell_as_it_was(written: Path) -> None:
-    correction = truearm.compensate(
+    correction = compensate(
         written / "calibrated" / "calibrated.yaml",
         [written / "cell" / "plate.mod"],
         tools=written / "cell" / "cell.yaml",
         frames=written / "cell" / "cell.yaml",
-        taught=["none"],
-        controller_kinematics="nominal",
         accept=["not-better-here"],
         out=written / "anew",
     )
@@ -94,9 +93,8 @@ def test_a_program_is_corrected_with_the_robot_and_the_cell_as_it_was(written: P
 
 
 def test_a_corrected_program_is_known_and_restored(written: Path) -> None:
-    words = {"taught": ["none"], "controller_kinematics": "nominal", "accept": ["not-better-here"]}
     with pytest.raises(truearm.InputError, match="corrected already"):
-        truearm.compensate(written / "calibrated" / "calibrated.yaml", [written / "corrected" / "plate.mod"], **words)
+        compensate(written / "calibrated" / "calibrated.yaml", [written / "corrected" / "plate.mod"])
     truearm.revert([written / "corrected" / "plate.mod"], out=written / "original")
     original = (written / "cell" / "plate.mod").read_bytes()
     assert (written / "original" / "plate.mod").read_bytes() == original
@@ -107,11 +105,9 @@ def test_the_ledger_knows_a_corrected_program_without_its_record_and_its_comment
     (written / "bare.mod").write_text(text)
     robot = written / "calibrated" / "calibrated.yaml"
     with pytest.raises(truearm.InputError, match="corrected already"):
-        truearm.compensate(robot, [written / "bare.mod"], taught=["none"], controller_kinematics="nominal")
+        compensate(robot, [written / "bare.mod"])
     (written / "calibrated" / "truearm.corrected.json").unlink()
-    truearm.compensate(
-        robot, [written / "bare.mod"], taught=["none"], controller_kinematics="nominal", accept=["not-better-here"]
-    )
+    compensate(robot, [written / "bare.mod"], accept=["not-better-here"])
 
 
 def test_a_measuring_goes_on_where_it_stopped(written: Path) -> None:
@@ -152,9 +148,12 @@ def test_a_series_goes_on_where_it_stopped(written: Path, lost: str | None) -> N
 def test_tests_by_iso_9283_are_evaluated_as_they_were_and_compared(written: Path) -> None:
     place = written / "iso9283"
     old = json.loads((place / "result" / "iso9283.json").read_text())
-    files = {"poses": place / "before" / "poses.csv", "alignment": place / "before" / "alignment.yaml"}
     truearm.iso9283_evaluate(
-        place / "plan" / "plan.yaml", **files, compare=place / "result" / "iso9283.json", out=written / "new"
+        place / "plan" / "plan.yaml",
+        poses=place / "before" / "poses.csv",
+        alignment=place / "before" / "alignment.yaml",
+        compare=place / "result" / "iso9283.json",
+        out=written / "new",
     )
     new = json.loads((written / "new" / "iso9283.json").read_text())
     assert not list(differences(old["criteria"], new["criteria"]))

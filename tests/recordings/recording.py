@@ -33,13 +33,16 @@ from ruamel.yaml import YAML
 HERE: Final = Path(__file__).parent
 INPUTS: Final = HERE / "inputs"
 BASELINE: Final = HERE / "baseline"
-#: What holds the numerical libraries to instructions that many processors have, and the rest of the process as it is.
+#: All that a command sees of its environment, beside where programs and temporary files are: instructions that many
+#: processors have, and no terminal with colours.
 _ENVIRONMENT: Final = {
     "COLUMNS": "120",
     "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
     "OPENBLAS_CORETYPE": "Haswell",
     "OPENBLAS_NUM_THREADS": "1",
+    "PYTHONUTF8": "1",
 }
+_KEPT: Final = ("PATH", "PYTHONHASHSEED", "PYTHONPATH", "TMPDIR")
 #: Tables of more lines are recorded by their first and last lines, and by the mean and the spread of each column.
 _LONGEST: Final = 60
 _TODAY: Final = re.compile(str(date.today()))
@@ -75,7 +78,8 @@ GROUPS, LEFT_OUT, KEYS_LEFT_OUT = declared()
 def recorded(group: Group) -> dict[str, Any]:
     """Run the commands of a group in a process of its own, and return what each of them did."""
     words = [sys.executable, "-m", "tests.recordings.recording", group.name]
-    done = subprocess.run(words, env=os.environ | _ENVIRONMENT, cwd=HERE.parents[1], capture_output=True, text=True)
+    seen = _ENVIRONMENT | {name: os.environ[name] for name in _KEPT if name in os.environ}
+    done = subprocess.run(words, env=seen, cwd=HERE.parents[1], capture_output=True, text=True, encoding="utf-8")
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout))
 

@@ -17,7 +17,7 @@ from coverage import CoverageData
 from tests.mutants.tree import ROOT, Function, Mutant
 
 #: Most tests for a fault, most of one test function, and most seconds that they took when coverage was measured.
-MOST_TESTS, MOST_ALIKE, MOST_SECONDS = 25, 4, 60.0
+MOST_TESTS, MOST_ALIKE, MOST_SECONDS = 100, 8, 60.0
 FOUND, SURVIVED, TIMED_OUT, NO_TEST, GONE = "found", "not found", "timed out", "no test", "gone"
 
 
@@ -95,7 +95,10 @@ class Choice:
         return choice
 
     def _executed(self, function: Function, index: int) -> set[str]:
-        """Give the tests that executed the node, or that share what was made by it for another test of their file."""
+        """Give the tests that executed the node, or that share what was made by it for another test of their file.
+
+        What only processes execute that tests start is not measured: then it may be any test.
+        """
         if self.data is None:
             return set()
         file = next((f for f in self.data.measured_files() if Path(f).match(str(function.path))), None)
@@ -106,7 +109,7 @@ class Choice:
                 shared = tuple(c.partition("::")[0] + "::" for c in contexts if c.endswith("|setup"))
                 own = {context.rpartition("|")[0] for context in contexts}
                 return {test for test in self.tests if test in own or test.startswith(shared)}
-        return set()
+        return set(self.tests)
 
     def again(self, mutant: Mutant) -> list[str]:
         """Give the test that found it last time; if it has moved, those of its name."""
@@ -115,8 +118,8 @@ class Choice:
         name = mutant.by.partition("::")[2]
         return [mutant.by] if mutant.by in self.tests else [t for t in self.tests if t.partition("::")[2] == name][:3]
 
-    def of_mutant(self, mutant: Mutant, function: Function) -> list[str]:
-        """Give the tests in the order in which they are run."""
+    def others(self, mutant: Mutant, function: Function) -> list[str]:
+        """Give the tests chosen by coverage, in the order in which they are run."""
         words = set(re.split(r"[\W_]+", f"{function.path.with_suffix('')} {function.name}".lower()))
 
         def cost(test: str) -> float:
@@ -142,15 +145,14 @@ class Choice:
 
 def tried(copy: Path, mutant: Mutant, function: Function, choice: Choice) -> tuple[str, str | None]:
     """Put a fault into the copy, run its tests and take it out: what came of it, and the test that found it."""
-    tests = choice.of_mutant(mutant, function)
-    if not tests:
-        return NO_TEST, None
+    parts = [part for part in (choice.again(mutant), choice.others(mutant, function)) if part]
     file, original = copy / function.path, ROOT / function.path
     file.write_text(function.mutated(original.read_text(encoding="utf-8"), mutant), encoding="utf-8")
     try:
-        code, printed = pytest(copy, "-x", *tests, timeout=choice.longest(tests))
+        for tests in parts:
+            code, printed = pytest(copy, "-x", *tests, timeout=choice.longest(tests))
+            if code != 0:
+                return TIMED_OUT if code is None else FOUND, next(iter(failed(printed, tests)), tests[0])
     finally:
         shutil.copy2(original, file)
-    if code == 0:
-        return SURVIVED, None
-    return TIMED_OUT if code is None else FOUND, next(iter(failed(printed, tests)), tests[0])
+    return SURVIVED if parts else NO_TEST, None

@@ -77,7 +77,7 @@ def run(given: argparse.Namespace) -> int:
             wrong = set(failed(pytest(clean, *by)[1], by)) if by else set()
             choice.wrong |= wrong
             todo = {number: function for number, function in todo.items() if came[number][1] in wrong}
-    lost = [n for n in asked if mutants[n].found and came[n][0] not in (FOUND, TIMED_OUT, GONE)]
+    before = lost(mutants, came)
     for number in asked:
         if came[number][0] not in (FOUND, TIMED_OUT):
             print(_line(number, mutants[number], *came[number]))  # noqa: T201
@@ -87,9 +87,14 @@ def run(given: argparse.Namespace) -> int:
         store(mutants)
     counts = Counter(result for result, _ in came.values())
     print(f"{len(came)} faults: " + ", ".join(f"{count} {result}" for result, count in counts.most_common()))  # noqa: T201
-    if lost and not given.mark:
-        print(f"Found at the mark and not now: {', '.join(str(n + 1) for n in lost)}")  # noqa: T201
-    return int(bool(lost) and not given.mark)
+    if before and not given.mark:
+        print(f"Found at the mark and not now: {', '.join(str(number + 1) for number in before)}")  # noqa: T201
+    return int(bool(before) and not given.mark)
+
+
+def lost(mutants: list[Mutant], came: dict[int, tuple[str, str | None]]) -> list[int]:
+    """Give those that were found at the mark, that are still in the tree, and that are not found now."""
+    return [n for n, (result, _) in sorted(came.items()) if mutants[n].found and result not in (FOUND, TIMED_OUT, GONE)]
 
 
 def _line(number: int, mutant: Mutant, result: str, by: str | None) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.mutants.__main__ import stored
+from tests.mutants.__main__ import lost, stored
 from tests.mutants.drawing import NUMBER, drawn, faults
 from tests.mutants.measured import REST, WHOLE, worse
-from tests.mutants.running import Choice, failed
+from tests.mutants.running import FOUND, GONE, NO_TEST, SURVIVED, TIMED_OUT, Choice, failed
 from tests.mutants.tree import ROOT, Function, all_functions, found_again, functions
 
 #: More of them gone, and the mark says little.
@@ -99,6 +100,12 @@ def test_a_test_that_has_moved_is_run_again() -> None:
     assert Choice(["tests/new/test_a.py::test_b[x]", "tests/c.py::test_c"]).again(mutant) == [
         "tests/new/test_a.py::test_b[x]"
     ]
+
+
+def test_a_fault_that_is_found_no_more_is_told() -> None:
+    mutants = [replace(faults(_only(BEFORE))[0], found=found) for found in (*[True] * 5, False, None)]
+    results = (FOUND, TIMED_OUT, GONE, SURVIVED, NO_TEST, SURVIVED, NO_TEST)
+    assert lost(mutants, {n: (result, None) for n, result in enumerate(results)}) == [3, 4]
 
 
 def test_less_coverage_than_at_the_mark_is_told() -> None:

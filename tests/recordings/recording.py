@@ -126,7 +126,7 @@ def _prepare(step: dict[str, list[str]]) -> None:
 
 def command(line: str, folder: Path) -> dict[str, Any]:
     """Run a command in this process, and return its exit code, what it printed, how it refused and what it wrote."""
-    from truearm.cli import main
+    from truearm.commands import main
 
     before = _standing(folder)
     out, err = io.StringIO(), io.StringIO()

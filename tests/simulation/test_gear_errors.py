@@ -12,10 +12,11 @@ import pytest
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Joint
 from truearm.engine.robot.robot import Robot
-from truearm.engine.twin import twin_joint as gear_errors
+from truearm.engine.twin import gear_errors
+from truearm.engine.twin.gear_errors import DRAWN
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin
-from truearm.engine.twin.twin_joint import DRAWN, JointTruth
+from truearm.engine.twin.twin_joint import JointTruth
 
 TURN = np.linspace(-math.pi, math.pi, 7200, endpoint=False)
 
@@ -98,5 +99,5 @@ def test_a_joint_that_slides_has_no_gear() -> None:
 def test_errors_are_drawn_without_the_models() -> None:
     text = Path(gear_errors.__file__).read_text()
     imports = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
-    names = {alias.name for node in imports if node.module and "modeling" in node.module for alias in node.names}
+    names = {alias.name for node in imports if node.module and "engine.robot" in node.module for alias in node.names}
     assert names == {"Robot"}  # whose joints turn

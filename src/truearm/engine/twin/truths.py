@@ -18,8 +18,9 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import NO_PAYLOAD, Payload, Tool
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, rotation_from_quaternion
+from truearm.engine.twin.gear_errors import DRAWN, with_errors_drawn
 from truearm.engine.twin.twin import Twin
-from truearm.engine.twin.twin_joint import DRAWN, PERFECT, Contact, JointTruth, with_errors_drawn
+from truearm.engine.twin.twin_joint import PERFECT, Contact, JointTruth
 
 #: Three reflectors about 150 mm apart, like the triangular artefact of Nubiola, section 2.2.1.
 DEFAULT_TOOL = Tool({"1": (0.0, 0.0, 0.125), "2": (0.075, 0.0937, 0.215), "3": (0.150, 0.0, 0.125)})

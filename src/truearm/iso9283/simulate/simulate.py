@@ -32,9 +32,9 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, rotation_from_vector, rotation_vector
 from truearm.engine.robot.wrench import STANDARD_GRAVITY
+from truearm.engine.twin.gear_errors import DRAWN
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin
-from truearm.engine.twin.twin_joint import DRAWN
 from truearm.iso9283.plan.criteria import PerformancePlan
 from truearm.iso9283.plan.records import forces_text, poses_text, samples_text
 from truearm.iso9283.simulate.cell import ROBOTS, Corrected, SimulatedCampaign, Tracker, TrueRobot, simulated_campaign

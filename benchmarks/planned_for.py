@@ -31,7 +31,7 @@ POSES, CANDIDATES, NOISE = 30, 3000, 1e-4
 OBJECTIVES = ("O1", "error")
 #: Side of the cube [m], largest angle of the tool from vertical [deg], targets at most.
 PLACES = ((0.1, 25.0, 15), (0.25, 25.0, 60), (0.5, 60.0, 60))
-PROGRAM = Path(__file__).parents[1] / "tests/compensation/programs/samples/rapid/polish.mod"
+PROGRAM = Path(__file__).parents[1] / "tests/engine/programs/samples/rapid/polish.mod"
 PAYLOAD = Payload(2.7, (0.05, 0.025, 0.1))
 
 

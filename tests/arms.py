@@ -1,6 +1,6 @@
 """Arms of the library of every build, for tests that would find the same in arms that differ in their lengths alone.
 
-Every arm is held against the contract in tests/library.
+Every arm is held against the contract in tests/engine/robot/library.
 """
 
 from __future__ import annotations

@@ -10,6 +10,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from tests.commanding import demonstrated, small, truearm
+
+__all__ = ["demonstrated", "small", "truearm"]
+
 
 @pytest.fixture(scope="session", autouse=True)
 def files_that_need_not_outlive_the_machine() -> Iterator[None]:
@@ -20,7 +24,16 @@ def files_that_need_not_outlive_the_machine() -> Iterator[None]:
 
 
 #: Where pages are looked at as a browser shows them.
-DRAWN = ("tests/reporting/", "tests/studio/")
+DRAWN = (
+    *(
+        "tests/studio/",
+        "tests/engine/document/",
+        "tests/calibration/test_curve_figures",
+        "tests/calibration/test_report",
+    ),
+    *("tests/calibration/test_selection_figure", "tests/compensation/test_program_picture"),
+    *("tests/fleets/test_fleet_figures", "tests/simulation/test_influence_figures"),
+)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -32,15 +45,18 @@ def pages_without_what_draws_them(request: pytest.FixtureRequest) -> Iterator[No
         yield
 
 
-#: Where plans are made for what comes after them.
-PLANNING = ("tests/cli/", "tests/compensation/", "tests/honesty/", "tests/jobs/", "tests/measurement/")
+#: Where plans themselves are looked at, and not made for what comes after them.
+PLANNING = (
+    *("tests/studio/", "tests/recordings/", "tests/house/test_documents", "tests/house/test_measured"),
+    *("tests/planning/test_measurement_plan", "tests/planning/test_reachable"),
+)
 
 
 @pytest.fixture(scope="module", autouse=True)
 def plans_judged_at_few_numbers_of_poses(request: pytest.FixtureRequest) -> Iterator[None]:
     """Judge plans at few numbers of poses: all of them take most of a plan's time, and are tested with the planning."""
     with pytest.MonkeyPatch.context() as patch:
-        if request.node.nodeid.startswith(PLANNING):
+        if not request.node.nodeid.startswith(PLANNING):
             patch.setattr("truearm.planning.accuracy.NUMBERS", (8, 30))
         yield
 
@@ -55,9 +71,9 @@ def measured_data() -> Path:
 
 
 #: Files that copy their process hundreds of times, which takes ten times as long once it has grown: begun first of all.
-COPYING = "tests/test_killed_runs.py"
+COPYING = "tests/house/test_killed_runs.py"
 #: Files whose tests, or what they share, take seconds each: begun first, no process is left alone with them at the end.
-SLOW = ("tests/test_documents.py", "tests/test_measured.py", "tests/simulation/devices/", "tests/studies/")
+SLOW = ("tests/house/test_documents.py", "tests/house/test_measured.py", "tests/simulation/devices/", "tests/studies/")
 
 
 def pytest_configure() -> None:

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tests.jobs.examples import EXAMPLES
+from tests.house.examples import EXAMPLES
 from tests.killing import contents, done, found, killed_copies, leftovers
 
 import truearm

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 import pytest
-from tests.jobs.examples import PATH
+from tests.house.examples import PATH
 
 import truearm
 from truearm.compensation.limit import CorrectionLimit, check_size, correction_limit

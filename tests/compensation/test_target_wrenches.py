@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.calibration.test_external_force import elastic_twin
 from tests.compensation.test_program_on_twin import EVERY, HIGH, LOW, given, missed, original, plate
-from tests.identification.test_external_force import elastic_twin
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration

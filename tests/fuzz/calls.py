@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from tests.fuzz import samples
 from tests.fuzz.mutations import ODD, Random, damaged, one_of
-from tests.jobs.examples import EXAMPLES
+from tests.house.examples import EXAMPLES
 
 import truearm
 from truearm.engine.data.dataset import Dataset

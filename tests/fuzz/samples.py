@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 from papers.simulated import ballbar, measured_legs, measured_sides
-from tests.jobs.examples import EXAMPLES, performance_files
-from tests.measurement.test_fixture_rows import MIXED
-from tests.measurement.test_table import JOINTS, POINTS, SPATIAL
+from tests.engine.data.test_fixture_rows import MIXED
+from tests.engine.data.test_table import JOINTS, POINTS, SPATIAL
+from tests.house.examples import EXAMPLES, performance_files
 
 import truearm
 from truearm.engine.data.hexapod import poses, triangle

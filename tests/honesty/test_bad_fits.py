@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 import pytest
-from tests.cli.conftest import Truearm
-from tests.cli.conftest import truearm as truearm
+from tests.commanding import Truearm
+from tests.commanding import truearm as truearm
 from tests.honesty.telling import told, written
 from tests.simulated import campaign
 

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import Truearm
-from tests.cli.conftest import truearm as truearm
+from tests.commanding import Truearm
+from tests.commanding import truearm as truearm
 
 from truearm.studio.access import listening_socket
 from truearm.studio.project import PROJECT_FILE

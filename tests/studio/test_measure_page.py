@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.cli.conftest import Truearm
-from tests.cli.conftest import truearm as truearm
-from tests.jobs.examples import MEASURED_PLAN
+from tests.commanding import Truearm
+from tests.commanding import truearm as truearm
+from tests.house.examples import MEASURED_PLAN
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, below
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.conftest import Truearm
-from tests.cli.conftest import truearm as truearm
+from tests.commanding import Truearm
+from tests.commanding import truearm as truearm
 from tests.performance_plan import small_plan
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, notices

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.cli.conftest import Truearm
-from tests.cli.conftest import truearm as truearm
+from tests.commanding import Truearm
+from tests.commanding import truearm as truearm
 from tests.studio.conftest import Serving
 from tests.studio.pressing import at_once, below
 from tests.studio.test_jog_page import act, eventually

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 from tests import ur_controller as ur
-from tests.cli.conftest import Truearm
-from tests.cli.conftest import truearm as truearm
+from tests.commanding import Truearm
+from tests.commanding import truearm as truearm
 from tests.simulated import campaign
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, below, notices

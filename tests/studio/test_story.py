@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.cli.conftest import Truearm
-from tests.cli.conftest import truearm as truearm
+from tests.commanding import Truearm
+from tests.commanding import truearm as truearm
 
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.project import PROJECT_FILE

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.modeling.test_conventions import about
-from tests.modeling.test_joint_errors import TABLE_3, with_table_3
+from tests.engine.robot.test_conventions import about
+from tests.engine.robot.test_joint_errors import TABLE_3, with_table_3
 
 from truearm.engine.base.errors import InputError
 from truearm.validation.tolerances import errors_of_tolerance, flange_error, joint_tolerances, tolerance_of

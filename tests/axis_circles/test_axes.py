@@ -1,0 +1,266 @@
+"""Axes, frames, parameters and joint errors from circles, against twins."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tests.engine.robot.test_joint_errors import with_table_3
+
+from truearm.axis_circles.axes import AxisCalibration
+from truearm.axis_circles.fit import NORMAL_95, AxisAnalysis, AxisProblem, analyse, axis_circles, fit_axes
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.conversion import converted
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.lines import base_and_flange, frame_between, joint_axes
+from truearm.engine.robot.parameters import FreeParameters
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import JointTruth
+
+
+def runs(step: float = 6.0, posture: tuple[float, ...] = (0, 0, 0, 0, 30, 0)) -> Array:
+    """Every joint alone from -60 to 60 deg and back, the others in a posture."""
+    forward = np.arange(-60.0, 60.1, step)
+    rows = []
+    for joint in range(6):
+        run = np.tile(np.array(posture, float), (2 * len(forward), 1))
+        run[:, joint] = np.concatenate([forward, forward[::-1]])
+        rows.append(run)
+    return np.asarray(np.radians(np.concatenate(rows)))
+
+
+def campaign(
+    robot: str, noise: float, seed: int = 1, posture: tuple[float, ...] = (0, 0, 0, 0, 30, 0)
+) -> tuple[Twin, Dataset]:
+    rng = np.random.default_rng(seed)
+    twin = truth_twin(load_robot(robot), "random", rng)
+    return twin, measure(twin, runs(posture=posture), noise, rng)
+
+
+def left_over(found: AxisAnalysis, twin: Twin) -> float:
+    """Largest error at configurations that move every joint [m]."""
+    q = found.nominal.random_configurations(40, np.random.default_rng(9))
+    return float(errors_of(found.robot, measure(twin, q, 0.0, np.random.default_rng(0))).position_norms.max())
+
+
+# -- the truth comes back --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robot", ["irb120", "kr5", "ur5", "puma560", "lrmate200ic"])
+def test_without_noise_the_robot_is_found(robot: str) -> None:
+    twin, data = campaign(robot, 0.0)
+    found = analyse(load_robot(robot), data)
+    assert left_over(found, twin) < 1e-8
+    q = found.nominal.random_configurations(20, np.random.default_rng(3))
+    assert_allclose(
+        found.robot_with_errors.world_poses(q, "3")[0], found.robot.world_poses(q, "3")[0], rtol=0, atol=1e-8
+    )
+
+
+def test_axes_are_where_the_twin_has_them() -> None:
+    twin, data = campaign("irb120", 0.0)
+    found = analyse(load_robot("irb120"), data)
+    for axis, true in zip(joint_axes(found.measured.robot), joint_axes(twin.robot), strict=True):
+        assert_allclose(axis.along, true.along, rtol=0, atol=1e-9)
+        assert np.linalg.norm(true.nearest(axis.point) - axis.point) < 1e-9
+
+
+def test_base_and_flange_lie_on_the_axes_as_those_of_the_nominal_robot_do() -> None:
+    twin, data = campaign("irb120", 0.0)
+    found = analyse(load_robot("irb120"), data)
+    axes, plain = joint_axes(twin.robot), joint_axes(found.nominal)
+    base, flange = base_and_flange(found.nominal)
+    for (place, _, _), (first, second), nominal in (
+        (found.base, (0, 1), base),
+        (found.flange, (5, 4), flange),
+    ):
+        of_axes = np.linalg.inv(frame_between(plain[first], plain[second])) @ nominal
+        expected = frame_between(axes[first], axes[second]) @ of_axes
+        assert_allclose(place.rotation, expected[:3, :3], rtol=0, atol=1e-8)
+        assert_allclose(place.translation, expected[:3, 3], rtol=0, atol=1e-8)
+    assert_allclose(found.robot.base.translation, found.base[0].translation, rtol=0, atol=1e-9)
+
+
+def test_dh_and_s_model_of_measured_axes_are_those_of_the_true_robot() -> None:
+    """A build without parallel axes: joint 3 of an IRB 120 turned by a quarter."""
+    plain = load_robot("irb120")
+    third = replace(plain.joints[2], row={**plain.joints[2].row, "alpha": math.pi / 3})
+    robot = replace(plain, joints=(*plain.joints[:2], third, *plain.joints[3:]), truths={})
+    rng = np.random.default_rng(4)
+    twin = truth_twin(robot, "random", rng)
+    found = analyse(robot, measure(twin, runs(), 0.0, rng))
+    for name in ("standard-dh", "s-model"):
+        true = converted(found.framed(converted(twin.robot, "zero-reference")), name)
+        for row, joint in zip(found.table(name), true.joints, strict=True):
+            for column, (value, _) in row.items():
+                assert value == pytest.approx(joint.row[column], abs=1e-7)
+
+
+def test_parallel_axes_leave_hayatis_table_alone() -> None:
+    _, data = campaign("irb120", 0.01e-3)
+    tables = AxisCalibration(analyse(load_robot("irb120"), data)).summary()["tables"]
+    assert "nearly parallel" in tables["standard-dh"]["refused"]
+    assert "nearly parallel" in tables["s-model"]["refused"]
+    assert len(tables["hayati"]["rows"]) == 6
+    assert tables["hayati"]["rows"][1]["a"]["value"] == pytest.approx(270.0, abs=5.0)
+
+
+def test_stated_deviations_of_a_table_are_those_of_repetitions() -> None:
+    rng = np.random.default_rng(5)
+    twin = truth_twin(load_robot("irb120"), "random", rng)
+    perfect = measure(twin, runs(15.0), 0.0, rng)
+    sigma = np.full(len(perfect.position), 2e-5)
+    wanted = ((1, "a"), (3, "alpha"), (2, "theta_offset"), (4, "d"))
+    values = []
+    for _ in range(12):
+        noisy = perfect.position + rng.normal(0, 2e-5, perfect.position.shape)
+        found = analyse(load_robot("irb120"), replace(perfect, position=noisy, sigma=sigma))
+        joints = converted(found.framed(found.measured.robot), "hayati").joints
+        values.append([joints[joint].row[column] for joint, column in wanted])
+    rows = found.table("hayati")
+    assert_allclose(np.std(values, axis=0), [rows[joint][column][1] for joint, column in wanted], rtol=0.45)
+
+
+def test_noise_leaves_hundredths_of_a_millimetre() -> None:
+    twin, data = campaign("irb120", 0.01e-3)
+    found = analyse(load_robot("irb120"), data)
+    assert left_over(found, twin) < 0.1e-3
+    assert found.found.excess == 1.0
+    assert found.calibrated.residual == pytest.approx(1.0, abs=0.4)
+
+
+# -- joint errors of the KR5 -----------------------------------------------------------------------------
+
+TABLE_2 = {
+    1: (-54, 126, 9, (0, 0, 0, 0, 0, 0)),
+    2: (-160, -24, 8, (-90, 0, 0, 0, 0, 0)),
+    3: (0, 140, 7, (90, -90, 0, 0, 0, 0)),
+    4: (-180, 180, 18, (0, -90, 90, 0, 0, 0)),
+    5: (-108, 108, 12, (90, -90, 90, 0, 0, 0)),
+    6: (-180, 180, 18, (0, -90, 90, 0, 0, 0)),
+}
+
+
+@pytest.fixture(scope="module")
+def kr5() -> Dataset:
+    """Table 2 without noise, in the robot's frame."""
+    rows = []
+    for joint, (low, high, step, posture) in TABLE_2.items():
+        run = np.tile(np.array(posture, float), (len(range(low, high + 1, step)), 1))
+        run[:, joint - 1] = np.arange(low, high + 1, step)
+        rows.append(run)
+    twin = Twin(with_table_3().with_frames(IDENTITY, {"smr": (0.07, 0.05, 0.03)}))
+    return measure(twin, np.radians(np.concatenate(rows)), 0.0, np.random.default_rng(0))
+
+
+def test_circles_see_24_sums_and_name_the_rest(kr5: Dataset) -> None:
+    fit = analyse(load_robot("kr5"), kr5, in_robot_frame=True).errors
+    true = with_table_3().values
+    assert len(fit.free.names) == 24
+    for name in fit.free.names:
+        expected = sum(weight * true[n] for n, weight in fit.combination(name).items())
+        assert fit.robot.values[name] == pytest.approx(expected, abs=1e-8)
+    assert [r.combination for r in fit.redundancies] == [
+        "ez_1 - ey_2",
+        "ez_2 - ey_4",
+        "ez_3 - ey_4",
+        "ez_4 + ey_5",
+        "ez_5 - ey_6",
+        "ez_6",
+    ]
+    assert fit.moving_flange == ("ez_6",)
+
+
+def test_intervals_hold_what_they_say(kr5: Dataset) -> None:
+    nominal = converted(load_robot("kr5"), "joint-errors")
+    exact = fit_axes(nominal, axis_circles(kr5).circles, ("geometry",))
+    true = np.array([exact.robot.values[n] for n in exact.free.names])
+    rng, inside = np.random.default_rng(7), []
+    for _ in range(120):
+        noisy = kr5.position + rng.normal(0, 2e-5, kr5.position.shape)
+        data = replace(kr5, position=noisy, sigma=np.full(len(noisy), 2e-5))
+        fit = fit_axes(nominal, axis_circles(data).circles, ("geometry",), exact.redundancies)
+        deviation = np.array([p.deviation or 0.0 for p in fit.free.parameters])
+        inside.append(np.abs([p.value for p in fit.free.parameters] - true) <= NORMAL_95 * deviation)
+    share = np.mean(inside, axis=0)
+    assert 0.93 <= share.mean() <= 0.97
+    assert share.min() > 0.87
+
+
+def test_jacobian_is_that_of_central_differences(kr5: Dataset) -> None:
+    robot = with_table_3()
+    free = FreeParameters(tuple(p for p in robot.parameters.values() if p.group != "target"))
+    noisy = replace(kr5, position=kr5.position + np.random.default_rng(1).normal(0, 1e-4, kr5.position.shape))
+    problem = AxisProblem(robot, axis_circles(noisy).circles, free)
+    start = free.start + 1e-3
+    J = problem.linearised(start)[1]
+    step = 1e-6
+    for column, one in zip(J.T, np.eye(len(start)), strict=True):
+        there, back = (problem.at(start + sign * step * one).residual for sign in (1, -1))
+        assert_allclose(column, (there - back) / (2 * step), rtol=1e-5, atol=1e-4 * np.abs(J).max())
+
+
+# -- what is said, and what is refused -------------------------------------------------------------------
+
+
+def test_an_arm_that_gives_way_is_said_and_widens_deviations() -> None:
+    rng = np.random.default_rng(2)
+    twin = truth_twin(load_robot("irb120"), "nominal", rng)
+    soft = replace(twin, joints={3: JointTruth(compliance=2e-4), 5: JointTruth(compliance=1e-3)})
+    stiff, bent = (analyse(load_robot("irb120"), measure(t, runs(), 5e-6, rng)) for t in (twin, soft))
+    assert {n.code for n in stiff.notices} == {"no-circle"}
+    assert "not-circular" in {n.code for n in bent.notices}
+    assert bent.found.excess > 1.5
+    assert bent.found.circles[0].circle.sigma == pytest.approx(5e-6 * bent.found.excess)
+
+
+def test_undeclared_noise_is_found_from_what_the_circles_leave() -> None:
+    _, data = campaign("irb120", 0.03e-3)
+    found = axis_circles(replace(data, sigma=None))
+    assert not found.declared
+    assert found.circles[0].circle.sigma == pytest.approx(0.03e-3, rel=0.05)
+
+
+def test_a_target_on_the_axis_is_left_out_if_there_are_others() -> None:
+    _, data = campaign("irb120", 0.02e-3)
+    found = axis_circles(data)
+    assert {c.target for c in found.circles if c.joint == 6} == {"2", "3"}
+    assert all("joint 6, target 1" in str(refusal) for refusal in found.refused)
+
+
+def test_poses_that_belong_to_no_run_are_counted() -> None:
+    rng = np.random.default_rng(3)
+    twin = truth_twin(load_robot("irb120"), "nominal", rng)
+    wild = load_robot("irb120").random_configurations(4, rng)
+    found = analyse(load_robot("irb120"), measure(twin, np.concatenate([runs(), wild]), 1e-5, rng))
+    assert found.found.left_out == 4
+    assert "left-out" in {n.code for n in found.notices}
+
+
+def refused(robot: str, data: Dataset, match: str) -> None:
+    with pytest.raises(InputError, match=match):
+        analyse(load_robot(robot), data)
+
+
+def test_what_cannot_be_used_is_refused() -> None:
+    rng = np.random.default_rng(0)
+    twin = truth_twin(load_robot("irb120"), "nominal", rng)
+    refused("irb120", measure(twin, runs()[: 4 * 42], 0.0, rng), "no run of joint 5, 6")
+    refused(
+        "irb120", measure(twin, load_robot("irb120").random_configurations(9, rng), 0.0, rng), "one joint moves alone"
+    )
+    data = measure(twin, runs(), 1e-5, rng)
+    refused("katana450", data, "other joints than katana450.*allowed: 5")
+    backwards = replace(data, joints=data.joints * [1, 1, 1, -1, 1, 1])
+    refused("irb120", backwards, "joint 4 does not turn as the robot file says")
+    short = measure(twin, np.concatenate([runs()[:210], runs()[210:214] * 0.01]), 2e-5, rng)
+    refused("irb120", short, "joint 6.*arc is too short|no run of joint 6")
+    refused("irb120", replace(data, joint_kinds=(*data.joint_kinds[:5], "prismatic")), "joint 6: a joint that slides")

@@ -1,0 +1,446 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tests.arms import ARMS
+from tests.engine.robot.test_chain import random_frame, random_robot, random_unit
+from tests.pinocchio_oracle import Body, PinocchioChain
+
+from truearm.engine.base.errors import InputError
+from truearm.engine.robot.chain import Array, Chain, Direction, Element, across, axis_of
+from truearm.engine.robot.conventions import CONVENTIONS
+from truearm.engine.robot.conventions.convention import Convention, JointKind
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.loads import joint_loads
+from truearm.engine.robot.parts import GRAVITY, Joint, LinkMass, Payload
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.twin import carried, directions_at
+
+CONFIGURATIONS = 7
+WITH_MASSES = [name for name in ARMS if load_robot(name).masses]
+CONVENTION = {c.name: c for c in CONVENTIONS}
+
+
+def random_triple(rng: np.random.Generator, size: float) -> Direction:
+    x, y, z = (float(v) for v in rng.uniform(-size, size, 3))
+    return x, y, z
+
+
+def random_link(joint: int, rng: np.random.Generator) -> LinkMass:
+    """A body of eight point masses, so that its inertia is one that a body can have."""
+    masses, points = rng.uniform(0.1, 1, 8), rng.uniform(-0.2, 0.2, (8, 3))
+    cog = masses @ points / masses.sum()
+    arms = points - cog
+    tensor = sum(m * (arm @ arm * np.eye(3) - np.outer(arm, arm)) for m, arm in zip(masses, arms, strict=True))
+    xx, yy, zz, xy, xz, yz = (float(np.asarray(tensor)[e]) for e in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    x, y, z = (float(v) for v in cog)
+    return LinkMass(joint, float(masses.sum()), (x, y, z), (xx, yy, zz, xy, xz, yz))
+
+
+def laden(robot: Robot, rng: np.random.Generator) -> Robot:
+    """The robot with another base, a payload and gravity in any direction."""
+    return replace(
+        robot.with_frames(random_frame(rng), {}),
+        payload=Payload(float(rng.uniform(0.5, 3)), random_triple(rng, 0.2)),
+        gravity=random_triple(rng, 10),
+    )
+
+
+def with_bearings(robot: Robot, rng: np.random.Generator) -> Robot:
+    """The robot with the bearing of every joint that turns somewhere on its axis."""
+    joints = [
+        replace(joint, bearing=float(rng.uniform(-0.3, 0.3))) if joint.kind == "revolute" else joint
+        for joint in robot.joints
+    ]
+    return replace(robot, joints=tuple(joints))
+
+
+def heavy_robot(convention: Convention, rng: np.random.Generator) -> Robot:
+    """Up to seven joints of both kinds with bearings anywhere; masses on most links, two on some."""
+    kinds: tuple[JointKind, ...] = tuple(
+        "revolute" if rng.random() < 0.7 else "prismatic" for _ in range(int(rng.integers(2, 8)))
+    )
+    robot = with_bearings(random_robot(convention, (), rng, kinds), rng)
+    links = [i + 1 for i in range(len(kinds)) for _ in range(int(rng.choice([0, 1, 1, 1, 2])))]
+    return laden(replace(robot, masses=tuple(random_link(i, rng) for i in links)), rng)
+
+
+def motion(robot: Robot, rng: np.random.Generator, count: int = CONFIGURATIONS) -> tuple[Array, Array, Array, Array]:
+    """Random joint variables, velocities, accelerations and external wrenches."""
+    joints = len(robot.joints)
+    variables = robot.variables(robot.random_configurations(count, rng), robot.values)
+    return variables, rng.normal(size=(joints, count)), rng.normal(size=(joints, count)), rng.normal(size=(6, count))
+
+
+# -- against Pinocchio -----------------------------------------------------------------------------------
+
+
+def stayed(elements: Sequence[Element], end: int, point: Direction, robot: Robot) -> Array:
+    """Where a point of the link that ends there is, by the twin's way to tell how far slides have carried it."""
+    axes = directions_at(elements, end)
+    return np.array(point) - sum((carried(elements, end, a, robot.values) * a for a in axes), np.zeros(3))
+
+
+def bearing_of(elements: Sequence[Element], place: int, robot: Robot) -> float:
+    """How far from its origin the bearing of the joint at a place lies, by the twin's way."""
+    if not elements[place].turns:
+        return 0.0
+    bearing = robot.joints[elements[place].variable or 0].bearing or 0.0
+    return bearing - carried(elements, place, np.array(axis_of(elements[place])), robot.values)
+
+
+def by_pinocchio(robot: Robot, variables: Array, velocity: Array, acceleration: Array, wrench: Array) -> Array:
+    elements = [e for link in robot.link_elements for e in link]
+    ends = np.cumsum([len(link) for link in robot.link_elements])
+    whole = Chain((*elements, *robot.flange_elements))
+    bodies = []
+    for link in robot.masses:
+        xx, yy, zz, xy, xz, yz = link.inertia
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        end = int(ends[link.joint - 1])
+        bodies.append(Body(end, link.mass, stayed(elements, end, link.cog, robot), tensor))
+    bodies.append(Body(len(whole.elements), robot.payload.mass, np.array(robot.payload.cog), np.zeros((3, 3))))
+    oracle = PinocchioChain(whole, robot.values, bodies)
+    joints = [e for e in whole.elements if e.variable is not None]
+    own_axes = [np.array([*across(e), axis_of(e)]) for e in joints]
+    lever = [bearing_of(elements, elements.index(e), robot) * np.array(axis_of(e)) for e in joints]
+    loads = np.empty((len(joints), 6, variables.shape[1]))
+    for k in range(variables.shape[1]):
+        held = oracle.reactions(
+            variables[:, k], velocity[:, k], acceleration[:, k], np.array(robot.gravity), wrench[:, k]
+        )
+        for i, axes in enumerate(own_axes):
+            moment = held[i, 3:] - np.cross(lever[i], held[i, :3])
+            loads[i, :3, k], loads[i, 3:, k] = -axes @ held[i, :3], -axes @ moment
+    return loads
+
+
+def compare_with_pinocchio(robot: Robot, rng: np.random.Generator) -> None:
+    variables, velocity, acceleration, wrench = motion(robot, rng)
+    still, none = np.zeros_like(velocity), np.zeros_like(wrench)
+    for v, a, w in ((None, None, None), (None, None, wrench), (velocity, acceleration, None), (velocity, None, wrench)):
+        actual = joint_loads(robot, variables, velocity=v, acceleration=a, wrench=w)
+        expected = by_pinocchio(
+            robot,
+            variables,
+            still if v is None else v,
+            still if a is None else a,
+            none if w is None else w,
+        )
+        for part in (slice(0, 3), slice(3, 6)):
+            size = np.abs(expected[:, part]).max()
+            assert size > 0.1
+            assert_allclose(actual[:, part], expected[:, part], rtol=0, atol=1e-10 * size)
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)
+@pytest.mark.parametrize("seed", range(4))
+def test_random_robot_agrees_with_pinocchio(convention: Convention, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    compare_with_pinocchio(heavy_robot(convention, rng), rng)
+
+
+@pytest.mark.parametrize("robot_id", WITH_MASSES)
+def test_library_robot_agrees_with_pinocchio(robot_id: str) -> None:
+    rng = np.random.default_rng(1)
+    robot = load_robot(robot_id)
+    compare_with_pinocchio(robot, rng)
+    step = {"m": 1e-3, "rad": 1e-3}
+    off = robot.with_values({n: p.value + step[p.unit] * rng.normal() for n, p in robot.parameters.items()})
+    compare_with_pinocchio(with_bearings(laden(off, rng), rng), rng)
+
+
+def test_library_has_masses() -> None:
+    assert {"irb120", "katana450"} <= set(WITH_MASSES)
+
+
+# -- closed forms ----------------------------------------------------------------------------------------
+
+
+def lever(**changes: object) -> Robot:
+    """A level axis along y of the base and, at zero, a weightless arm of 0.8 m along x with 2 kg at its end."""
+    made = Robot(
+        name="lever",
+        title="lever",
+        source="made up",
+        convention_name="modified-dh",
+        joints=(Joint("swing", "revolute", {"alpha": -np.pi / 2, "a": 0.0, "theta_offset": 0.0, "d": 0.0}),),
+        flange=Transform((0.8, 0.0, 0.0)),
+        payload=Payload(2.0),
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def test_level_arm_sags_forward() -> None:
+    q = np.radians([[0.0, 60.0, 90.0, -30.0]])
+    loads = joint_loads(lever(), q)
+    weight = 2.0 * 9.80665
+    assert_allclose(loads[0, 5], weight * 0.8 * np.cos(q[0]), rtol=1e-15, atol=1e-14)
+    assert_allclose(loads[0, :2], weight * np.array([np.sin(q[0]), np.cos(q[0])]), rtol=0, atol=1e-14)
+    assert_allclose(loads[0, 2:5], 0.0, rtol=0, atol=1e-14)
+    assert loads[0, 5, 0] > 0  # turning forward, about y of the base, lowers the arm
+    held, sagged = (lever().world_poses(np.array([[turn]]))[0][0, 2] for turn in (0.0, 1e-4 * loads[0, 5, 0]))
+    assert sagged < held
+
+
+def test_weight_beside_the_plane_of_an_arm_twists_its_bearing() -> None:
+    loads = joint_loads(lever(payload=Payload(2.0, (0.0, 0.0, 0.3))), np.zeros((1, 1)))
+    # 0.3 m along the axis, which is y of the base, and the weight is along y of the joint
+    assert_allclose(loads[0, 3:, 0], 2.0 * 9.80665 * np.array([-0.3, 0.0, 0.8]), rtol=0, atol=1e-14)
+
+
+def test_turning_mass_pulls_outwards_and_resists() -> None:
+    weightless = lever(gravity=(0.0, 0.0, 0.0))
+    loads = joint_loads(weightless, np.array([[0.3]]), velocity=np.array([[4.0]]), acceleration=np.array([[5.0]]))
+    # m w^2 r outwards along x of the joint, m r alpha backwards, m r^2 alpha against the turn
+    assert_allclose(loads[0, :, 0], [2 * 16 * 0.8, -2 * 0.8 * 5, 0, 0, 0, -2 * 0.64 * 5], rtol=0, atol=1e-13)
+
+
+def test_slide_carries_the_weight_along_it() -> None:
+    rows = {"type": "prismatic", "theta_offset": 0.0, "d": 0.0, "alpha": 0.0, "a": 0.0}
+    row = {k: v for k, v in rows.items() if isinstance(v, float)}
+    slide = lever(joints=(Joint("lift", "prismatic", row),), payload=Payload(3.0, (0.1, 0.0, 0.0)))
+    loads = joint_loads(slide, np.array([[0.5]]), acceleration=np.array([[2.0]]))
+    weight = 3.0 * (9.80665 + 2.0)
+    assert_allclose(loads[0, :, 0], [0, 0, -weight, 0, 0.9 * weight, 0], rtol=1e-15, atol=1e-14)
+
+
+def test_horizontal_pull_turns_an_upright_axis() -> None:
+    robot = load_robot("irb120")
+    robot = replace(robot, masses=())
+    q = robot.random_configurations(CONFIGURATIONS, np.random.default_rng(2)).T
+    wrench = np.zeros((6, CONFIGURATIONS))
+    wrench[1] = 30.0
+    loads = joint_loads(robot, q, wrench=wrench)
+    reach = robot.world_poses(q.T)[0][:, 0]
+    assert_allclose(loads[0, 5], 30.0 * reach, rtol=0, atol=1e-12)
+
+
+# -- what must hold for every arm ------------------------------------------------------------------------
+
+
+def centre_of(robot: Robot, link: LinkMass) -> list[Element]:
+    """The way from a link's frame to its centre of gravity."""
+    every = [e for each in robot.link_elements for e in each]
+    end = sum(len(each) for each in robot.link_elements[: link.joint])
+    x, y, z = (float(v) for v in stayed(every, end, link.cog, robot))
+    return [Element("Tx", x), Element("Ty", y), Element("Tz", z)]
+
+
+def height_of_weight(robot: Robot, bodies: Array, elements: tuple[tuple[Element, ...], ...]) -> Array:
+    """Potential energy [J] of the links, by the poses of their centres of gravity."""
+    energy = np.zeros(bodies.shape[1])
+    for link in robot.masses:
+        way = [e for each in elements[: link.joint] for e in each]
+        way += centre_of(robot, link)
+        energy -= (
+            link.mass * np.array(robot.gravity) @ Chain(tuple(way)).forward_kinematics(bodies, robot.values).position
+        )
+    return energy
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)
+def test_arm_that_yields_to_its_load_sags(convention: Convention) -> None:
+    rng = np.random.default_rng(3)
+    robot = replace(heavy_robot(convention, rng), payload=Payload())
+    variables = motion(robot, rng)[0]
+    loads = joint_loads(robot, variables)
+    joints = [next(e for e in link if e.variable is not None) for link in robot.link_elements]
+    for i, joint in enumerate(joints):
+        # tilts and shifts of this joint alone, behind its element, in its own axes
+        for k, axis in enumerate((*across(joint), axis_of(joint))):
+            for motion_, load in (("T", loads[i, k]), ("R", loads[i, 3 + k])):
+                if np.abs(load).max() < 1e-9:
+                    continue
+                yielding = Element(motion_, variable=len(joints), axis=axis)  # type: ignore[arg-type]
+                bent = list(robot.link_elements)
+                place = bent[i].index(joint) + 1
+                every = [e for each in robot.link_elements for e in each]
+                away = bearing_of(every, every.index(joint), robot)
+                there, back_again = (Element("T", s * away, axis=axis_of(joint)) for s in (1.0, -1.0))
+                bent[i] = (*bent[i][:place], there, yielding, back_again, *bent[i][place:])
+                step = 1e-6
+                moved = height_of_weight(robot, np.vstack([variables, np.full(CONFIGURATIONS, step)]), tuple(bent))
+                back = height_of_weight(robot, np.vstack([variables, np.full(CONFIGURATIONS, -step)]), tuple(bent))
+                assert_allclose((back - moved) / (2 * step), load, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["standard-dh", "modified-hayati", "product-of-exponentials", "urdf"])
+def test_power_of_the_loads_is_what_kinetic_and_potential_energy_lose(name: str) -> None:
+    rng = np.random.default_rng(4)
+    count = 256
+    robot = replace(heavy_robot(CONVENTION[name], rng), payload=Payload())
+    joints = len(robot.joints)
+    phase = 2 * np.pi * np.arange(count) / count  # one period of a motion that comes back: derivatives by Fourier
+    wave = 2 * np.pi * np.fft.fftfreq(count, d=2 * np.pi / count)
+
+    def rate(series: Array) -> Array:
+        return np.real(np.fft.ifft(1j * wave * np.fft.fft(series)))
+
+    variables = np.array([[a] * count + b * np.sin(phase + c) for a, b, c in rng.uniform(-0.5, 0.5, (joints, 3))])
+    velocity = np.array([rate(row) for row in variables])
+    acceleration = np.array([rate(row) for row in velocity])
+    energy = height_of_weight(robot, variables, robot.link_elements)
+    for link in robot.masses:
+        way = [e for each in robot.link_elements[: link.joint] for e in each]
+        way += centre_of(robot, link)
+        kinematics = Chain(tuple(way)).forward_kinematics(variables, robot.values)
+        R = kinematics.matrix()
+        energy += 0.5 * link.mass * (rate(kinematics.position) ** 2).sum(axis=0)
+        body_rates = np.swapaxes(R, 1, 2) @ np.moveaxis(rate(np.moveaxis(R, 0, -1)), -1, 0)
+        spin = np.stack([body_rates[:, 2, 1], body_rates[:, 0, 2], body_rates[:, 1, 0]])
+        xx, yy, zz, xy, xz, yz = link.inertia
+        energy += 0.5 * np.einsum("in,ij,jn->n", spin, [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], spin)
+    loads = joint_loads(robot, variables, velocity=velocity, acceleration=acceleration)
+    along = [5 if j.kind == "revolute" else 2 for j in robot.joints]
+    power = sum(loads[i, k] * velocity[i] for i, k in enumerate(along))
+    assert np.abs(power).max() > 0.1
+    assert_allclose(power, -rate(energy), rtol=0, atol=1e-9 * np.abs(power).max())
+
+
+def test_loads_of_two_sets_of_masses_add_up() -> None:
+    rng = np.random.default_rng(5)
+    robot = replace(heavy_robot(CONVENTION["modified-hayati"], rng), payload=Payload())
+    variables, velocity, acceleration, _ = motion(robot, rng)
+    one = tuple(random_link(i, rng) for i in range(1, len(robot.joints) + 1))
+    two = tuple(random_link(i, rng) for i in range(1, len(robot.joints) + 1))
+
+    def loads(masses: tuple[LinkMass, ...]) -> Array:
+        return joint_loads(replace(robot, masses=masses), variables, velocity=velocity, acceleration=acceleration)
+
+    assert_allclose(loads(one + two), loads(one) + loads(two), rtol=0, atol=1e-11)
+    triple = tuple(replace(m, mass=3 * m.mass, inertia=tuple(3 * v for v in m.inertia)) for m in one)  # type: ignore[arg-type]
+    assert_allclose(loads(triple), 3 * loads(one), rtol=0, atol=1e-11)
+
+
+def test_nothing_weighs_nothing() -> None:
+    robot = load_robot("irb120")
+    q = robot.random_configurations(CONFIGURATIONS, np.random.default_rng(6)).T
+    for masses in ((), tuple(replace(m, mass=0.0) for m in robot.masses)):
+        loads = joint_loads(replace(robot, masses=masses), q, velocity=np.ones_like(q), acceleration=np.ones_like(q))
+        assert loads.shape == (6, 6, CONFIGURATIONS)
+        assert not loads.any()
+
+
+def test_massless_link_changes_nothing() -> None:
+    robot = load_robot("irb120")
+    q = robot.random_configurations(CONFIGURATIONS, np.random.default_rng(7)).T
+    more = replace(robot, masses=(*robot.masses, LinkMass(6, 0.0, (0.1, 0.2, 0.3))))
+    assert_allclose(joint_loads(more, q), joint_loads(robot, q), rtol=0, atol=0)
+
+
+def test_joint_without_weight_beyond_it_bears_none() -> None:
+    robot = load_robot("irb120")  # the last mass is on link 4
+    q = robot.random_configurations(CONFIGURATIONS, np.random.default_rng(8)).T
+    loads = joint_loads(robot, q)
+    assert not loads[4:].any()
+    assert (np.linalg.norm(loads[:4, :3], axis=1) > 1.0).all()
+
+
+def test_turning_gravity_about_the_first_axis_is_turning_the_first_joint_back() -> None:
+    rng = np.random.default_rng(9)
+    robot = replace(load_robot("ur5"), payload=Payload(3.0, (0.02, 0.03, 0.1)), gravity=(3.0, -8.0, 2.0))
+    variables, velocity, acceleration, _ = motion(robot, rng)
+    turn = 0.7
+    c, s = np.cos(turn), np.sin(turn)
+    x, y, z = robot.gravity
+    turned = replace(robot, gravity=(c * x - s * y, s * x + c * y, z))
+    ahead = variables.copy()
+    ahead[0] += turn
+    given = {"velocity": velocity, "acceleration": acceleration}
+    assert_allclose(joint_loads(turned, ahead, **given), joint_loads(robot, variables, **given), rtol=0, atol=1e-11)
+
+
+def test_place_of_the_base_does_not_matter() -> None:
+    rng = np.random.default_rng(10)
+    robot = load_robot("katana450")
+    variables, velocity, _, wrench = motion(robot, rng)
+    moved = robot.with_frames(random_frame(rng), {})
+    expected = joint_loads(robot, variables, velocity=velocity, wrench=wrench)
+    assert_allclose(joint_loads(moved, variables, velocity=velocity, wrench=wrench), expected, rtol=0, atol=0)
+
+
+def test_upside_down_turns_every_load_around() -> None:
+    robot = load_robot("irb120")
+    q = robot.random_configurations(CONFIGURATIONS, np.random.default_rng(11)).T
+    x, y, z = GRAVITY
+    hanging = replace(robot, gravity=(-x, -y, -z))
+    assert_allclose(joint_loads(hanging, q), -joint_loads(robot, q), rtol=0, atol=0)
+
+
+def test_configurations_together_equal_configurations_alone() -> None:
+    rng = np.random.default_rng(12)
+    robot = heavy_robot(CONVENTION["urdf"], rng)
+    variables, velocity, acceleration, wrench = motion(robot, rng)
+    together = joint_loads(robot, variables, velocity=velocity, acceleration=acceleration, wrench=wrench)
+    for k in range(CONFIGURATIONS):
+        one = slice(k, k + 1)
+        alone = joint_loads(
+            robot,
+            variables[:, one],
+            velocity=velocity[:, one],
+            acceleration=acceleration[:, one],
+            wrench=wrench[:, one],
+        )
+        assert_allclose(together[:, :, one], alone, rtol=0, atol=1e-12)
+
+
+def test_further_variables_of_the_chain_are_no_joints() -> None:
+    rng = np.random.default_rng(13)
+    robot = load_robot("irb120")
+    variables, velocity, _, _ = motion(robot, rng)
+    more = np.vstack([variables, rng.normal(size=(4, CONFIGURATIONS))])
+    expected = joint_loads(robot, variables, velocity=velocity)
+    assert_allclose(joint_loads(robot, more, velocity=velocity), expected, rtol=0, atol=0)
+
+
+# -- refusals --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "allowed"),
+    [("velocity", (7, 6), "(6, 7)"), ("acceleration", (5, 7), "(6, 7)"), ("wrench", (7, 6), "(6, 7)")],
+)
+def test_array_of_another_shape_is_refused(name: str, shape: tuple[int, int], allowed: str) -> None:
+    robot = load_robot("irb120")
+    with pytest.raises(InputError) as caught:
+        joint_loads(robot, np.zeros((6, 7)), **{name: np.zeros(shape)})
+    for part in (name, "irb120", str(shape), allowed):
+        assert part in str(caught.value)
+
+
+# -- the joint's own axes --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("motion_", ["Rx", "Ry", "Rz", "Tx", "Ty", "Tz"])
+def test_axes_across_a_plain_axis_are_the_two_others(motion_: str) -> None:
+    x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    expected = {"x": (y, z), "y": (z, x), "z": (x, y)}
+    assert across(Element(motion_)) == expected[motion_[1]]  # type: ignore[arg-type]
+
+
+def test_axes_across_any_axis_are_right_handed() -> None:
+    rng = np.random.default_rng(14)
+    plain = [s * row for s in (1.0, -1.0) for row in np.eye(3)]
+    almost = [np.array([1e-9, -1e-9, s]) for s in (1.0, -1.0)]
+    for axis in (*plain, *almost, *(np.array(random_unit(rng, 3)) for _ in range(200))):
+        a, b, c = (float(v) for v in axis)
+        element = Element("R", axis=(a, b, c))
+        own = np.array([*across(element), axis_of(element)])
+        assert_allclose(own @ own.T, np.eye(3), rtol=0, atol=1e-14)
+        assert np.linalg.det(own) > 0
+
+
+def test_axes_across_do_not_jump_near_z() -> None:
+    assert across(Element("R", axis=(0.0, 0.0, 1.0))) == across(Element("Rz"))
+    rng = np.random.default_rng(15)
+    for _ in range(50):
+        x, y = rng.normal(size=2) * 1e-4
+        z = float(np.sqrt(1 - x * x - y * y))
+        for own, plain in zip(across(Element("R", axis=(float(x), float(y), z))), np.eye(3), strict=False):
+            assert np.linalg.norm(own - plain) < 2 * np.hypot(x, y)

@@ -1,0 +1,306 @@
+"""Every example in README and guide is run: console sessions with their output, Python blocks, captioned files.
+
+Commands of truearm and Python blocks run in this process, which is many times faster than a process for each; other
+commands and pipelines go to the shell.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from truearm.commands import main
+from truearm.engine.base.limits import LIMITS
+from truearm.engine.data.rigid_tool import Suspicion
+from truearm.engine.diagnose.changes import Kind
+
+ROOT = Path(__file__).parents[2]
+GUIDE = sorted((ROOT / "docs" / "guide").glob("*.md"))
+DOCUMENTS = [ROOT / "README.md", ROOT / "docs" / "api.md", *GUIDE]
+#: Pages that are one session from top to bottom; elsewhere every block of Python stands for itself.
+SESSIONS = ("api.md", "notebook.md")
+PAGES = [
+    ROOT / "README.md",
+    *GUIDE,
+    ROOT / "CHANGELOG.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+BLOCK = re.compile(r"^(?P<indent> *)```(?P<kind>\S+(?: \S+)?)\n(?P<body>.*?)^(?P=indent)```$", re.M | re.S)
+#: A command of truearm alone, perhaps in a folder: no pipeline, no other program.
+ALONE = re.compile(r"(?:cd (?P<folder>\S+) && )?truearm (?P<words>[^|&;<>$`]*)")
+
+
+def blocks(document: Path) -> list[tuple[str, str]]:
+    found = []
+    for match in BLOCK.finditer(document.read_text()):
+        indent = len(match["indent"])
+        found.append((match["kind"], "".join(line[indent:] for line in match["body"].splitlines(keepends=True))))
+    return found
+
+
+def fits(shown: str, came: str) -> bool:
+    """Whether output is what a document shows; `...` stands for anything, runs of blanks do not count."""
+    came = " ".join(came.split())
+    first, *rest = [" ".join(part.split()) for part in shown.split("...")]
+    if not rest:
+        return came == first
+    place = len(first)
+    for part in rest[:-1]:
+        found = came.find(part, place)
+        if found < 0:
+            return False
+        place = found + len(part)
+    return came.startswith(first) and came.endswith(rest[-1]) and len(came) >= place + len(rest[-1])
+
+
+@contextmanager
+def arguments(words: list[str]) -> Iterator[None]:
+    before = sys.argv
+    sys.argv = words
+    try:
+        yield
+    finally:
+        sys.argv = before
+
+
+#: What commands printed, and the files that they wrote, by their words and all files of the folder they ran in.
+DONE: dict[tuple[str, ...], tuple[int, str, dict[str, bytes]]] = {}
+
+
+def files_in(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def run_once(command: str, folder: Path) -> tuple[int, str]:
+    """Run a command, or give again what it did in another folder: pages share sessions, such as the demo's.
+
+    Only the files that a command names can matter to it; where nothing of that name is there, it writes it.
+    """
+    if ALONE.fullmatch(command.strip()) is None:
+        return run_command(command, folder)
+    before, words = files_in(folder), shlex.split(command)
+    named = {word.split("/")[0] for word in words}
+    read = [f"{name}={sha256(content).hexdigest()}" for name, content in before.items() if name.split("/")[0] in named]
+    key = (*words, *sorted(read))
+    if key not in DONE:
+        code, printed = run_command(command, folder)
+        DONE[key] = code, printed, {name: text for name, text in files_in(folder).items() if before.get(name) != text}
+        return code, printed
+    code, printed, written = DONE[key]
+    for name, content in written.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    return code, printed
+
+
+def run_command(command: str, folder: Path) -> tuple[int, str]:
+    """Return the exit code of a command, and what it printed."""
+    alone = ALONE.fullmatch(command.strip())
+    if alone is None:
+        environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+        done = subprocess.run(["sh", "-c", command], cwd=folder, env=environment, capture_output=True, text=True)
+        return done.returncode, done.stdout + done.stderr
+    code, out, err = 0, io.StringIO(), io.StringIO()
+    words = ["truearm", *shlex.split(alone["words"])]
+    with chdir(folder / (alone["folder"] or "")), arguments(words), redirect_stdout(out), redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+    return code, out.getvalue() + err.getvalue()
+
+
+def run_session(session: str, folder: Path) -> None:
+    commands = re.split(r"^\$ ", session.replace("\\\n", " "), flags=re.M)[1:]
+    assert commands
+    for entry in commands:
+        command, _, shown = entry.partition("\n")
+        code = re.search(r"^\[exit (\d+)\]\n", shown, re.M)
+        came, printed = run_once(command, folder)
+        assert came == (int(code[1]) if code else 0), f"{command}\n{printed}"
+        shown = shown.replace(code[0], "") if code else shown
+        if shown.strip():
+            assert fits(shown, printed), f"{command} printed:\n{printed}"
+
+
+def run_python(body: str, names: dict[str, object], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a block after those before it; comment lines below a print are lines of what it prints."""
+    out, known = io.StringIO(), set(sys.modules)
+    with monkeypatch.context() as patch, chdir(folder), redirect_stdout(out):
+        patch.syspath_prepend(str(folder))
+        exec(compile(body, "example", "exec"), names)
+    for name in set(sys.modules) - known:
+        if getattr(sys.modules[name], "__file__", None) == str(folder / f"{name}.py"):
+            del sys.modules[name]  # an example's own module
+    printed = out.getvalue().splitlines()
+    for shown in re.findall(r"^(?:print\(.*|\))\n((?:# .*\n)+)|^(?: +print\(.*|    \))\n((?:# .*\n)+)", body, re.M):
+        for line in "".join(shown).splitlines():
+            assert any(fits(line[2:], each) for each in printed), f"{line}\nis not in\n{out.getvalue()}"
+
+
+def test_output_is_compared_as_the_documents_mean_it() -> None:
+    assert fits("mean 0.07...  max ... mm\nStatus: converged", "mean 0.073  max 0.178 mm\n\n Status: converged\n")
+    assert fits("...", "")
+    assert not fits("mean 0.08... mm", "mean 0.073 mm")
+    assert not fits("a ... b", "a b c")
+    assert not fits("a b ... b c", "a b c")
+    assert not fits("one", "one two")
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_the_examples_run_as_shown(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran, names = 0, dict[str, object]()
+    for kind, body in blocks(document):
+        if kind.startswith("{code-block}"):
+            caption, _, content = body.partition("\n")
+            (tmp_path / caption.removeprefix(":caption:").strip()).write_text(content)
+    for kind, body in blocks(document):
+        if kind == "console":
+            if "session/" in body and not (tmp_path / "session").exists() and "truearm example" not in body:
+                run_session("$ truearm example session\n", tmp_path)
+            run_session(body, tmp_path)
+            ran += 1
+        elif kind == "python":
+            if document.name not in SESSIONS:
+                names = {}
+            run_python(body, names, tmp_path, monkeypatch)
+            ran += 1
+    if document.name != "results.md":
+        assert ran
+
+
+def test_every_relative_link_leads_somewhere() -> None:
+    for document in PAGES:
+        for link, anchor in re.findall(r"\]\(([^)#:\s]*)(#[^)\s]+)?\)", document.read_text()):
+            page = document.parent / link if link else document
+            assert page.exists(), f"{document.name}: {link}"
+            if anchor:
+                assert anchor[1:] in anchors_of(page), f"{document.name}: {link}{anchor}"
+
+
+def anchors_of(page: Path) -> set[str]:
+    """Return what links can point to: the headings, in small letters, blanks as hyphens, no signs."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.M)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_every_page_stands_in_the_index() -> None:
+    index = (ROOT / "docs" / "index.md").read_text()
+    for page in [*GUIDE, *(ROOT / "docs").glob("*.md")]:
+        name = page.relative_to(ROOT / "docs").with_suffix("").as_posix()
+        if name != "index":
+            assert f"({name}.md)" in index, f"{name} has no line in the index"
+            assert f"\n{name}\n" in index, f"{name} is in no list of pages"
+
+
+def test_pages_that_can_be_skipped_say_so_themselves_and_in_the_index() -> None:
+    lines = (ROOT / "docs" / "index.md").read_text().splitlines()
+    for page in GUIDE:
+        entry = next(line for line in lines if f"(guide/{page.name})" in line)
+        says_so = page.read_text().splitlines()[2].startswith("*You can skip this page")
+        assert says_so == ("*(special)*" in entry), page.name
+
+
+def test_every_word_of_the_glossary_leads_to_a_page_that_uses_it() -> None:
+    entries = re.split(r"^## ", (ROOT / "docs" / "glossary.md").read_text(), flags=re.M)[1:]
+    words = [entry.splitlines()[0] for entry in entries]
+    assert words == sorted(words, key=str.lower)
+    for entry in entries:
+        assert re.search(r"\]\((guide/|architecture|#)", entry), f"{entry.splitlines()[0]} leads nowhere"
+
+
+#: "Lomb 1976", "Holland and Welsch (1977)", "Li et al. 2016", "Mooring, 1983": the last name and the year.
+CITATION = re.compile(r"\b([A-Z][A-Za-z-]+)(?: et al\.| and others)?,? \(?((?:18|19|20)\d\d)\b")
+
+
+def test_every_source_that_is_cited_stands_in_the_bibliography() -> None:
+    entries = re.split(r"\n(?=- |\n)", (ROOT / "docs" / "bibliography.md").read_text())
+    sources = ROOT / "src" / "truearm"
+    cited = 0
+    for file in sorted([*sources.rglob("*.py"), *sources.rglob("*.yaml"), *(ROOT / "docs" / "guide").glob("*.md")]):
+        text = re.sub(r"\s+#?\s*", " ", file.read_text())
+        for name, year in CITATION.findall(text):
+            cited += 1
+            assert any(name in entry and year in entry for entry in entries), f"{file.name}: {name} {year}"
+    assert cited > 40
+
+
+def test_every_file_that_the_architecture_names_is_there() -> None:
+    places = [*(ROOT / "src").rglob("*"), *(ROOT / "tests").rglob("*.py")]
+    files = [f"/{place.relative_to(ROOT).as_posix()}" for place in places]
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    named = set(re.findall(r"[\w/]*\w\.py\b|\b[a-z]\w+(?:/\w+)*/(?=[`\s,])", text))
+    assert len(named) > 60
+    for name in named:
+        assert any(file.endswith(f"/{name.rstrip('/')}") for file in files), name
+
+
+#: What makes a notice, or becomes one, and the level that it has if none is given.
+NOTICES = {"Notice": "warning", "Slip": "error", "Suspect": "warning"}
+
+
+@cache
+def calls_in_code() -> list[ast.Call]:
+    """Return every call in the code, of files in which a notice or a next step is named at all."""
+    texts = [file.read_text() for file in (ROOT / "src" / "truearm").rglob("*.py")]
+    named = re.compile(rf"\b({'|'.join((*NOTICES, 'NextStep'))})\(")
+    trees = [ast.parse(text) for text in texts if named.search(text)]
+    return [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
+
+
+def notices_in_code() -> dict[str, set[str]]:
+    """Return the levels of every code in the code; those that are chosen where it runs are not among them."""
+    found: dict[str, set[str]] = {code: set() for code in (*get_args(Kind), *get_args(Suspicion))}
+    for call in calls_in_code():
+        if not isinstance(call.func, ast.Name) or call.func.id not in NOTICES:
+            continue
+        if not call.args or not isinstance(call.args[0], ast.Constant):
+            continue
+        given = call.args[2] if call.func.id == "Notice" and len(call.args) > 2 else None
+        levels = found.setdefault(str(call.args[0].value), set())
+        if given is None:
+            levels.add(NOTICES[call.func.id])
+        elif isinstance(given, ast.Constant):
+            levels.add(str(given.value))
+    return found
+
+
+def test_every_code_of_a_notice_stands_in_the_guide_with_its_level() -> None:
+    rows = [line.split("|") for page in GUIDE for line in page.read_text().splitlines() if line.startswith("| `")]
+    codes = notices_in_code()
+    assert len(codes) > 60
+    for code, levels in codes.items():
+        told = [row[2] for row in rows if f"`{code}`" in row[1] and re.search("note|warning|error", row[2])]
+        assert told, f"{code} has no row with its level"
+        assert all(any(level in cell for cell in told) for level in levels), f"{code}: {levels}, told as {told}"
+
+
+def test_every_code_of_a_next_step_stands_in_the_guide() -> None:
+    text = (ROOT / "docs" / "guide" / "results.md").read_text().split("## What to do next")[1].split("\n## ")[0]
+    codes = set(get_args(Kind))
+    for call in calls_in_code():
+        if isinstance(call.func, ast.Name) and call.func.id == "NextStep":
+            codes |= {str(arg.value) for arg in call.args[:1] if isinstance(arg, ast.Constant)}
+    assert len(codes) > 12
+    for code in codes:
+        assert f"`{code}`" in text, code
+
+
+def test_every_limit_stands_in_the_guide() -> None:
+    text = (ROOT / "docs" / "guide" / "data.md").read_text().replace(" ", "")
+    for name, limit in LIMITS.items():
+        assert f"|`{name}`|{limit.most}|" in text, f"{name} is {limit.most}"

@@ -1,0 +1,62 @@
+"""The wheel works outside the clone, and importing stays cheap."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def unpacked_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+    )
+    (wheel,) = folder.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder / "site")
+    return folder / "site"
+
+
+def test_the_wheel_calibrates_outside_the_clone(unpacked_wheel: Path, tmp_path: Path) -> None:
+    script = (
+        f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nimport truearm\nfrom truearm.commands import main\n"
+        f"assert {str(unpacked_wheel)!r} in truearm.__file__\n"
+        "for words in ('robots', 'demo --out demo', 'new-robot mine.yaml', 'show mine.yaml'):\n"
+        "    sys.argv[1:] = words.split()\n"
+        "    try:\n        main()\n    except SystemExit as end:\n        assert not end.code\n"
+    )
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "mine.yaml").exists()
+    assert (tmp_path / "demo" / "report.html").stat().st_size > 1_000_000
+
+
+def test_the_wheel_is_typed_and_licensed(unpacked_wheel: Path) -> None:
+    assert (unpacked_wheel / "truearm" / "py.typed").exists()
+    assert list(unpacked_wheel.glob("*.dist-info/licenses/LICENSE"))
+    assert not list(unpacked_wheel.rglob("tests"))
+
+
+def test_a_calibration_imports_neither_scipy_optimize_nor_plotly() -> None:
+    script = (
+        "import sys, truearm\nfrom truearm import calibrate\n"
+        "print([m for m in ('scipy.optimize', 'plotly') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_unknown_names_of_the_package_are_refused() -> None:
+    import truearm
+
+    with pytest.raises(AttributeError, match="has no attribute 'calibrat'"):
+        truearm.calibrat  # noqa: B018

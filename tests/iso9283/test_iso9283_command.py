@@ -1,0 +1,80 @@
+"""`truearm iso9283`: plan, simulate, evaluate, in millimetres, degrees and percent."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.commanding import Truearm
+from tests.house.examples import performance_files
+
+CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name, text in performance_files().items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "cube.yaml").write_text(CUBE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_plan_is_made_in_percent_and_millimetres(truearm: Truearm, folder: Path) -> None:
+    words = ("iso9283", "plan", "irb120", "--cube", "cube.yaml", "--criteria", "AP,t", "--tip", "0,0,100")
+    run = truearm(
+        *words, "--velocity", "400", "--velocities", "50,10", "--limit-band", "0.2", "--out", "made", "--json"
+    )
+    found = json.loads(run.out)
+    assert found["cube_mm"]["side"] == 200.0
+    assert found["rated_velocity_mm_s"] == 400.0
+    assert [test["velocities_percent"] for test in found["tests"]] == [[50.0, 10.0], [50.0]]
+    assert "limit_band: 0.2" in (folder / "made" / "plan.yaml").read_text()
+    again = truearm(*words, "--out", "other")
+    assert (again.code, "rated-velocity-assumed" in again.out) == (0, True)
+    assert "Written to other: plan.yaml, robot.yaml, sheet.html" in again.out
+
+
+def test_an_evaluation_is_printed_as_a_table_or_as_json(truearm: Truearm, folder: Path) -> None:
+    words = ("iso9283", "evaluate", "plan.yaml", "--poses", "poses.csv", "--alignment", "alignment.yaml")
+    found = json.loads(truearm(*words, "--noise", "0.001", "--out", "made", "--json").out)
+    assert found["instrument"]["sigma_mm"] == pytest.approx(0.001)
+    assert {entry["id"] for entry in found["criteria"] if entry["status"] != "not-measured"} == {"AP", "RP"}
+    run = truearm(*words, "--out", "made", "--compare", "made/iso9283.json")
+    assert run.code == 2
+    assert "would be overwritten. Choose another --out" in run.err
+    run = truearm(*words, "--out", "second", "--compare", "made/iso9283.json")
+    assert run.code == 0
+    assert "Written to second: iso9283.json, report.html" in run.out
+    assert {path.name for path in (folder / "second").iterdir()} >= {"iso9283.json", "report.html"}
+
+
+def test_a_campaign_is_simulated_with_an_instrument_in_millimetres(truearm: Truearm, folder: Path) -> None:
+    words = ("iso9283", "simulate", "irb120", "--plan", "plan.yaml", "--rate", "100", "--seed", "3", "--noise", "0.02")
+    run = truearm(*words, "--out", "read")
+    assert (run.code, "25 attained poses" in run.out) == (0, True)
+    assert (folder / "read" / "poses.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("plan", "irb120", "--velocities", "150", "--out", "a"), "--velocities"),
+        (("plan", "irb120", "--criteria", "zz", "--out", "a"), "--criteria"),
+        (("plan", "irb120", "--criteria", "ap", "--cube", "none.yaml", "--out", "a"), "none.yaml"),
+        (("simulate", "kr5", "--plan", "plan.yaml", "--out", "a"), "--plan"),
+        (("simulate", "irb120", "--plan", "plan.yaml", "--rate", "1", "--out", "a"), "--rate"),
+        (("evaluate", "plan.yaml", "--out", "a"), "--poses"),
+        (("evaluate", "plan.yaml", "--poses", "none.csv", "--out", "a"), "none.csv"),
+        (("evaluate", "plan.yaml", "--forces", "forces.csv", "--out", "a"), "--alignment"),
+        (("evaluate", "plan.yaml", "--poses", "poses.csv", "--noise", "0", "--out", "a"), "--noise"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_by_its_option(
+    truearm: Truearm, folder: Path, words: tuple[str, ...], said: str
+) -> None:
+    run = truearm("iso9283", *words)
+    assert run.code == 2
+    assert said in run.err
+    assert not (folder / "a").exists()

@@ -1,0 +1,566 @@
+"""A plan measured from the first reading to a calibration, stopped and gone on with, by every source."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.house.examples import MEASURED_PLAN
+
+import truearm
+from truearm.engine.base.errors import InputError
+from truearm.engine.data.readers.canonical import read_csv
+from truearm.engine.twin.devices import DEVICES
+from truearm.engine.twin.devices.device import Device
+from truearm.measuring.begun import BEGUN
+from truearm.measuring.open_campaign import open_campaign, sight
+from truearm.measuring.reading_log import LOG
+from truearm.measuring.result import DATA, PAGE
+from truearm.measuring.session import Reading
+from truearm.measuring.virtual_instrument import VIRTUAL, VirtualInstrument
+
+MAPPING = """\
+truearm: truearm-mapping/1
+configuration: {column: Pose}
+length_unit: mm
+readings: [{target_column: Point, x: X, y: Y, z: Z}]
+joints: {file: plan.csv}
+"""
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A plan of configurations at which the tracker sees a reflector."""
+    return seen_by("tracker", 24, tmp_path_factory.mktemp("planned"))
+
+
+def seen_by(device: str, poses: int, folder: Path) -> Path:
+    """Write a plan of configurations that a device can measure."""
+    data = truearm.simulate("irb120", truth="nominal", poses=poses, device=device).data
+    rows = (",".join(map(repr, row)) for row in np.degrees(data.joints).tolist())
+    path = folder / "plan.csv"
+    path.write_text(MEASURED_PLAN.splitlines()[0] + "\n" + "".join(f"{k},{row}\n" for k, row in enumerate(rows, 1)))
+    return path
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    path = tmp_path / "plan.csv"
+    path.write_text(MEASURED_PLAN)
+    return path
+
+
+def arm(plan: Path, out: Path, **more: Any) -> Any:
+    given: dict[str, Any] = {"device": "measurement-arm", "nests": ["n"], "every": 2} | more
+    return truearm.measure(plan, "irb120", out=out, **given)
+
+
+def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(planned: Path, tmp_path: Path) -> None:
+    told: list[str] = []
+    found = truearm.measure(
+        planned,
+        "irb120",
+        out=tmp_path,
+        device="tracker",
+        seed=3,
+        disturbed=0.2,
+        nests=["n1", "n2", "n3"],
+        every=6,
+        tell=told.append,
+    )
+    assert found.finished
+    assert len(told) == len(found.session.entries)
+    reasons = found.session.aside_by_reason
+    assert {*reasons} == {"beam-break", "not-settled", "scatter"}
+    assert sum(reasons.values()) > 3
+    assert [(notice.code, notice.level) for notice in found.warnings] == [("not-seen", "note"), ("not-said", "note")]
+    assert {p.name for p in tmp_path.iterdir()} == {BEGUN, DATA, LOG, PAGE, "truearm.manifest.json"}
+    data = read_csv(tmp_path / DATA)
+    assert data.sigma is not None
+    assert set(data.sigma[data.has_reading].tolist()) == {VIRTUAL["tracker"].sigma}
+    assert data.references is not None
+    calibration = truearm.calibrate("irb120", tmp_path / DATA, train=18)
+    assert calibration.validation is not None
+    assert calibration.validation.position is not None
+    assert calibration.validation.position.mean < 1e-4
+    page = (tmp_path / PAGE).read_text()
+    for word in ("beam-break", "n1", "how well it fits", "not said"):
+        assert word in page
+
+
+def test_what_was_stopped_goes_on_to_the_same_files(plan: Path, tmp_path: Path) -> None:
+    whole = tmp_path / "whole"
+    arm(plan, whole, seed=1, disturbed=0.3)
+    for stopped in (1, 4, 7):
+        part = tmp_path / f"part-{stopped}"
+        with open_campaign(
+            plan, "irb120", part, device="measurement-arm", nests=["n"], every=2, seed=1, disturbed=0.3
+        ) as campaign:
+            for _ in range(stopped):
+                campaign.step()
+            step = campaign.session.next
+            unfinished = campaign.finish()
+        assert step is not None
+        assert f"next is {step.label}, {step.names[0]}" in unfinished.warnings[0].message
+        told: list[str] = []
+        arm(plan, part, seed=1, disturbed=0.3, tell=told.append)
+        assert told[0].startswith(f"Going on after {stopped} entries")
+        for name in (LOG, DATA):
+            assert (part / name).read_bytes() == (whole / name).read_bytes()
+    before = (whole / DATA).read_bytes()
+    assert arm(plan, whole, seed=1, disturbed=0.3).finished
+    assert (whole / DATA).read_bytes() == before
+
+
+def test_a_torn_line_is_said_and_measured_again(plan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arm(plan, out)
+    log, data = (out / LOG).read_bytes(), (out / DATA).read_bytes()
+    (out / LOG).write_bytes(log[:-7])
+    found = arm(plan, out)
+    (notice,) = [notice for notice in found.warnings if notice.code == "torn-line"]
+    assert notice.level == "note"
+    assert ((out / LOG).read_bytes(), (out / DATA).read_bytes()) == (log, data)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"targets": ["nest"], "nests": ["m"]}, "nests"),
+        ({"every": 3}, "every"),
+        ({"seed": 2}, "source of readings"),
+        ({"most_deviation": 1e-3}, "limit of what is kept"),
+        ({"payload": "1kg,0mm,0mm,50mm"}, "source of readings"),
+    ],
+)
+def test_a_folder_that_began_otherwise_is_refused(
+    plan: Path, tmp_path: Path, change: dict[str, Any], word: str
+) -> None:
+    out = tmp_path / "out"
+    arm(plan, out)
+    with pytest.raises(InputError, match=f"began with another {word}") as refusal:
+        arm(plan, out, **change)
+    assert refusal.value.parameter == "out"
+
+
+def test_another_plan_robot_or_instrument_is_refused(plan: Path, tmp_path: Path) -> None:
+    out, about = tmp_path / "out", tmp_path / "about.yaml"
+    about.write_text("truearm: truearm-about/1\nunits: {}\ninstrument: {serial: A}\n")
+    arm(plan, out, about=about)
+    about.write_text("truearm: truearm-about/1\nunits: {}\ninstrument: {serial: B}\n")
+    with pytest.raises(InputError, match="another instrument or robot"):
+        arm(plan, out, about=about)
+    with pytest.raises(InputError, match="another robot"):
+        truearm.measure(plan, "irb1600", out=out, device="measurement-arm", nests=["n"], every=2)
+    plan.write_text(MEASURED_PLAN.replace("P2,20", "P2,21"))
+    with pytest.raises(InputError, match="another plan"):
+        arm(plan, out)
+    (out / BEGUN).unlink()
+    with pytest.raises(InputError, match="nothing says of which plan"):
+        arm(plan, out)
+    (out / BEGUN).write_text("{}")
+    with pytest.raises(InputError, match="how a measuring began"):
+        arm(plan, out)
+
+
+def test_rows_of_a_folder_become_the_same_file_as_the_import_of_the_table(plan: Path, tmp_path: Path) -> None:
+    inside, mapping = tmp_path / "in", tmp_path / "map.yaml"
+    inside.mkdir()
+    mapping.write_text(MAPPING)
+    rows = "".join(f"P{k},{name},{k}.5,{n},3\n" for k in (1, 2, 3) for n, name in enumerate("ab"))
+    (inside / "points.csv").write_text(f"Pose,Point,X,Y,Z\n{rows}")
+    found = truearm.measure(plan, "irb120", out=tmp_path / "out", watch=inside, mapping=mapping, targets=["a", "b"])
+    assert found.finished
+    imported = truearm.import_table(inside / "points.csv", mapping).data
+    data = read_csv(tmp_path / "out" / DATA)
+    assert (data.labels, data.targets) == (imported.labels, imported.targets)
+    np.testing.assert_array_equal(data.position, imported.position)
+    np.testing.assert_array_equal(data.joints, imported.joints)
+    assert data.number is not None
+
+
+def test_a_folder_into_which_nothing_comes_is_left_after_a_while(plan: Path, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "map.yaml").write_text(MAPPING)
+    given: dict[str, Any] = {"watch": tmp_path / "in", "mapping": tmp_path / "map.yaml", "targets": ["a"]}
+    found = truearm.measure(plan, "irb120", out=tmp_path / "out", wait=0.0, **given)
+    assert found.files == ()
+    assert found.data is None
+    assert "unfinished" in {notice.code for notice in found.warnings}
+    (tmp_path / "in" / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\n")
+    assert truearm.measure(plan, "irb120", out=tmp_path / "out", wait=0.0, **given).files == (DATA, PAGE)
+
+
+def test_ctrl_c_ends_with_what_is_there(plan: Path, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "map.yaml").write_text(MAPPING)
+    (tmp_path / "in" / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\n")
+    told: list[str] = []
+
+    def tell(line: str) -> None:
+        told.append(line)
+        threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+    found = truearm.measure(
+        plan,
+        "irb120",
+        out=tmp_path / "out",
+        watch=tmp_path / "in",
+        mapping=tmp_path / "map.yaml",
+        targets=["a"],
+        tell=tell,
+    )
+    assert len(told) == 1
+    assert found.files == (DATA, PAGE)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_program_sends_readings_to_a_port(plan: Path, tmp_path: Path) -> None:
+    def talk(line: str) -> None:
+        if not line.startswith("Listening"):
+            return
+        words = line.replace(",", "").split()
+        number, token = int(words[words.index("port") + 1]), words[words.index("token") + 1]
+
+        def send() -> None:
+            with socket.create_connection(("127.0.0.1", number), timeout=5.0) as stream:
+                stream.sendall(f"token {token}\n".encode())
+                for k in range(3):
+                    stream.sendall(f"reading a {k} 2 3 mm\n".encode())
+                while stream.recv(4096):
+                    pass
+
+        threading.Thread(target=send, daemon=True).start()
+
+    found = truearm.measure(plan, "irb120", out=tmp_path / "out", listen=0, targets=["a"], wait=10.0, tell=talk)
+    assert found.finished
+    assert len(found.session.kept) == 3
+    assert "token" not in found.command
+
+
+@pytest.mark.parametrize("device", VIRTUAL)
+def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_path: Path) -> None:
+    assert VIRTUAL[device].reads_where
+    plan = seen_by(device, 12, tmp_path)
+    with open_campaign(plan, "irb120", tmp_path / "out", device=device, truth="nominal", noise=1e-9) as campaign:
+        source = campaign.source
+        assert isinstance(source, VirtualInstrument)
+        seen = sight(campaign)
+        assert seen is not None
+        assert campaign.placed is not None
+        while not campaign.session.done:
+            campaign.step()
+        for entry in campaign.session.kept:
+            assert entry.reading is not None
+            k = campaign.session.labels.index(entry.label)
+            place, _ = campaign.placed.world_poses(campaign.joints[k : k + 1], entry.name)
+            np.testing.assert_allclose(entry.reading.position, place[0], atol=1e-7)
+            assert (entry.reading.quaternion is None) == (device in ("tracker", "measurement-arm"))
+        found = campaign.measured()
+        assert len(found.session.kept) >= 12
+        assert sight(campaign) is None
+
+
+def test_what_an_instrument_that_drifts_does_to_the_nests_is_said(plan: Path, tmp_path: Path) -> None:
+    plan.write_text(MEASURED_PLAN + "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9)))
+    found = arm(plan, tmp_path / "out", nests=["n1", "n2", "n3"], noise=1e-5, drift=3e-4)
+    (notice,) = [n for n in found.warnings if n.code == "nests-moved"]
+    assert notice.level == "warning"
+    drift = found.drift
+    assert drift is not None
+    assert drift.largest == pytest.approx(3e-4, rel=0.2)
+    assert np.isfinite(drift.moved).all()
+    calm = arm(plan, tmp_path / "calm", nests=["n1", "n2", "n3"], noise=1e-5)
+    assert "nests-moved" not in {n.code for n in calm.warnings}
+    summary = json.loads(json.dumps(found.summary()))
+    assert summary["nests"]["rounds"] == len(drift.rounds)
+
+
+def test_a_drift_of_one_nest_is_told_where_nothing_states_a_deviation(plan: Path, tmp_path: Path) -> None:
+    plan.write_text(MEASURED_PLAN + "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9)))
+    rng = np.random.default_rng(0)
+    codes = []
+    for number, drift in enumerate((0.0, 0.5)):
+        with open_campaign(plan, "irb120", tmp_path / str(number), listen=0, targets=["a"], nests=["n"], every=1) as c:
+            while (step := c.session.next) is not None:
+                x, y, z = (1e-2 * rng.standard_normal(3) + 2.0).tolist()
+                x += drift * step.configuration / 11 if step.kind == "nests" else 100.0 * step.configuration
+                position = np.array([x, y, z]) * 1e-3
+                c._written(c.session.judged(Reading(step.names[0], 1.0, position, label=step.label)))
+            found = c.measured()
+        codes.append("nests-moved" in {notice.code for notice in found.warnings})
+        assert "No reading is corrected for it." in "\n".join(found.lines())
+    assert codes == [False, True]
+
+
+def test_a_nest_behind_the_arm_or_a_box_is_left_out_and_told(planned: Path, tmp_path: Path) -> None:
+    given: dict[str, Any] = {"device": "tracker", "nests": ["n1", "n2", "n3"], "every": 2, "truth": "nominal"}
+    with open_campaign(planned, "irb120", tmp_path / "open", **given) as campaign:
+        assert isinstance(campaign.source, VirtualInstrument)
+        behind = [(k, name) for k, names in enumerate(campaign.source.hides) for name in names]
+        assert behind
+        seen = sight(campaign)
+        assert seen is not None
+        assert seen.names == ("n1", "n2", "n3")
+        assert seen.visible.tolist() == [name not in campaign.source.hides[0] for name in seen.names]
+        assert seen.outstanding.all()
+    found = truearm.measure(planned, "irb120", out=tmp_path / "open", **given)
+    left = [e for e in found.session.entries if e.event == "left" and e.is_nest]
+    for entry in left:
+        assert entry.words == "the arm is in the line of sight"
+    boxes = tmp_path / "boxes.yaml"
+    boxes.write_text(
+        "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"
+        "keep_out: {wall: {x: [-2000, 2000], y: [-3000, 3000], z: [-2000, -1900]}, shed: {z: [-1, 2000]}}\n"
+    )
+    hidden = truearm.measure(planned, "irb120", out=tmp_path / "shed", constraints=boxes, **given)
+    assert hidden.drift is None
+    (notice,) = [n for n in hidden.warnings if n.code == "nests-missed"]
+    assert "the box 'shed' is in the line of sight" in notice.message
+    with pytest.raises(InputError, match="another source of readings"):
+        truearm.measure(planned, "irb120", out=tmp_path / "shed", **given)
+
+
+#: Joint positions [deg] of an IRB 120 at which a device reads its target, at which it reads none, and why not.
+SEEN_AND_BLIND: dict[str, tuple[str, str, str]] = {
+    "measurement-arm": ("0,0,0,0,0,0", "-160,90,-90,0,0,0", "a target must be within 3000 mm of the base of the arm"),
+    "optical-cmm-planar": ("0,0,0,0,0,0", "180,0,0,0,0,0", "9 targets of the artefact or more must look at the"),
+    "markers": ("10,10,5,20,29,40", "180,0,0,0,0,0", "must look at the cameras within 60 deg"),
+}
+
+
+def plan_of(folder: Path, *rows: str) -> Path:
+    path = folder / "few.csv"
+    path.write_text("\n".join([MEASURED_PLAN.splitlines()[0], *(f"{k},{row}" for k, row in enumerate(rows, 1))]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("device", ["tracker", *SEEN_AND_BLIND])
+def test_a_plan_of_which_an_instrument_sees_nothing_is_refused_before_anything_is_logged(
+    device: str, tmp_path: Path
+) -> None:
+    why = "a reflector must look at the tracker within 30 deg"
+    _, blind, why = SEEN_AND_BLIND.get(device, ("", "180,0,0,0,0,0", why))
+    few, pairs = plan_of(tmp_path, blind, blind.replace("0,0,0", "0,0,9")), 6 if device == "tracker" else 2
+    with pytest.raises(InputError, match=f"nothing of this plan can be read with the {device}") as refusal:
+        truearm.measure(few, "irb120", out=tmp_path / "out", device=device, truth="nominal", nests=["n"])
+    assert refusal.value.parameter == "plan"
+    assert why in str(refusal.value)
+    assert f"got 0 of {pairs} pairs of configuration and target" in str(refusal.value)
+    assert f"`truearm plan` with `device={device}`" in str(refusal.value)
+    assert "on the page Plan of the studio the field Instrument" in str(refusal.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("device", SEEN_AND_BLIND)
+def test_what_an_instrument_does_not_see_of_a_plan_is_counted_before_the_first_reading(
+    device: str, tmp_path: Path
+) -> None:
+    seen, blind, why = SEEN_AND_BLIND[device]
+    few = plan_of(tmp_path, blind, seen, blind.replace("0,0,0", "0,0,9"))
+    with open_campaign(few, "irb120", tmp_path / "out", device=device, truth="nominal") as campaign:
+        assert len(campaign.session) == 0
+        (notice,) = [one for one in campaign.notices if one.code == "not-seen"]
+        assert notice.level == "warning"
+        assert f"{device} 1 of 3 pairs of configuration and target can be read, none at 2 of 3" in notice.message
+        assert why in notice.message
+        while not campaign.session.done:
+            campaign.step()
+        assert len(campaign.session.kept) == 1
+        codes = [one.code for one in campaign.measured().warnings]
+    assert "not-seen" in codes
+    assert "many-left-out" not in codes  # it would say the same again
+
+
+def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is_not_judged(
+    planned: Path, tmp_path: Path
+) -> None:
+    given: dict[str, Any] = {"device": "tracker", "truth": "nominal"}
+    with open_campaign(planned, "irb120", tmp_path / "all", **given) as campaign:
+        (notice,) = [one for one in campaign.notices if one.code == "not-seen"]
+        assert isinstance(campaign.source, VirtualInstrument)
+        names = np.array(campaign.session.targets)
+        seen = [names[campaign.source.visible(k)] for k in range(24)]
+    assert notice.level == "note"
+    assert f"{sum(map(len, seen))} of 72 pairs of configuration and target can be read, some at every" in notice.message
+    head, *rows = planned.read_text().splitlines()
+    reads = (f"{row},{'; '.join(at)}" for row, at in zip(rows, seen, strict=True))
+    path = tmp_path / "reads.csv"
+    path.write_text("\n".join([f"{head},reads", *reads]) + "\n")
+    with open_campaign(path, "irb120", tmp_path / "reads", **given) as campaign:
+        assert "not-seen" not in {one.code for one in campaign.notices}
+    few = plan_of(tmp_path, "180,0,0,0,0,0")
+    with open_campaign(few, "irb120", tmp_path / "port", listen=0, targets=["1"]) as campaign:
+        assert "not-seen" not in {one.code for one in campaign.notices}
+
+
+def test_what_an_arm_touches_needs_no_line_of_sight(plan: Path, tmp_path: Path) -> None:
+    with open_campaign(plan, "irb120", tmp_path, device="measurement-arm", nests=["n1", "n2", "n3"]) as campaign:
+        assert isinstance(campaign.source, VirtualInstrument)
+        assert not any(campaign.source.hides)
+
+
+def test_the_column_reads_of_a_plan_says_what_is_asked_for(planned: Path, tmp_path: Path) -> None:
+    head, *rows = planned.read_text().splitlines()
+    path = tmp_path / "reads.csv"
+    path.write_text(
+        "\n".join([f"{head},reads", *(f"{row},{'1; 3' if k else '2'}" for k, row in enumerate(rows))]) + "\n"
+    )
+    with open_campaign(path, "irb120", tmp_path / "all", listen=0, targets=["1", "2", "3"]) as campaign:
+        assert campaign.session.outstanding == 1 + 2 * 23
+    with open_campaign(path, "irb120", tmp_path / "other", listen=0, targets=["smr"]) as campaign:
+        assert campaign.session.outstanding == 24
+    with open_campaign(path, "irb120", tmp_path / "beside", listen=0, targets=["2", "smr"]) as campaign:
+        assert campaign.session.outstanding == 25
+    truearm.measure(path, "irb120", out=tmp_path / "virtual", device="tracker", targets=["1", "2", "3"])
+    head, *lines = (tmp_path / "virtual/measurements.csv").read_text().splitlines()
+    at = head.split(",").index("target")
+    read = {(line.split(",")[0], line.split(",")[at]) for line in lines}
+    first = rows[0].split(",")[0]
+    assert not any(target == "2" and label != first for label, target in read)  # nobody asked for it
+
+
+@pytest.mark.parametrize(("unit", "told"), [("mm", False), ("m", True), ("um", True)])
+def test_lengths_that_cannot_be_meant_are_told(plan: Path, tmp_path: Path, unit: str, told: bool) -> None:
+    with open_campaign(plan, "irb120", tmp_path / "out", listen=0, targets=["a"]) as campaign:
+        places = campaign.robot.world_poses(campaign.joints)[0] * 1e3  # as a number, in mm
+        for label, place in zip(campaign.session.labels, places, strict=True):
+            reading = Reading("a", 1.0, place * {"mm": 1e-3, "m": 1.0, "um": 1e-6}[unit], label=label)
+            campaign._written(campaign.session.judged(reading))
+        found = [n for n in campaign.measured().warnings if n.code == "units-unlikely"]
+    assert bool(found) == told
+    assert all(n.level == "warning" and "Check the unit of lengths" in n.message for n in found)
+
+
+def test_an_instrument_without_noise_reads_the_twin_that_is_simulated(planned: Path, tmp_path: Path) -> None:
+    found = truearm.measure(planned, "irb120", out=tmp_path, device="tracker", seed=5, noise=0.0).data
+    simulated = truearm.simulate("irb120", truth="random", seed=5, poses=planned, noise=0.0).data
+    assert found is not None
+    places = {
+        (simulated.labels[c], simulated.targets[t]): place
+        for c, t, place in zip(simulated.configuration, simulated.target, simulated.position, strict=True)
+    }
+    assert found.has_position.sum() >= 24
+    for c, t, place in zip(found.configuration, found.target, found.position, strict=True):
+        if np.isfinite(place).all():
+            np.testing.assert_allclose(place, places[found.labels[c], found.targets[t]], atol=1e-12)
+
+
+def test_the_page_says_the_whole_call_and_no_token(plan: Path, tmp_path: Path) -> None:
+    found = arm(plan, tmp_path / "out", seed=3, disturbed=0.2, most_deviation=1e-3)
+    assert found.command == (
+        f"truearm.measure({str(plan)!r}, 'irb120', out={str(tmp_path / 'out')!r}, device='measurement-arm', seed=3, "
+        "disturbed=0.2, nests=['n'], every=2, most_deviation=0.001)"
+    )
+    again = eval(found.command.replace(str(tmp_path / "out"), str(tmp_path / "again")), {"truearm": truearm})
+    assert (tmp_path / "again" / DATA).read_bytes() == (tmp_path / "out" / DATA).read_bytes()
+    assert again.finished
+    with open_campaign(plan, "irb120", tmp_path / "port", listen=0, token="x" * 20, targets=["a"]) as campaign:
+        assert "x" * 20 not in campaign.measured().command
+
+
+def test_a_word_that_the_job_does_not_know_is_no_keyword(plan: Path, tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="'tracker'"):
+        open_campaign(plan, "irb120", tmp_path / "out", tracker=1)  # type: ignore[call-arg]
+
+
+def test_a_point_of_which_no_reading_can_be_kept_is_left_out_after_twenty(plan: Path, tmp_path: Path) -> None:
+    found = arm(plan, tmp_path / "out", most_settling=0.0, nests=[])
+    assert found.session.aside_by_reason == {"not-settled": 60}
+    assert len(found.session.left_out) == 3
+    assert found.files == ()
+
+
+def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        arm(plan, tmp_path / "out", command="")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "parameter", "word"),
+    [
+        ({"device": None}, "device, watch, listen", "nobody says"),
+        ({"device": None, "mapping": "m.yaml"}, "watch", "no folder is given, and `mapping` belongs to one"),
+        ({"device": None, "token": "x" * 20}, "listen", "no port is given, and `token` belongs to one"),
+        ({"device": None, "seed": 1}, "device", "no virtual device is given, and `seed` belongs to one"),
+        ({"device": None, "watch": "", "mapping": "m.yaml"}, "watch", "no folder is given; got ''"),
+        ({"listen": 0}, "device, listen", "one source"),
+        ({"device": "traker"}, "device", "Did you mean tracker"),
+        ({"mapping": "m.yaml"}, "mapping", "belongs to `watch`"),
+        ({"token": "x" * 20}, "token", "belongs to `listen`"),
+        ({"device": None, "listen": 0, "seed": 1}, "seed", "belongs to `device`"),
+        ({"device": None, "listen": 0}, "targets", "which targets"),
+        ({"device": None, "listen": 0, "targets": ["a"], "token": "short"}, "token", "keeps others out"),
+        ({"device": None, "listen": 0, "targets": ["n"]}, "targets, nests", "a target and for a nest"),
+        ({"device": None, "listen": 70000, "targets": ["a"]}, "listen", "out of range"),
+        ({"device": None, "watch": "nowhere", "targets": ["a"]}, "mapping", "what the columns"),
+        ({"disturbed": 0.95}, "disturbed", "too many"),
+        ({"every": 0}, "every", "out of range"),
+        ({"nests": [" "]}, "nests", "a name belongs here"),
+        ({"nests": ["n1", "n2", "n1"]}, "nests", "named twice; got 'n1'"),
+        ({"targets": ["1", 1]}, "targets", "named twice; got '1'"),
+        ({"targets": ["x"]}, "targets", "no such target"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(
+    plan: Path, tmp_path: Path, given: dict[str, Any], parameter: str, word: str
+) -> None:
+    with pytest.raises(InputError, match=word) as refusal:
+        arm(plan, tmp_path / "out", **given)
+    assert refusal.value.parameter == parameter
+
+
+@pytest.mark.parametrize("device", [device for device in DEVICES if device.name not in VIRTUAL], ids=lambda d: d.name)
+def test_a_device_that_goes_through_no_plan_says_why_and_what_to_do(device: Device, plan: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=device.no_plan) as refusal:
+        arm(plan, tmp_path / "out", device=device.name)
+    assert refusal.value.parameter == "device"
+    assert f"'truearm simulate' finds the postures of {device.name}" in str(refusal.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_folders_that_cannot_be_watched_are_refused(plan: Path, tmp_path: Path) -> None:
+    mapping, out = tmp_path / "out" / DATA, tmp_path / "out"
+    out.mkdir()
+    mapping.write_text(MAPPING)
+    given: dict[str, Any] = {"device": None, "targets": ["a"], "watch": out}
+    with pytest.raises(InputError, match="would be overwritten"):
+        arm(plan, out, mapping=mapping, **given)
+    moved = mapping.rename(tmp_path / "map.yaml")
+    with pytest.raises(InputError, match="is written to") as refusal:
+        arm(plan, out, mapping=moved, **given)
+    assert refusal.value.parameter == "out"
+
+
+def test_a_plan_with_a_configuration_twice_is_refused(plan: Path, tmp_path: Path) -> None:
+    plan.write_text(MEASURED_PLAN + MEASURED_PLAN.splitlines()[1] + "\n")
+    with pytest.raises(InputError, match="appears twice") as refusal:
+        arm(plan, tmp_path / "out")
+    assert refusal.value.parameter == "plan"
+
+
+def test_a_virtual_robot_comes_from_the_stops_of_the_plan(plan: Path, tmp_path: Path) -> None:
+    lag = 1e-3
+    robot = truearm.load_robot("irb120").with_effects(["approach"])
+    truth = robot.with_values({f"approach_{k}": lag for k in range(1, 7)})
+    header, *rows = plan.read_text().splitlines()
+    table = [row.split(",") for row in rows]
+    stops = [",".join(str(float(cell) - 2.0) for cell in row[1:]) for row in table]
+    names = ",".join(f"approach_{k} [deg]" for k in range(1, 7))
+    plan.write_text("\n".join([f"{header},{names}", *(f"{a},{b}" for a, b in zip(rows, stops, strict=True))]) + "\n")
+    came = arm(plan, tmp_path / "stopped", truth=truth, noise=1e-9, nests=[])
+    ahead = [",".join([row[0], *(repr(float(cell) + float(np.degrees(lag))) for cell in row[1:])]) for row in table]
+    plan.write_text("\n".join([header, *ahead]) + "\n")
+    there = arm(plan, tmp_path / "ahead", truth="nominal", noise=1e-9, nests=[])
+    places = [[e.reading.position for e in found.session.kept if e.reading] for found in (came, there)]
+    np.testing.assert_allclose(places[0], places[1], atol=1e-12)
+    assert came.data is not None
+    assert came.data.number.tolist() == list(range(1, 2 * len(table), 2))

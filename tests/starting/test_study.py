@@ -1,0 +1,69 @@
+"""The command ``truearm study``: what it lists, writes, prints and refuses."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import pytest
+from papers.study import Study
+from tests.commanding import Truearm
+
+from papers import STUDIES, irb120_simulation
+from truearm.engine.base.manifest import MANIFEST
+
+WHOLE = irb120_simulation.study
+
+
+@cache
+def fewer(seeds: int) -> Study:
+    return WHOLE(seeds, lambda _: None, unseen=20)
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A study that is done in a second, and once."""
+    monkeypatch.setattr(irb120_simulation, "study", lambda seeds, _: fewer(seeds))
+
+
+def test_help_lists_every_study(truearm: Truearm) -> None:
+    shown = truearm("study", "--help").out
+    assert all(entry.name in shown for entry in STUDIES)
+
+
+def test_it_writes_its_files_and_compares(truearm: Truearm, quick: None, tmp_path: Path) -> None:
+    run = truearm("study", "irb120-simulation", "--seeds", "1", "--out", tmp_path / "new")
+    assert run.code == 0
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["report.html", "study.json", MANIFEST]
+    page = (tmp_path / "new" / "report.html").read_text()
+    assert "<pre>truearm study irb120-simulation --seeds 1 --out DIR</pre>" in page
+    assert "  not worse       after, drawn errors:" in run.out
+    assert run.out.count("Verdicts: agrees ") == 1
+    assert "published 0.004 mm" in run.out
+
+
+def test_json_is_what_the_file_holds(truearm: Truearm, quick: None, tmp_path: Path) -> None:
+    run = truearm("study", "irb120-simulation", "--seeds", "1", "--out", tmp_path, "--json")
+    assert json.loads(run.out) == json.loads((tmp_path / "study.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("irb120-sim",), "NAME: there is no study of this name"),
+        (("irb120-faro",), "--data: this study needs measured data"),
+        (("irb120-faro", "--data", "nowhere"), "a file of the measured data is missing"),
+        (("irb120-axes", "--data", "nowhere"), "--data: this study simulates its data; got 'nowhere'. Leave --data"),
+    ],
+)
+def test_refusals(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], said: str) -> None:
+    run = truearm("study", *words, "--out", tmp_path)
+    assert run.code == 2
+    assert run.out == ""
+    assert said in run.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_seed_is_refused(truearm: Truearm, tmp_path: Path) -> None:
+    assert truearm("study", "irb120-axes", "--seeds", "0", "--out", tmp_path).code == 2

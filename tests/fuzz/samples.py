@@ -23,7 +23,7 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Joint
 from truearm.hexapod.sheet import PlannedRow, sheet_csv
 
-PROGRAMS = Path(__file__).parents[1] / "compensation" / "programs" / "samples"
+PROGRAMS = Path(__file__).parents[1] / "engine" / "programs" / "samples"
 
 #: What its files are called here.
 PERFORMANCE = {

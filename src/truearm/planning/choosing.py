@@ -519,9 +519,6 @@ def _refuse_too_few(
         )
 
 
-# A plan of measurements as CSV.
-
-
 def plan_csv(plan: MeasurementPlan, joints_are: JointsOf = "model") -> str:
     """Return a plan as CSV, one row a configuration in the order of measurement, joints in deg or mm.
 

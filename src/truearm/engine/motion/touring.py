@@ -18,8 +18,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rotation_vector
 
-# How near an arm comes to each thing on ways, as a distance that holds all the way.
-
 #: By how much the stated distances may be too small [m], and by which part of themselves.
 _TOLERANCE: Final = 1e-4
 _PART: Final = 0.002

@@ -1,4 +1,4 @@
-"""A new URDF of a robot, whatever its convention."""
+"""A new URDF of a robot, whatever its convention, and what files say beside their numbers."""
 
 from __future__ import annotations
 
@@ -163,9 +163,6 @@ def joint_cells(values: Array, joints: Sequence[Joint], controller: Controller |
 
 def _units(joints: Sequence[Joint]) -> list[str]:
     return ["deg" if joint.kind == "revolute" else "mm" for joint in joints]
-
-
-# Robots with the constant transforms between their joint variables multiplied into one.
 
 
 def collapsed(robot: Robot) -> tuple[list[Array], list[Array]]:

@@ -1,4 +1,4 @@
-"""Split KRL moves: the same instruction once more for each segment, with its position written out."""
+"""KRL programs read, what the words of their moves mean, and split moves."""
 
 from __future__ import annotations
 
@@ -39,7 +39,6 @@ from truearm.engine.programs.program import (
 )
 
 # Where the words of a KRL move stand: the place, the auxiliary point of a circle, and what follows.
-
 Span = tuple[int, int]
 
 _OPERAND_TEXT: Final = (
@@ -292,7 +291,6 @@ def _same(one: tuple[str, str], other: tuple[str, str]) -> bool:
 
 
 # Reading of KRL programs: follows every routine in the order of its text and puts targets and moves together.
-
 _KINDS: Final[dict[str, MoveKind]] = {
     "PTP": "joint",
     "SPTP": "joint",

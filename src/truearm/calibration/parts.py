@@ -169,7 +169,6 @@ def mdeg(angle: float) -> float:
     return 1e3 * math.degrees(angle)
 
 
-# Intervals by Monte Carlo as JSON and the command show them, in the units of the parameters and in mm.
 def simulated_summary(found: SimulatedCalibrations, robot: Robot) -> dict[str, Any]:
     """Return intervals of parameters and predictions, those by Monte Carlo beside the linear ones."""
     made: dict[str, Any] = {"trials": found.asked, "settled": found.settled, "seed": found.seed}

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 
-# A scanned page: how bright each dot is, and how far apart the dots lie.
 _FORMATS: Final = ("PNG", "JPEG", "TIFF")
 #: Dots per inch that scanners have. Programs write 72 or 96 where they do not know.
 _RESOLUTIONS: Final = (100.0, 4800.0)

@@ -14,8 +14,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import Transform
 
 
-# Where the base fixture stands: three cups that the robot touched, and the exact distances between them.
-#
 # The robot brings one cup of its tool to each cup of the base. What it read there, and its current model, say where the
 # three points are; the ballbar says how far apart they are, and much better. The triangle of those distances is laid
 # onto the three points so that the sum of squares is least (Nubiola, 4.3 to 4.12). Its plane is that of the points, so

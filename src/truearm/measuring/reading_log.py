@@ -23,7 +23,7 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot_file.entries import STRICT, Number
 from truearm.measuring.session import REASONS, Entry, Reading
 
-# A file says it, all of it optional::
+# What a file says of instrument and air, all of it optional::
 #
 #     truearm: truearm-about/1
 #     units: {length: mm, temperature: degC, pressure: hPa, humidity: percent}

@@ -139,8 +139,6 @@ def triangle(sides: Sequence[float] | Array, fixture: str) -> Array:
     return cups.reshape(3, 3, *shape)
 
 
-# From lengths to the pose and back, in closed form (Nubiola, 3.3).
-
 #: On which side of their three feet the second and the third tool cup lie, for the document's solutions 1 to 4.
 SOLUTIONS: Final = {1: (1, 1), 2: (1, -1), 3: (-1, 1), 4: (-1, -1)}
 

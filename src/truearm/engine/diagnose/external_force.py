@@ -67,8 +67,6 @@ class _Bending:
     rigid: bool  #: Whether no joint gives way although the force loads some.
 
 
-# What is to be known where an external force acts on the tool: does the model know how the arm gives way to it.
-#
 # Gravity loads the joints of a calibration, and nothing else does: it never turns the upright axis of joint 1, so its
 # compliance stays what the prior said, and no prediction at rest depends on it. A sideways force at the tool turns that
 # joint. What each parameter of the joints' elasticity does to the tip is compared with and without the force; with the

@@ -126,8 +126,6 @@ _SAME_REPEATABILITY: Final = 1e-9
 _LEAST_FREEDOM: Final = 10
 
 
-# How well the robot comes back to a posture, from postures that were visited again.
-#
 # Readings of a target at the same joint positions, on separate visits, differ by the robot's repeatability and the
 # noise of the instrument; no model of the robot is needed. ISO 9283 states it as RP, the mean distance of the visits
 # from their barycentre plus three of its standard deviations. Here the scatter of all postures is taken together, the

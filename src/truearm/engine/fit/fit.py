@@ -55,8 +55,6 @@ LEAST_FITS: Final = 20
 _SMALL: Final = 1e-4
 
 
-# What parameters are uncertain by, from fits to configurations drawn anew from those that were measured.
-#
 # Efron (1979): whole configurations are drawn with replacement, because readings of one share errors of the joints, and
 # each draw is fitted as the readings were, under the same loss and bounds. It needs no model of the residuals, and no
 # derivative of a loss that has none, such as a sum of absolute values.

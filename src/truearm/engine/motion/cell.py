@@ -75,7 +75,6 @@ def _dot(a: Array, b: Array) -> Array:
     return np.asarray(a[..., 0, :] * b[..., 0, :] + a[..., 1, :] * b[..., 1, :] + a[..., 2, :] * b[..., 2, :])
 
 
-# Whether an arm touches itself, with a capsule along the line from each joint to the next.
 _LENGTH: Final = 1e-3  # m: what is shorter is no link of its own
 #: Less room, and not zero, is meant in another unit [m].
 LEAST_CLEARANCE: Final = 1e-3

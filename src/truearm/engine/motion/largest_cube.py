@@ -207,8 +207,6 @@ _DAMPING: Final = 1e-3
 _REACHED: Final = 1e-6
 
 
-# The largest cube in front of an arm on whose diagonal planes it reaches every point.
-#
 # Where the tip gets to is first looked up among many random configurations: a point counts as reached if the tip came
 # near to it. The best cubes of a coarse lattice are then moved and grown in ever smaller steps, while damped Newton's
 # steps from the nearest of those configurations reach a grid of points on the diagonal planes, edges and corners

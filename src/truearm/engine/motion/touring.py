@@ -62,8 +62,6 @@ def _lower(least: Array, thing: NDArray[np.intp], rooms: Array) -> None:
         np.minimum.at(least, thing, rooms.min(axis=1))
 
 
-# What is to be known of what a plan keeps clear of: links beside their lines, what is left out, odd boxes, limits.
-
 #: A box whose sides are all shorter is meant in another unit [m].
 _TINY: Final = 0.01
 #: A joint of less range may have its limits in another unit: once around is 6.3 rad, and a rail 2 m long [rad; m].

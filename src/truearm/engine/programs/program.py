@@ -312,8 +312,6 @@ def written(value: float, decimals: int) -> str:
     return text if float(text) else text.lstrip("-")
 
 
-# What all texts of programs have: lines, whatever they end with, byte order marks, and words to be replaced.
-
 #: The byte order mark of UTF-8 in a text of one character a byte.
 BYTE_ORDER_MARK: Final = "\xef\xbb\xbf"
 _END: Final = re.compile(r"\r\n?|\n")

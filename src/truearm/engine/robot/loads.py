@@ -236,9 +236,10 @@ _MOST_ROUNDS: Final = 100
 _SETTLED: Final = 1e-12
 
 
-# Each is found from the other in turns. A round leaves a hundredth of what was missing, or half where a joint with play
-# is all but balanced; only postures that are not yet settled go through the next one. The few that swing to and fro
-# take half of each way later on. A shaft that would have to stand in the middle of its clearance never settles.
+# Bending and loads are found from each other in turns. A round leaves a hundredth of what was missing, or half where a
+# joint with play is all but balanced; only postures that are not yet settled go through the next one. The few that
+# swing to and fro take half of each way later on. A shaft that would have to stand in the middle of its clearance never
+# settles.
 def settled(following: Callable[[NDArray[np.intp], Array], Array], start: Array) -> Array:
     """Return where rounds from `start` ``(variables, n)`` settle to 1e-12 rad or m.
 

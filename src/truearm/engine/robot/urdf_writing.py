@@ -21,8 +21,6 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
 from truearm.engine.robot.urdf_tree import Triple, product, roll_pitch_yaw
 
-# What a file says beside its numbers: what it cannot hold, and which frames the numbers refer to.
-
 #: Two frames less than this apart [m, rad] are the same to any instrument.
 _SAME_FRAME: Final = 1e-9
 
@@ -97,8 +95,6 @@ def comments(robot: Robot, frame: str, left: Sequence[str]) -> list[str]:
     ]
     return [" ".join("".join(c if c.isprintable() else " " for c in line).split()) for line in said]
 
-
-# Joint positions in the columns of a file: ``joint_i`` of the model, or ``axis_i`` as the controller shows them.
 
 #: What columns are called, before their numbers.
 COLUMN: Final[dict[JointsOf, str]] = {"model": "joint", "controller": "axis"}

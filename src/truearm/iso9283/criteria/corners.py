@@ -232,8 +232,6 @@ _LEAST_SAMPLES = 20
 _LEAST_PERIODS = 2
 
 
-# Weaving deviations WS and WF: relative errors of stroke and frequency.
-#
 # WS is the attained stroke minus the commanded one over the commanded one; WF the same of the frequency, whose command
 # is the commanded velocity over the wavelength (the table; the standard's text was not at hand).
 @dataclass(frozen=True, eq=False)

@@ -183,8 +183,6 @@ def visited(test: PlannedTest) -> tuple[str, ...]:
 TURNS: Final = 4
 
 
-# Where the tip is commanded to be along a planned path: place, orientation and direction by the distance travelled.
-#
 # On a path on which the orientation changes, it turns from one to the other and back in :data:`TURNS` stretches of
 # equal length, evenly in each.
 @dataclass(frozen=True, eq=False)

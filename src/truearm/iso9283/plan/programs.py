@@ -352,8 +352,6 @@ def _percent(share: float) -> str:
     return f"{100 * share:.4g}".replace(".", "p")
 
 
-# What tests by ISO 9283 keep clear of where somebody has stated the cell, by the rules of plans of measurements.
-
 #: A message names no more ways.
 _MOST_NAMED: Final = 3
 

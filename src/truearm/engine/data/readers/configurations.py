@@ -168,7 +168,6 @@ def _unseen(cells: Cells, found: Configurations) -> Dataset:
     )
 
 
-# Poses to go to: a CSV with one row a pose, its columns named as in the canonical CSV.
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _SHOWN: Final = {"pose": "pose"} | {axis: f"{axis} [mm]" for axis in _POSITION} | {part: part for part in _QUATERNION}

@@ -38,7 +38,6 @@ from truearm.engine.programs.program import (
     written,
 )
 
-# Where the words of a KRL move stand: the place, the auxiliary point of a circle, and what follows.
 Span = tuple[int, int]
 
 _OPERAND_TEXT: Final = (
@@ -96,8 +95,6 @@ def with_of(flat: str, statement: Statement) -> int | None:
     found = _WITH.search(flat, after, stop)
     return found.end() if found else None
 
-
-# Finds what the words of a KRL move mean: a place that is written in them, one of a name, or an offset from it.
 
 #: Where the robot stands already: a move there changes nothing.
 _PRESENT: Final = frozenset({"$POS_ACT", "$AXIS_ACT", "$POS_ACT_MES", "$AXIS_ACT_MES"})
@@ -290,7 +287,6 @@ def _same(one: tuple[str, str], other: tuple[str, str]) -> bool:
     return (one[0].casefold(), one[1].casefold()) == (other[0].casefold(), other[1].casefold())
 
 
-# Reading of KRL programs: follows every routine in the order of its text and puts targets and moves together.
 _KINDS: Final[dict[str, MoveKind]] = {
     "PTP": "joint",
     "SPTP": "joint",

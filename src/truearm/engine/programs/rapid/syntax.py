@@ -166,8 +166,6 @@ def _wrong_bracket(brackets: str) -> int | None:
     return open_ones[-1] if open_ones else None
 
 
-# The arguments of RAPID's instructions and functions.
-#
 # Source: ABB, Technical reference manual, RAPID Kernel (3HAC050946-001), argument lists: optional arguments begin with
 # a backslash and may follow the one before without a comma.
 

@@ -246,8 +246,6 @@ def _numbers(found: re.Match[str], group: int) -> Numbers:
     return Numbers("pose" if kind else "joints", tuple(map(float, words)), spans[group + 2 : group + 8], *spans[group])
 
 
-# The routines, assignments and calls of a URScript file.
-#
 # Source: Universal Robots, The URScript Programming Language (script manual, e-Series), "Flow of Control", "Function",
 # "Scoping rules", "Threads", "Program Label", "Secondary Programs".
 _NAME_SCRIPT: Final = r"[A-Za-z_]\w*"

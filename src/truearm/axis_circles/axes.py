@@ -1,4 +1,4 @@
-"""A robot's axes from circles, and with them its frames, parameters and joint errors."""
+"""A robot found axis by axis, from circles: its axes, frames, tables of parameters and joint errors."""
 
 from __future__ import annotations
 
@@ -34,8 +34,6 @@ from truearm.engine.robot.parameters import FreeParameters
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.engine.robot.transform import Transform
-
-# A robot found axis by axis, from circles: its axes, frames, tables of parameters and joint errors.
 
 #: What an axis-by-axis calibration writes into its folder.
 AXIS_FILES: Final = ("calibrated.yaml", "joint-errors.yaml", "axes.json")

@@ -1,4 +1,4 @@
-"""The whole of axis-by-axis calibration: circles, axes, the frames they fix, tables of parameters, joint errors.
+"""Axis-by-axis calibration: circles, axes, the frames they fix, tables of parameters, joint errors.
 
 Sources: Nubiola, sections 1.3.2 and 2.3 (base frame from axes 1 and 2, tool frame from the last two; DH parameters by
 Sklar's way and the S-model by Stone's, both from lines in space); KR5 paper, sections 2.2 and 3.2 (joint errors).
@@ -32,8 +32,8 @@ from truearm.engine.robot.transform import Transform, rotation_vector
 # A joint turned alone: the runs of a campaign in which it is, and how far what it does is from what it reads.
 #
 # Source: Nubiola, section 2.4.1. A point on the tool goes round the joint's axis. The circle through its places is
-# fitted by :mod:`.circles`; the angular error is the angle about that axis beyond the joint position, the tangential
-# error the same at the radius, and backlash is by how much the joint lags when it comes back.
+# fitted by :mod:`truearm.engine.data.circles`; the angular error is the angle about that axis beyond the joint
+# position, the tangential error the same at the radius, and backlash is by how much the joint lags when it comes back.
 
 #: Joint positions that differ by less are the same: encoders flicker [rad].
 SAME_POSITION: Final = math.radians(0.01)

@@ -31,8 +31,6 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
 from truearm.engine.robot.controller import JointsOf
 
-# Measurements that came from a recording of a ROS cell.
-
 #: What the page beside the measurements ends with.
 PAGE: Final = ".html"
 #: Fewer messages than this share are lost in ordinary recordings.

@@ -341,8 +341,6 @@ def _mean(part: Array, turns: Array | None, set_aside: int, slow: float) -> Sigh
     return Sighting(part.mean(axis=0), quaternion, n, set_aside, scatter, sigma, sigma_rot)
 
 
-# A bag as measurements: one configuration a standstill, one reading a target.
-
 #: A smaller deviation is none: all samples are the same [m or rad].
 _EXACT: Final = 1e-8
 

@@ -1,4 +1,4 @@
-"""Measurements from a camera and a board, one of them on the flange."""
+"""Measurements from a camera and a board, one of them on the flange: poses of the board in the camera, or pictures."""
 
 from __future__ import annotations
 
@@ -29,10 +29,6 @@ from truearm.engine.data.readers.sheets import (
 )
 from truearm.engine.document.records import Record
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion
-
-# A camera and a board, one of them on the flange: poses of the board in the camera, or pictures of it.
-#
-# Either way a table has a row for each configuration: joint positions, and the pose or the picture.
 
 #: What is on the flange, and what the target is called then.
 ON_FLANGE: Final = {"camera": "camera", "board": "board"}
@@ -170,8 +166,6 @@ def refuse_wrong_place(pictures: Sequence[Path], board: object) -> None:
             cure="Leave it out, or give a table with the column picture.",
         )
 
-
-# What a camera saw of a board, imported.
 
 #: The lens as lines show it: what belongs together, and in which unit.
 _SHOWN: Final = ((("fx", "fy"), " px"), (("cx", "cy"), " px"), (("k1", "k2", "k3"), ""), (("p1", "p2"), ""))

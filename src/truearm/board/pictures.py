@@ -20,8 +20,6 @@ from truearm.engine.base.files import read_bytes
 from truearm.engine.base.units import quantity_si
 from truearm.engine.robot.chain import Array
 
-# A ChArUco board as a text names it: ``14x10,25mm,18mm,5X5_250``.
-
 #: Dictionaries of markers, as OpenCV names them behind ``DICT_``, and how many markers each has.
 DICTIONARIES: Final[dict[str, int]] = {
     f"{bits}X{bits}_{count}": count for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)
@@ -102,9 +100,6 @@ class Charuco:
         middle = np.array([self.columns, self.rows]) / 2
         flat = (np.column_stack([x.ravel(), y.ravel()]) - middle) * self.square
         return np.column_stack([flat, np.zeros(len(flat))])
-
-
-# Poses of a board in a camera, with what is not known of them.
 
 
 @dataclass(frozen=True, eq=False)

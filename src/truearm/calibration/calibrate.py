@@ -85,8 +85,6 @@ from truearm.engine.robot.proof import Proof
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import is_intact
 
-# What is told of a fit while it is made: its cost, and the error on configurations that it does not see.
-
 #: That much time may go into the errors that are told of a fit [s], and that share of the fit's own.
 _TIME: Final = 0.5
 _SHARE: Final = 0.05
@@ -140,8 +138,6 @@ def followed(progress: Callable[[str], None], judging: Dataset, *, held_out: boo
     with watching(told):
         yield
 
-
-# Intervals by Monte Carlo for a calibration: what is accepted, and how far the work has come.
 
 #: Fewer trials than this give no interval of 95 %.
 _LEAST: Final = 100

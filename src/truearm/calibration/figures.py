@@ -1,4 +1,4 @@
-"""Zones of the workspace: their held-out errors with one model and with their own, as a picture and as rows."""
+"""Pictures and tables of a calibration: error budget, joint curves, simulated intervals, choice of the model, zones."""
 
 from __future__ import annotations
 
@@ -38,7 +38,6 @@ from truearm.engine.robot.parameters import PLACES
 from truearm.engine.robot.robot import Robot
 
 # What limits the accuracy, as a picture in which squares add up, and as rows of a table.
-
 _NEGATIVE = "#b3261e"
 #: Height of a bar with its gap, and of what stands around them.
 _BAR = 34
@@ -138,7 +137,6 @@ def _squares(square: float, deviation: float) -> str:
 
 
 # The curves of the joints, one picture a joint: millidegrees over the range of the joint, with their band of 95 %.
-
 _BAND: Final = "#c3d5e3"
 _UNMEASURED: Final = "#e4e6e8"
 _PLACES: Final = "#646b72"

@@ -1,4 +1,4 @@
-"""What a calibration writes into its robot about itself."""
+"""Parts of a calibration's result: error budget, curves, simulated intervals, residuals, and its proof."""
 
 from __future__ import annotations
 
@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
     from truearm.calibration.result import Calibration
 
-
-# What limits the accuracy, as JSON and the command show it, in mm.
 
 #: What the sources are called where people read.
 _SOURCES: Final = {
@@ -135,9 +133,6 @@ def _is_sure(share: Share) -> bool:
     return share.square is not None and share.square > _SURE * share.deviation
 
 
-# Curves of joints as JSON and the command show them: millidegrees, degrees, periods in a turn.
-
-
 def curves_summary(curves: Sequence[FoundCurve]) -> list[dict[str, Any]]:
     """Return size, strongest periods and measured ranges of each curve, as JSON holds them."""
     return [
@@ -172,9 +167,6 @@ def curve_lines(curves: Sequence[FoundCurve]) -> list[str]:
 def mdeg(angle: float) -> float:
     """Return an angle [rad] in millidegrees."""
     return 1e3 * math.degrees(angle)
-
-
-# Intervals by Monte Carlo as JSON and the command show them, in the units of the parameters and in mm.
 
 
 def simulated_summary(found: SimulatedCalibrations, robot: Robot) -> dict[str, Any]:
@@ -394,8 +386,6 @@ def loads_of(robot: Robot, postures: Postures) -> list[tuple[float, float]]:
     efforts = joint_efforts(robot, postures)
     return list(zip(efforts.min(axis=0).tolist(), efforts.max(axis=0).tolist(), strict=True))
 
-
-# Reading by reading, how far a robot's predictions are from what was measured.
 
 Part = Literal["training", "held out"]
 Kind = Literal["position", "orientation", "length"]

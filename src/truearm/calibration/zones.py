@@ -34,8 +34,6 @@ from truearm.engine.fit.rounds import Redundant
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
 
-# Models for zones of the workspace: which were kept, as JSON, lines and files show it.
-
 #: The file that names the zones and their robots.
 ZONES_FILE: Final = "zones.yaml"
 

@@ -1,4 +1,4 @@
-"""What is wrong with measurements before they are believed."""
+"""Checks of measurements before a calibration."""
 
 from __future__ import annotations
 
@@ -24,8 +24,6 @@ from truearm.engine.diagnose.next_steps import steps_after_check
 from truearm.engine.diagnose.unmodelled import LeftOver
 from truearm.engine.document.records import Record, notice_lines, notice_summaries
 from truearm.engine.robot.robot import Robot
-
-# What was found wrong with measurements.
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,4 +1,4 @@
-"""``truearm path``."""
+"""``truearm compensate`` and ``truearm path``."""
 
 from __future__ import annotations
 
@@ -25,8 +25,6 @@ from truearm.engine.command.options import (
     read_notes,
 )
 from truearm.engine.command.texts import read_seed
-
-# ``truearm compensate``.
 
 
 def compensate(

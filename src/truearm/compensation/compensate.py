@@ -1,4 +1,4 @@
-"""The originals of corrected programs."""
+"""Robot programs corrected, and their originals restored."""
 
 from __future__ import annotations
 
@@ -87,8 +87,6 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.entries import STATED
 from truearm.engine.robot.wrench import Wrench, WrenchFrame
-
-# From robot programs to corrected ones: read, correct, split, report, write.
 
 #: Targets that cannot be corrected, shown one by one in a refusal.
 _SHOWN: Final = 5

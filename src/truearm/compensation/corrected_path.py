@@ -1,4 +1,4 @@
-"""A corrected path as a program: which of its samples become targets, and what the controller is told of them."""
+"""A path corrected so that the calibrated robot keeps to it, and its program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Programs that were corrected already: where that is looked for, and where it is remembered."""
+"""Checks before programs are corrected: measured range, controller, size of the correction, earlier corrections."""
 
 from __future__ import annotations
 
@@ -31,8 +31,6 @@ from truearm.engine.robot.controller import OTHER_ARM, ControllerKinematics
 from truearm.engine.robot.inverse.kinematics import reach
 from truearm.engine.robot.robot import Robot
 
-# Which targets are reached with joint positions that calibration has not seen.
-
 #: How far beyond the measured range of a joint nothing new is to be expected, as a share of that range.
 _MARGIN: Final = 0.1
 
@@ -60,7 +58,6 @@ def beyond_measured(robot: Robot, joints: Array) -> NDArray[np.bool_]:
 # A controller that has kinematics of its own, measured by its maker, goes elsewhere with a pose than the table of the
 # robot file says. Correcting against that table then adds what the controller corrects already. Targets that are given
 # by joints do not pass through the kinematics.
-
 _KEPT: Final = (
     "The robot file keeps the answer (controller: {{kinematics: {0}}}), or a cell file (controller_kinematics: {0})."
 )

@@ -72,8 +72,6 @@ from truearm.engine.robot.transform import homogeneous
 from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
 from truearm.engine.robot.wrench import Wrench, WrenchFrame
 
-# A path followed: joint positions over time, corrected ones, and programs.
-
 #: Files that are always written.
 MOTION: Final = "motion.csv"
 REPORT: Final = "report.html"

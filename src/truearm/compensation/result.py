@@ -1,4 +1,4 @@
-"""The originals of corrected programs."""
+"""Results of correcting programs and of restoring their originals."""
 
 from __future__ import annotations
 
@@ -27,8 +27,6 @@ from truearm.engine.programs.program_files import ProgramFile, language_called, 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.entries import controller_summary
-
-# Corrected programs, ready to be written.
 
 #: The report beside the corrected programs.
 REPORT: Final = "compensation.html"

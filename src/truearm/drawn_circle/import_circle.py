@@ -1,4 +1,4 @@
-"""Measurements from circles that the robot drew with a pencil."""
+"""Measurements from circles that the robot drew: scanned pages, and tables of what was read on the way round."""
 
 from __future__ import annotations
 
@@ -24,8 +24,6 @@ from truearm.engine.data.readers.cells import Cells, Layout, read_cells
 from truearm.engine.data.readers.rows import Configurations, found_configurations, in_order
 from truearm.engine.document.records import ImportedCircles
 from truearm.engine.robot.urdf_writing import joint_names
-
-# Circles that a robot drew, from scanned pages and tables of what was read on the way round.
 
 _HEADING: Final = re.compile(r"(configuration|(?:joint|axis)_[1-9][0-9]{0,3}|angle|height)\s*(?:\[([^\]]*)\])?")
 _ALLOWED: Final = "configuration, joint_1 [deg] .. or axis_1 [deg] .., angle [deg], height [mm]"

@@ -1,4 +1,4 @@
-"""What a drawn circle says of the configurations in which the robot drew it."""
+"""Circles that a robot drew, found on scanned pages: centre, radius and profile."""
 
 from __future__ import annotations
 
@@ -23,8 +23,6 @@ from truearm.engine.robot.chain import Array
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-
-# A scanned page: how bright each dot is, and how far apart the dots lie.
 
 _FORMATS: Final = ("PNG", "JPEG", "TIFF")
 #: Dots per inch that scanners have. Programs write 72 or 96 where they do not know.
@@ -435,8 +433,6 @@ def _smooth(profile: Array, around: float) -> Array:
     neighbours = np.arange(sectors)[:, None] + np.arange(-half, half + 1)
     return np.asarray(np.median(whole[neighbours % sectors], axis=1))
 
-
-# The drawn circle on a scanned page: its centre, radius and profile.
 
 _SECTORS: Final = (90, 3600)
 #: Lines whose circles are nearer together than this are one [m].

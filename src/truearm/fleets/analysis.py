@@ -58,8 +58,6 @@ def robust_spread(values: Array) -> tuple[Array, Array]:
     return centre, np.where(median > 0.0, spread, 0.0)
 
 
-# Robots whose parameters differ from those of the others of their kind.
-
 #: Robots from which on they are compared with one another; fewer are compared with their priors.
 LEAST_COMPARED: Final = 10
 #: In at most this share of series is any robot named although none differs.
@@ -137,8 +135,6 @@ def differences(kind: Kind) -> tuple[Difference, ...]:
     ]
     return tuple(sorted(told, key=lambda one: -abs(one.times)))
 
-
-# Which robots of a fleet to look at first, and why.
 
 #: Why a robot is looked at, the gravest first: it was not calibrated; its result must not be used as it is; its fit did
 #: not end well; it is no better than before; it is less accurate than the others; parameters differ or drift. The last
@@ -270,8 +266,6 @@ def _limit(means: Array) -> float:
     times = float(stdtrit(FREEDOM * (len(known) - 1), 1.0 - FALSE_ALARMS / len(known)))
     return float(np.exp(centre[0] + times * spread[0])) if spread[0] > 0.0 else float("inf")
 
-
-# How far parameters scatter over a series, beside what their priors say, and priors that follow from it.
 
 #: Robots from which on a spread is told; of ten its interval already reaches from two thirds to almost twice of it.
 LEAST_SPREAD: Final = 10
@@ -503,9 +497,6 @@ def _errors(known: list[tuple[str, dict[str, Accuracy]]]) -> dict[str, Errors]:
             mean, largest = np.array([(one.mean, one.max) for _, one in those]).T
             made[kind] = Errors(mean, largest, tuple(name for name, _ in those))
     return made
-
-
-# A robot with the priors that a series proposes, as its file and an experiment take them.
 
 
 def with_proposed(robot: Robot, spreads: Sequence[ParameterSpread]) -> tuple[Robot, tuple[str, ...]]:

@@ -1,12 +1,4 @@
-"""Machines that were measured again: which parameters have changed, how fast, and how sure that is.
-
-Two results of one machine share what the priors add: where nothing but a prior holds a parameter both are at nominal,
-and their difference says nothing. Be ``C_1`` and ``C_2`` their covariances with the variances ``P`` of the priors as
-unit. If the machine is the same, its true values vary as the priors say, and base and targets stood elsewhere, then the
-results covary by ``(I - C_1)(I - C_2)``, each varies by ``I - C``, and their difference by ``C_1 + C_2 - C_1 C_2 -
-C_2 C_1``: what errors of the readings add, and what the two campaigns shrink differently. Where both determine nothing
-but ``d_2 + d_3`` that is as small as the sum is known, although each alone is known to its prior only.
-"""
+"""Accuracy of a series, robots of one kind, and machines measured again: which parameters have changed, how fast."""
 
 from __future__ import annotations
 
@@ -288,6 +280,14 @@ _Z: Final = 1.959963984540054
 _BENT: Final = 0.01
 
 
+# Machines that were measured again: which parameters have changed, how fast, and how sure that is.
+#
+# Two results of one machine share what the priors add: where nothing but a prior holds a parameter both are at nominal,
+# and their difference says nothing. Be ``C_1`` and ``C_2`` their covariances with the variances ``P`` of the priors as
+# unit. If the machine is the same, its true values vary as the priors say, and base and targets stood elsewhere, then
+# the results covary by ``(I - C_1)(I - C_2)``, each varies by ``I - C``, and their difference by ``C_1 + C_2 - C_1 C_2
+# - C_2 C_1``: what errors of the readings add, and what the two campaigns shrink differently. Where both determine
+# nothing but ``d_2 + d_3`` that is as small as the sum is known, although each alone is known to its prior only.
 @dataclass(frozen=True)
 class Drift:
     """How a parameter of a machine went on from campaign to campaign; everything in SI units."""

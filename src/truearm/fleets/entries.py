@@ -30,8 +30,6 @@ from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot_file.entries import NAME, NAME_IN_WORDS, STRICT
 
-# How robots of a fleet are calibrated: the options that a manifest or its table may give them.
-
 _WHOLE: Final = re.compile(r"[0-9]{1,18}")
 #: What separates several names or numbers in a cell.
 _SEPARATORS: Final = re.compile(r"[;,\s]+")

@@ -37,8 +37,6 @@ from truearm.fleets.parts import Finished, Task, finished
 from truearm.fleets.recorded import RECORD, ROBOTS, Known, Recorded
 from truearm.fleets.result import FLEET_FILES, Fleet, Run
 
-# What a fleet of measured robots asks for, tried before anything is computed.
-
 #: Robots with the same options of which these are tried.
 _MOST_TRIED: Final = 50
 #: No result of the options depends on it before the fit.

@@ -1,4 +1,4 @@
-"""An experiment prepared: its robot with targets, and the configurations at which robots are measured and judged."""
+"""What is asked of a fleet: robots that were measured, or an experiment with simulated ones."""
 
 from __future__ import annotations
 
@@ -75,8 +75,6 @@ def _refusals_at(place: str) -> Iterator[None]:
         raise
 
 
-# What is asked of a fleet: robots that were measured, or an experiment with simulated ones.
-#
 # Robots that were measured, in the file or in a table with one row each::
 #
 #     truearm: truearm-fleet/1
@@ -92,7 +90,6 @@ def _refusals_at(place: str) -> Iterator[None]:
 #     experiment: {robot: irb120, count: 10000, configurations: 20, targets: 1, noise: 0.05, seed: 1}
 #
 # Files are named from the folder that the manifest is in.
-
 SCHEMA: Final = "truearm-fleet/1"
 
 #: Robots of a part, where the manifest does not say: a part shall take seconds.

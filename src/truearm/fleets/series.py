@@ -26,8 +26,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import PLACES
 from truearm.engine.robot.robot import Robot
 
-# What was found of one robot of a fleet: a row, as the parts on disk hold it.
-
 Status = Literal["calibrated", "failed"]
 
 #: Columns of the parameters that may be the same for all robots of a part, and stand in its first line once.
@@ -255,7 +253,6 @@ def part_text(
 # problem carry through, so a step is a few array operations on a block of trials that fits the processor's cache.
 # The normal equations are good enough here, scaled by the priors and with noise in the data: what rounding leaves of
 # one step, the next one removes, because the gradient is formed anew from the residuals.
-
 _BLOCK: Final = 9_000  # readings swept together, so that their Jacobian stays in the cache
 _STEPS: Final = 12
 _SMALL: Final = 1e-9  # priors

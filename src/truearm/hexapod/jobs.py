@@ -1,4 +1,4 @@
-"""Where the base fixture of the hexapod device stands, from the joint positions at its cups."""
+"""Jobs with the hexapod device: its poses, plans, cups from lengths, their uncertainty, and the base fixture."""
 
 from __future__ import annotations
 
@@ -57,8 +57,6 @@ from truearm.hexapod.places import CupUncertainty, WorldFrame, all_solutions, cu
 from truearm.hexapod.reachable import ARM_RADIUS, Reachable, attached_anew, reachable_at_places, steps_text, with_cups
 from truearm.hexapod.sheet import CUP_DEVIATION, Attachments, Sheet, legs_of_side, sheet_csv, together
 from truearm.hexapod.sheet_reading import read_sheet, read_touches
-
-# What is found with the hexapod device: its poses, how well it measures, cups, plans, and the base fixture.
 
 _CUPS: Final = ("t1", "t2", "t3")
 
@@ -332,16 +330,11 @@ class HexapodFrame(Record):
         ]
 
 
-# The designs, assemblies and poses of the hexapod device.
-
-
 def hexapod_enumerate() -> HexapodPoses:
     """Count designs, assemblies and poses of the device, and list the poses that teach much the same."""
     found = poses()
     return HexapodPoses(len(designs()), len(list(assemblies())), found, distinct(found), near_equal(found))
 
-
-# Which configurations of a robot can be measured with the hexapod device, at one place or several.
 
 #: More attachments than anybody compares.
 _MOST_ATTACHMENTS: Final = 50
@@ -471,9 +464,6 @@ def _branches_argument(branches: object) -> tuple[str, ...]:
     return tuple(name_argument(name, "branches") for name in branches)
 
 
-# The tool's cups from lengths that were measured with the hexapod device.
-
-
 def hexapod_solve(
     sheet: Sheet | str | Path | Sequence[Sheet | str | Path] | None = None,
     *,
@@ -585,9 +575,6 @@ def _one_pose(
     with refusals_of("legs"):
         cups = tool_cups(chosen.design, chosen.solution, sides["base"], sides["tool"], lengths)
     return SolvedPose("", chosen.design, chosen.solution, cups)
-
-
-# How well the hexapod device finds the cups of a tool.
 
 
 def hexapod_uncertainty(*, trials: int = 100_000, seed: int = 0) -> HexapodUncertainty:

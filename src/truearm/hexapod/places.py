@@ -1,9 +1,4 @@
-"""How well the tool's cups are known, in standard deviations of one measured length (Nubiola, 3.4, Table 3.1).
-
-Twelve distances and twelve coordinates: three of the base, whose frame the cups themselves make, and nine of the tool.
-The lengths' derivatives by the coordinates are unit vectors along the bars, and their inverse gives every sensitivity
-at once, with all correlations.
-"""
+"""Where the base fixture of the hexapod device stands, and how well the tool's cups are known."""
 
 from __future__ import annotations
 
@@ -18,14 +13,11 @@ from truearm.engine.data.hexapod import DEVICE, SIDES, SOLUTIONS, Design, Device
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import Transform
 
-# Where the base fixture stands: three cups that the robot touched, and the exact distances between them.
-#
+
 # The robot brings one cup of its tool to each cup of the base. What it read there, and its current model, say where the
 # three points are; the ballbar says how far apart they are, and much better. The triangle of those distances is laid
 # onto the three points so that the sum of squares is least (Nubiola, 4.3 to 4.12). Its plane is that of the points, so
 # this is a fit in two dimensions with a closed form; the document iterates.
-
-
 @dataclass(frozen=True, eq=False)
 class WorldFrame:
     """The frame of the base fixture: origin B1, x to B2, z the normal on whose side B3 is at positive y."""
@@ -79,6 +71,11 @@ DESIGN: Final = Design((0, 1, 2), (0, 1, 2))
 _FREE_OF_BASE: Final = ((1, 0), (2, 0), (2, 1))
 
 
+# How well the tool's cups are known, in standard deviations of one measured length (Nubiola, 3.4, Table 3.1).
+#
+# Twelve distances and twelve coordinates: three of the base, whose frame the cups themselves make, and nine of the
+# tool. The lengths' derivatives by the coordinates are unit vectors along the bars, and their inverse gives every
+# sensitivity at once, with all correlations.
 @dataclass(frozen=True, eq=False)
 class CupUncertainty:
     """Uncertainty of the tool's cups in one solution, in standard deviations of a length."""

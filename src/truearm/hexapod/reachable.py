@@ -109,7 +109,7 @@ def reachable(
         device: Nominal lengths.
         largest_turn: No joint that turns is used beyond this, whatever its limits [rad]; Nubiola (4.4) takes 180 deg,
             for the cables.
-        arm_radius: Of the arm's links [m], see :mod:`truearm.hexapod.reachable`.
+        arm_radius: Of the arm's links [m].
         branches: Only branches whose names begin so, such as ``front-up``; all of them if empty.
         fourth_cup: Whether there is a fourth cup, and the poses are taken on all four sides.
 
@@ -247,7 +247,6 @@ def _bars(
 
 
 # The plan in words, to print and to work through with the bar in hand (Nubiola, 3.5 and 4.4).
-
 _FOURTH: Final = (
     "   Set the fourth cup below the three others in the same way, at the fourth corner of a tetrahedron. It must be",
     "   as far from each of them as they are from each other, to the range of the bar.",
@@ -301,9 +300,6 @@ def steps_text(plan: Reachable, robot: Robot, controller: Controller | None = No
         lines.append(f"   {called} {positions}")
         lines += [f"   [ ] Attach the bar between {' and '.join(name.split('-'))}." for name in row.leg_names]
     return "\n".join(lines) + "\n"
-
-
-# The tool of a robot for the device: three cups, calibrated or as its file has them.
 
 
 def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:

@@ -28,8 +28,6 @@ from truearm.hexapod.sheet import (
     side_frames,
 )
 
-# What the ballbar reads of a twin: true distances with noise, nothing where they are beyond its range.
-
 
 @dataclass
 class Ballbar:
@@ -110,8 +108,6 @@ class ToolChanger:
 
 
 # A session with the bar on a twin: the distances of the fixtures, then pose after pose (Nubiola, 3.5).
-
-
 @dataclass(frozen=True, eq=False)
 class SetUp:
     """Fixtures that stand fast, and what was measured of them."""
@@ -254,9 +250,6 @@ def _sides(read: dict[str, float], fixture: str) -> Array:
     return np.array([read[name] for name in names])
 
 
-# A planned sheet filled in on a twin: to rehearse a campaign before the bar is taken in hand.
-
-
 def locked_cups(fixture: Transform, rng: np.random.Generator, off: float = 0.0, *, fourth: bool = False) -> Array:
     """Return where the cups of a base fixture truly are in the frame of the fixture's place [m], ``(3 or 4, 3)``.
 
@@ -314,8 +307,6 @@ def filled_sheet(
 
 
 # A fourth cup, set and measured on a twin's fixture (Nubiola, 4.5; :mod:`truearm.hexapod.sheet`).
-
-
 def with_fourth(fixtures: SetUp, place: Array, bar: Ballbar) -> tuple[tuple[SetUp, Transform], ...]:
     """Measure a fourth cup on a twin's fixture.
 

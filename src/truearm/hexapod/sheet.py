@@ -1,4 +1,4 @@
-"""Several sheets as one: those of one robot with one tool, with the base fixture at one place or several."""
+"""The sheet of a campaign with the hexapod device, its fourth cup and attachments, and several sheets as one."""
 
 from __future__ import annotations
 

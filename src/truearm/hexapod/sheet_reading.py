@@ -1,4 +1,4 @@
-"""A sheet that was filled in, read and checked: see :mod:`truearm.hexapod.sheet`."""
+"""A sheet that was filled in (:mod:`truearm.hexapod.sheet`), and joint positions at the base cups, read and checked."""
 
 from __future__ import annotations
 
@@ -247,7 +247,6 @@ def _columns(cells: Cells) -> Columns:
 # Joint positions at the three base cups: a CSV with ``cup`` (B1, B2, B3) and ``joint_1 [deg]`` .., one row a cup.
 #
 # ``axis_1 [deg]`` .. instead are joint positions as the controller shows them.
-
 _HEADING_TOUCHES: Final = re.compile(r"(?P<name>cup|(?:joint|axis)_[1-9][0-9]?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 _CUPS: Final = ("B1", "B2", "B3")
 

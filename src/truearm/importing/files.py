@@ -1,4 +1,4 @@
-"""Measurements from any table of points."""
+"""Measurements from files of other programs: plain matrices, RoboDK, sockets, and any table of points."""
 
 from __future__ import annotations
 
@@ -36,8 +36,6 @@ from truearm.engine.document.records import Imported, ImportedRoboDK
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 from truearm.engine.robot.postures import approach_of
-
-# Importer for plain matrices: one file for the joints, one a target, one configuration a row.
 
 
 def read_matrices(
@@ -170,9 +168,6 @@ def _number(cell: str, unit: str, where: str, *, missing: bool) -> float:
     raise InputError("a number belongs here", where=where, came=cell, allowed=allowed, cure=cure)
 
 
-# Measurements from plain matrices, one file for the joints and one a target.
-
-
 def import_matrices(
     joints: str | Path,
     targets: Mapping[str, str | Path],
@@ -216,9 +211,6 @@ def import_matrices(
     if file is not None:
         write_text(file, csv_text(data))
     return Imported(data, file, missing)
-
-
-# Measurements from the tables of RoboDK's robot calibration.
 
 
 def import_robodk(
@@ -370,8 +362,6 @@ def read_sockets(path: Path, apart: Apart, ball: float, sigma: float | None) -> 
     )
     return replace(data, setup=known)
 
-
-# Measurements from a ball that was put into two sockets.
 
 #: A distance with a larger share of doubt was not measured: a tape measure leaves one in a hundred.
 _VAGUEST: Final = 0.1

@@ -1,4 +1,4 @@
-"""The mapping file that a table seems to need."""
+"""The mapping file that a table seems to need, with every guess marked and nothing confirmed."""
 
 from __future__ import annotations
 
@@ -47,8 +47,6 @@ from truearm.importing.meanings import (
     time_among,
     unit_of,
 )
-
-# The mapping file that a table seems to need, with every guess marked and nothing confirmed.
 
 _NUMBERED: Final = re.compile("(.*?)[0-9]{1,9}")
 
@@ -429,9 +427,6 @@ def _tried(made: Guessed, path: Path) -> Guessed:
     except InputError as error:
         return replace(made, refusal=str(error))
     return replace(made, configurations=data.configurations, targets=data.targets)
-
-
-# A mapping file that was guessed from a table.
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,4 +1,4 @@
-"""Which column of a table seems to tell when its rows were measured, and in what format."""
+"""What the columns of a table seem to hold, and the text of the mapping that is guessed from it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from truearm.engine.base.units import LENGTH_UNITS, SMALL_ANGLE_UNITS
 from truearm.engine.data.readers.measuring_order import MIDNIGHT
 from truearm.engine.robot.chain import Array
 from truearm.importing.layouts import GON, NOTHING, UNITS, GuessedLayout, number_of
-
-# What the columns of a table seem to hold, by their names and by what stands in them.
 
 _IN_BRACKETS: Final = re.compile(r"\s*(?P<sign>[\[({])(?P<unit>[^\])}]*)[\])}]\s*")
 #: Units of what is no position.
@@ -346,8 +344,6 @@ def named_like(columns: Sequence[Column], kind: str) -> Column | None:
     words = {"label": _LABEL, "target": _TARGET, "visit": _VISIT, "time": _TIME, "temperature": _TEMPERATURE}[kind]
     return next((column for column in columns if words & set(column.words)), None)
 
-
-# The text of a mapping that is guessed: entries with what they rest on, and the units of columns.
 
 #: Where nothing in the file tells an answer.
 OPEN: Final = "?"

@@ -1,4 +1,4 @@
-"""``truearm tilting``."""
+"""``truearm tilting``, and ``--device inclinometers`` of ``truearm plan`` and ``truearm simulate``."""
 
 from __future__ import annotations
 
@@ -24,8 +24,6 @@ from truearm.engine.command.options import (
     read_notes,
     read_train,
 )
-
-# ``--device inclinometers`` of ``truearm plan`` and ``truearm simulate``: other jobs, other words on some options.
 
 #: Options that say nothing for inclinometers.
 _NOT_PLANNED: Final = (

@@ -1,4 +1,4 @@
-"""What to know about tilt, backlash and stiffness that inclinometers told."""
+"""Tilt, backlash and stiffness of the joints from inclinometers, and what to know about them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import FreeParameters, Parameter
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
-
-# What inclinometers on the links read of a robot's model, and how its parameters change that.
 
 #: Axes steeper than this are left out: a vertical one does not see small turns [rad].
 STEEPEST: Final = math.radians(60.0)

@@ -1,4 +1,4 @@
-"""What inclinometers would read of a robot whose truth is known."""
+"""Pairs of postures for inclinometers: which to hold under which loads, and what instruments would read there."""
 
 from __future__ import annotations
 
@@ -205,8 +205,6 @@ def _displacement_derivatives(robot: Robot, pairs: Pairs, names: Sequence[str]) 
     return np.moveaxis(second - first, (0, 2), (2, 0))
 
 
-# Which postures inclinometers are read in, under which loads, and what an instrument of that kind reads of a twin.
-
 #: What the poses under a load are called, beside what inclinometers read.
 PUSHED: Final = "-pushed"
 
@@ -358,8 +356,6 @@ class InclinometerSimulation(Record):
         held = {self.out.name: inclinations_text(self.inclinations)}
         return held if self.pushed is None else held | {pushed_file(self.out).name: csv_text(self.pushed)}
 
-
-# Which configurations to read inclinometers in, under which loads.
 
 #: Of a two-axis inclinometer (Patel, section 4.4.1) [rad]. It has the axes x and y of its link.
 RESOLUTION: Final = math.radians(0.001)
@@ -521,9 +517,6 @@ def planned_pairs(
             pose_deviation=pose_deviation,
             finder=finder,
         )
-
-
-# What inclinometers on the links of the digital twin read, alone and in comparisons.
 
 
 def inclinations(

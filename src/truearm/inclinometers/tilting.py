@@ -52,8 +52,6 @@ from truearm.inclinometers.fit import TILTING, TiltingFit, calibrate_tilting, ch
 from truearm.inclinometers.mounting import Mounting, find_mounting
 from truearm.inclinometers.reading import read_inclinations
 
-# Joints whose tilt, backlash and stiffness were found by inclinometers, and the geometry that was found after that.
-
 #: What tilting writes into its folder, and the report of the geometry where poses were given.
 TILTING_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
 GEOMETRY: Final = "geometry.html"

@@ -1,4 +1,4 @@
-"""What was fixed when the measuring of a plan began: written down, and held against it when it goes on."""
+"""What was fixed when the measuring of a plan began, and where its readings come from."""
 
 from __future__ import annotations
 
@@ -119,8 +119,6 @@ def hash_of(content: object) -> str:
     """Return by what contents that JSON can write are known again."""
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
-
-# Where the readings of a plan come from: a virtual instrument, a folder that is watched, or a port.
 
 _MOST_DISTURBED: Final = 0.9
 T = TypeVar("T")

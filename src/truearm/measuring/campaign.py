@@ -1,4 +1,4 @@
-"""How fixed nests beside the robot seem to move while a robot is measured: instrument and floor, not the robot."""
+"""A session with its log on disk and its source of readings, and how fixed nests seem to move meanwhile."""
 
 from __future__ import annotations
 
@@ -17,8 +17,6 @@ from truearm.engine.robot.chain import Array
 from truearm.measuring.reading_log import ReadingLog
 from truearm.measuring.session import Entry, Session
 from truearm.measuring.sources import Incoming, Source
-
-# A session with its log on disk and its source of readings: what a command drives, and a page of the studio.
 
 #: So many configurations are named in a notice.
 _NAMED: Final = 5

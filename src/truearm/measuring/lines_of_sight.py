@@ -1,4 +1,4 @@
-"""How much of a plan a virtual instrument can read, counted before anything is measured."""
+"""What of a plan an instrument can read: how far the readings reach, and what hides points from it."""
 
 from __future__ import annotations
 
@@ -89,8 +89,6 @@ def sight_notices(session: Session, device: Device, placed: Robot, joints: Array
         ),
     )
 
-
-# What stands between an instrument and fixed points beside a robot: the arm itself, or a box.
 
 #: Half of the width of a beam, or of what a camera must see of a target [m].
 BEAM: Final = 5e-3

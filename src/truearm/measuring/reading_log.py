@@ -1,9 +1,4 @@
-"""The log of a session on disk: every reading is there before the next one is asked for.
-
-A line is appended and synchronised at a time, with a checksum at its end. So whatever stops the machine leaves whole
-lines and, at most, a part of one: that reading was not confirmed to anybody, and its part is cut off when the measuring
-goes on. A line that is not the last and whose checksum does not fit was changed by somebody, and is refused.
-"""
+"""The log of a session on disk, and what a campaign was measured with."""
 
 from __future__ import annotations
 
@@ -28,9 +23,7 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot_file.entries import STRICT, Number
 from truearm.measuring.session import REASONS, Entry, Reading
 
-# What a campaign was measured with, and in what air: asked of the user, and kept with the data.
-#
-# A file says it, all of it optional::
+# What a file says of instrument and air, all of it optional::
 #
 #     truearm: truearm-about/1
 #     units: {length: mm, temperature: degC, pressure: hPa, humidity: percent}
@@ -257,6 +250,12 @@ _ROLES: Final = ("target", "nest")
 _EVENTS: Final = ("reading", "aside", "left")
 
 
+# The log of a session on disk: every reading is there before the next one is asked for.
+#
+# A line is appended and synchronised at a time, with a checksum at its end. So whatever stops the machine leaves whole
+# lines and, at most, a part of one: that reading was not confirmed to anybody, and its part is cut off when the
+# measuring goes on. A line that is not the last and whose checksum does not fit was changed by somebody, and is
+# refused.
 class ReadingLog:
     """An open log; one process at a time has it.
 

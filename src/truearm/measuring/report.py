@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from truearm.measuring.result import Measured
 
 
-# Pictures of a plan that is measured: how the nests move, and how the readings were taken.
-
 _HEIGHT: Final = 340
 _TOGETHER: Final = "#2b2f33"
 

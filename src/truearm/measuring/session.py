@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from truearm.engine.base.errors import InputError, did_you_mean
 from truearm.engine.robot.chain import Array
 
-# One reading of an instrument, and what it is worth by itself.
-
 #: Why a reading is not kept. Every reason is the instrument's or the operator's; none asks how well a reading fits.
 REASONS: Final[dict[str, str]] = {
     "beam-break": "the beam was interrupted",

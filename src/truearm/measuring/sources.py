@@ -1,17 +1,4 @@
-"""Readings sent by a program of this machine, a line each, over TCP.
-
-Any program of this machine can reach loopback, and could forge points. So a connection begins with a token that only
-whoever started the measuring knows, and nothing is taken before. A line is words separated by blanks; names with
-blanks stand in double quotes::
-
-    token TOKEN
-    reading NAME X Y Z UNIT [at=LABEL] [time=SECONDS] [sigma=D] [samples=N] [deviation=D] [settling=D] [breaks=N]
-                            [q=W,X,Y,Z]
-    left LABEL NAME [WORDS]
-
-Lengths are in UNIT, one of ``mm``, ``m``, ``um``, ``in``. Every line is answered by one: ``kept 12``, ``aside 12
-scatter WORDS``, ``left 12``, or ``refused WORDS``, and then what comes next.
-"""
+"""What readings come from; also readings sent by a program of this machine, over TCP."""
 
 from __future__ import annotations
 
@@ -32,8 +19,6 @@ from truearm.engine.base.errors import InputError, Notice, counted, printable, s
 from truearm.engine.base.units import LENGTH_UNITS, as_number, sized_si, to_si
 from truearm.engine.data.readers.rows import QUATERNION_TOLERANCE
 from truearm.measuring.session import Entry, Reading, Session
-
-# What readings come from, as the measuring sees it.
 
 
 def _nobody(entry: Entry) -> None:
@@ -102,6 +87,19 @@ class _Client:
     lines: int = 0
 
 
+# Readings sent by a program of this machine, a line each, over TCP.
+#
+# Any program of this machine can reach loopback, and could forge points. So a connection begins with a token that only
+# whoever started the measuring knows, and nothing is taken before. A line is words separated by blanks; names with
+# blanks stand in double quotes::
+#
+#     token TOKEN
+#     reading NAME X Y Z UNIT [at=LABEL] [time=SECONDS] [sigma=D] [samples=N] [deviation=D] [settling=D] [breaks=N]
+#                             [q=W,X,Y,Z]
+#     left LABEL NAME [WORDS]
+#
+# Lengths are in UNIT, one of ``mm``, ``m``, ``um``, ``in``. Every line is answered by one: ``kept 12``, ``aside 12
+# scatter WORDS``, ``left 12``, or ``refused WORDS``, and then what comes next.
 class Listener:
     """A source of readings: programs of this machine that know the token.
 

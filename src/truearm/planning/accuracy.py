@@ -1,4 +1,4 @@
-"""Where a robot shall be accurate: the targets of a program, poses, or a region."""
+"""How accurate a calibration will be before anything is measured, and where a robot shall be accurate."""
 
 from __future__ import annotations
 
@@ -178,8 +178,6 @@ def _in_region(robot: Robot, box: Array, rng: np.random.Generator) -> AccuracyGo
     return _goal(inside, f"in the region {corners} mm")
 
 
-# What readings at many configurations would tell about the parameters of a model.
-
 #: Radius at which an angle that is read counts as a length [m].
 _LEVER: Final = 0.1
 
@@ -300,8 +298,6 @@ def _size(free: FreeParameters) -> Array:
     return np.array([PRIOR["geometry", p.unit] if p.group in placed else p.prior for p in free.parameters])
 
 
-# How accurate a calibration will be, before anything is measured.
-#
 # The deviations of the readings give the covariance of the parameters, and that gives the error of predictions
 # anywhere. A fit takes readings as independent, but what a model cannot follow moves all targets of a pose alike: on
 # the measured IRB 120 three quarters of the variance of the residuals, with every model tried. So the covariance is

@@ -41,8 +41,6 @@ from truearm.engine.twin.devices.device import Device, in_view_of
 from truearm.engine.twin.truths import carrying_targets
 from truearm.planning.accuracy import Prediction, There, model_error, predict, sensitivity, sensitivity_of_readings
 
-# Which candidates an arm can be driven to: found for those that are chosen, as a way around takes long to find.
-
 #: After as many choices with configurations that have no way, those are chosen from whose ways are known.
 _ROUNDS: Final = 3
 #: So many times as many as are chosen are enough to choose from, and so many ways around are looked for to have them.
@@ -517,9 +515,6 @@ def _refuse_too_few(
             allowed=f"{needed} or more",
             cure=cure,
         )
-
-
-# A plan of measurements as CSV.
 
 
 def plan_csv(plan: MeasurementPlan, joints_are: JointsOf = "model") -> str:

@@ -1,4 +1,4 @@
-"""``truearm poses``."""
+"""``truearm plan`` and ``truearm poses``."""
 
 from __future__ import annotations
 
@@ -28,8 +28,6 @@ from truearm.engine.command.options import (
     refuse_pull,
 )
 from truearm.engine.command.texts import read_lengths, read_numbers, read_poses, read_region, read_seed, read_speed
-
-# ``truearm plan``.
 
 
 def plan(

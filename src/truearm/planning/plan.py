@@ -63,8 +63,6 @@ from truearm.planning.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS
 from truearm.planning.programs import load_notices, program_wanted, refuse_other_programs, targets_notices, with_program
 from truearm.planning.result import PAGE, Plan
 
-# The files that a plan is made from, by their hashes.
-
 
 def plan_inputs(
     robot: object, candidates_from: object, constraints: object, accurate_at: object, tools: object, frames: object

@@ -37,8 +37,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.kinematics import reach
 from truearm.engine.robot.robot import Robot
 
-# The measuring program of a plan: every configuration under its label, from the safe one and back to it.
-#
 # Joints go evenly, all at once, as the ways were checked, see :mod:`truearm.engine.programs.joint_speeds` for how fast.
 
 #: Name of the program; every language takes it.

@@ -41,8 +41,6 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.planning.pose_sets import POSE_SETS, PoseSet, pose_set
 
-# Poses of a named set, and the joint positions that reach them.
-
 #: What the page beside a set ends with.
 PAGE: Final = ".html"
 #: What is put behind the name of a set to name the file of its poses.

@@ -45,8 +45,6 @@ from truearm.planning.plan_program import (
 )
 from truearm.planning.result import Plan
 
-# What to know of what a plan is made with: its load, and the load and targets that nobody said.
-
 #: A message names no more targets.
 _MOST_NAMED: Final = 6
 

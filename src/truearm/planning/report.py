@@ -1,4 +1,4 @@
-"""The sheet that goes with a plan that is driven: what is measured in which order, and what to write down beside it."""
+"""The page of a plan of measurements, and the sheet that goes with one that is driven."""
 
 from __future__ import annotations
 
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from truearm.planning.choosing import MeasurementPlan
     from truearm.planning.result import Plan
 
-
-# What a plan of measurements is good for: one HTML file.
 
 _INDEX_WORDS: Final = {
     "O1": "geometric mean of the singular values, per square root of the poses",

@@ -1,4 +1,4 @@
-"""``truearm import ur-kinematics``."""
+"""``truearm convert``, ``export``, ``export-robodk``, ``ik``, ``robots``, ``show`` and ``import ur-kinematics``."""
 
 from __future__ import annotations
 
@@ -22,8 +22,6 @@ from truearm.engine.command.options import (
 )
 from truearm.engine.command.texts import read_joints, read_seed
 
-# ``truearm convert``.
-
 
 def convert(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
@@ -34,9 +32,6 @@ def convert(
     from truearm.robot_files.convert import convert as run
 
     print_record(run(robot, convention, out=out))
-
-
-# ``truearm export`` and ``truearm export-robodk``.
 
 
 def export(
@@ -85,9 +80,6 @@ def export_robodk(
         print_json(exported.summary())
     else:
         print_record(exported)
-
-
-# ``truearm ik``.
 
 
 def ik(
@@ -181,9 +173,6 @@ def ur_kinematics(
         print_json(imported.summary())
     else:
         print_record(imported)
-
-
-# ``truearm robots`` and ``truearm show``.
 
 
 def robots(

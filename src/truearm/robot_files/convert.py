@@ -1,4 +1,4 @@
-"""Measurements as the tables of RoboDK's robot calibration."""
+"""A robot in another convention or for other programs, and measurements for RoboDK."""
 
 from __future__ import annotations
 
@@ -30,8 +30,6 @@ from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.engine.robot.wrench import refuse_pushed
 from truearm.robot_files.formats import FORMATS
 
-# A robot in another kinematic convention.
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConvertedRobot(Record):
@@ -53,9 +51,6 @@ class ConvertedRobot(Record):
         """Return what was done."""
         text = f"{self.robot.name}, {self.robot.history[-1]}."
         return [text if self.file is None else f"{self.file}: {text}"]
-
-
-# A robot in another kinematic convention.
 
 
 def convert(robot: Robot | str | Path, convention: str, *, out: str | Path | None = None) -> ConvertedRobot:
@@ -82,9 +77,6 @@ def convert(robot: Robot | str | Path, convention: str, *, out: str | Path | Non
     if file is not None:
         write_new_text(file, robot_text(made))
     return ConvertedRobot(made, file)
-
-
-# A robot for other programs.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,9 +111,6 @@ class ExportedRobot(Record):
         return [text if self.file is None else f"{self.file}: {text}", *self.left_out, *notice_lines(self.told)]
 
 
-# A robot for other programs.
-
-
 def export(robot: Robot | str | Path, format: str, *, out: str | Path | None = None) -> ExportedRobot:
     """Write a robot, nominal or calibrated, for other programs, and say what the format cannot hold.
 
@@ -151,9 +140,6 @@ def export(robot: Robot | str | Path, format: str, *, out: str | Path | None = N
     if file is not None:
         write_new_text(file, made.text)
     return ExportedRobot(loaded, format, made.text, made.frames, made.left_out, file, tuple(told_of(loaded)))
-
-
-# Measurements for other programs.
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,8 +1,4 @@
-"""A robot as a Python file of its own that needs only NumPy.
-
-The file is :mod:`truearm.robot_files.python_template` with the constants of the robot in place of its own. Joint
-effects that are exportable, those that depend on readings and weights alone, are in it; the template computes each.
-"""
+"""A robot as files that other programs read: DH tables, JSON, Python."""
 
 from __future__ import annotations
 
@@ -64,7 +60,6 @@ from truearm.engine.robot.urdf_writing import (
 # DH tables as CSV: one row a joint, in mm and degrees; base and flange below, where they are asked for.
 #
 # Lines that start with ``#`` are comments. A table of convention ``hayati`` has a column for beta.
-
 _FRAMES: Final = ("frame", "x [mm]", "y [mm]", "z [mm]", "qw", "qx", "qy", "qz")
 
 
@@ -197,8 +192,6 @@ def _si(text: str, unit: str, where: str) -> float:
     return sized_si(value, unit, where, came=text)
 
 
-# A robot as one JSON object with everything a program needs, in SI units: schema ``truearm-model/1``.
-
 SCHEMA: Final = "truearm-model/1"
 
 
@@ -315,6 +308,10 @@ _STORED: Final = 3
 Row = tuple[float, ...]
 
 
+# A robot as a Python file of its own that needs only NumPy.
+#
+# The file is :mod:`truearm.robot_files.python_template` with the constants of the robot in place of its own. Joint
+# effects that are exportable, those that depend on readings and weights alone, are in it; the template computes each.
 def python_text(robot: Robot, comments: Sequence[str]) -> str:
     """Return a Python module with ``forward`` and ``inverse`` of a robot whose world is its base frame.
 
@@ -464,9 +461,6 @@ def _series(rows: Sequence[Row], names: Sequence[str]) -> str:
             [f"    (  # {name}", *(f"        {line}" for line in lines), "    ),"] if row else [f"    (),  # {name}"]
         )
     return "\n".join([*text, ")"])
-
-
-# A robot as files that other programs read; each says what it cannot hold and which frames it refers to.
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,6 @@ from truearm.engine.robot.ur_kinematics import (
     with_kinematics,
 )
 
-# A robot with the kinematics that its controller computes with.
-
 #: Joint zeros that are so many times smaller speak for another type: of published files they are 8 times and more, or
 #: less than twice.
 _CLEARLY: Final = 5.0

@@ -1,4 +1,4 @@
-"""The joints that bring a robot to poses."""
+"""The joints that bring a robot to poses, and their table."""
 
 from __future__ import annotations
 
@@ -42,8 +42,6 @@ from truearm.engine.robot.transform import IDENTITY, rotation_from_quaternion
 from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
 from truearm.engine.robot.wrench import Wrench, WrenchFrame
 
-# Joint tables: the answers of inverse kinematics as CSV.
-
 
 def joints_csv(
     solutions: JointSolutions, labels: Sequence[str], joints: Sequence[Joint], controller: Controller | None = None
@@ -81,8 +79,6 @@ def joints_csv(
         )
     return stream.getvalue()
 
-
-# Joints for poses, and which poses the robot cannot or should not just go to.
 
 #: Poses explained one by one where a person reads.
 _EXPLAINED: Final = 10

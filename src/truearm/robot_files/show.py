@@ -1,4 +1,4 @@
-"""What is known about a robot, and where it stands at joint positions."""
+"""The robots of the library, what is known about a robot, and where it stands at joint positions."""
 
 from __future__ import annotations
 
@@ -30,8 +30,6 @@ from truearm.engine.robot.transform import (
     Orientation,
 )
 from truearm.engine.twin.truths import truth_names
-
-# What can be named: the robots of the library, and the instruments.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,9 +64,6 @@ class RobotList(Record):
             rows.append((robot.name, robot.maker or "-", str(len(robot.joints)), reach, known, title))
         widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
         return ["  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
-
-
-# The robots of the library.
 
 
 def robots(text: str | None = None, *, maker: str | None = None, axes: int | None = None) -> RobotList:
@@ -158,8 +153,6 @@ def _holds(robot: Robot, words: list[str], together: str) -> bool:
     return any(together in name or all(word in name for word in words) for name in names)
 
 
-# Where a robot stands at joint positions, as its controller and its model say it.
-
 #: How controllers write an orientation, the unit of its numbers, and whose do.
 _WRITTEN: Final[tuple[tuple[str, Orientation, str, str], ...]] = (
     ("q1 q2 q3 q4", QUATERNION, "", "ABB"),
@@ -244,9 +237,6 @@ def _usual(numbers: Array, way: Orientation) -> list[float]:
 def _row(values: list[float], digits: int) -> str:
     """Return numbers in a row, without the sign of a zero."""
     return "  ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in values)
-
-
-# What is known about a robot, as a person reads it.
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,4 +1,4 @@
-"""``truearm simulate``."""
+"""``truearm devices``, ``truearm influence`` and ``truearm simulate``."""
 
 from __future__ import annotations
 
@@ -26,8 +26,6 @@ from truearm.engine.command.options import (
     refuse_pull,
 )
 
-# ``truearm devices``.
-
 
 def devices(json: Json = False) -> None:
     """List the instruments that can be simulated and planned for, with what each is good for."""
@@ -38,9 +36,6 @@ def devices(json: Json = False) -> None:
         print_json(found.summary()["devices"])
     else:
         print_record(found)
-
-
-# ``truearm influence``.
 
 
 def influence(

@@ -58,8 +58,6 @@ from truearm.simulation.influences import (
 )
 from truearm.simulation.influences import influence as influence_of
 
-# What each parameter does to the pose of the tip, and what identification by it is worth.
-
 #: What is written into a folder.
 INFLUENCE_FILES: Final = ("influence.csv", "result.json", "report.html")
 

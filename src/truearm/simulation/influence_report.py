@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 
 # What parameters do to the tip, as a picture (Patel, figure 3.8).
-
-
 def influence_figure(influence: Influence) -> Figure:
     """Show the average influence of each parameter, with its range over the configurations."""
     mean, least, greatest = (1e3 * sizes for sizes in (influence.mean, influence.least, influence.greatest))

@@ -1,25 +1,4 @@
-"""Identification at one pose after the other, as the Katana thesis does it (Patel, section 3.6), beside least squares.
-
-At a single pose the measured position gives three equations for all parameters, so infinitely many sets of them
-explain it. Both methods of the document start every pose from the robot as it is and step until the tip is where it
-was measured:
-
-- minimum norm (equation 3.6): the smallest step that does it, ``J^T (J J^T)^-1 dP``. "Smallest" depends on the units
-  in which parameters are counted; they are rad and mm, as in the document, so lengths hardly move.
-- influence-based (equations 3.7 and 3.8): that step times C < 1, each parameter then times its share in the influence
-  vector k, and again from where that leads. It converges, because ``J diag(k) J^T (J J^T)^-1`` has eigenvalues between
-  min(k) and 1. All steps lie in the span of ``diag(k) J^T``, so for small errors the set ends where
-  ``dE^T diag(k)^-1 dE`` is smallest, whatever C is.
-
-Each set explains its own pose only: of what is wrong with the robot it holds the three combinations that this pose
-sees. The document does not say how "a set of kinematics parameters is calculated that best fit the accuracy to all
-measured poses" from them; see :data:`Combination`. With more poses than parameters the linear combination of the sets
-that fits best is least squares over all poses itself, and going through the poses again from their mean, again and
-again, comes closer to it.
-
-Base and targets are held where the robot has them, unless their parameters are named: this is for readings taken in
-a known frame.
-"""
+"""How far each parameter moves the tip, and identification by that at one pose after the other."""
 
 from __future__ import annotations
 
@@ -206,6 +185,27 @@ _RANK: Final = 1e-9  # of the largest singular value
 _BLOCK: Final = 9_000  # positions swept together
 
 
+# Identification at one pose after the other, as the Katana thesis does it (Patel, section 3.6), beside least squares.
+#
+# At a single pose the measured position gives three equations for all parameters, so infinitely many sets of them
+# explain it. Both methods of the document start every pose from the robot as it is and step until the tip is where it
+# was measured:
+#
+# - minimum norm (equation 3.6): the smallest step that does it, ``J^T (J J^T)^-1 dP``. "Smallest" depends on the units
+#   in which parameters are counted; they are rad and mm, as in the document, so lengths hardly move.
+# - influence-based (equations 3.7 and 3.8): that step times C < 1, each parameter then times its share in the influence
+#   vector k, and again from where that leads. It converges, because ``J diag(k) J^T (J J^T)^-1`` has eigenvalues
+#   between min(k) and 1. All steps lie in the span of ``diag(k) J^T``, so for small errors the set ends where ``dE^T
+#   diag(k)^-1 dE`` is smallest, whatever C is.
+#
+# Each set explains its own pose only: of what is wrong with the robot it holds the three combinations that this pose
+# sees. The document does not say how "a set of kinematics parameters is calculated that best fit the accuracy to all
+# measured poses" from them; see :data:`Combination`. With more poses than parameters the linear combination of the sets
+# that fits best is least squares over all poses itself, and going through the poses again from their mean, again and
+# again, comes closer to it.
+#
+# Base and targets are held where the robot has them, unless their parameters are named: this is for readings taken in
+# a known frame.
 @dataclass(frozen=True, eq=False)
 class PoseByPose:
     """What poses say one at a time, and the robot made of it."""

@@ -47,8 +47,6 @@ from truearm.engine.twin.devices.device import Device, in_view_of, measured_with
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Conditions, measure, with_wrench_read
 
-# What an instrument reads of a simulated robot.
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation(Record):
@@ -103,9 +101,6 @@ class DeviceList(Record):
         """Return one line an instrument."""
         width = max(len(device.name) for device in self.devices)
         return [f"{d.name:<{width}}  {d.summary}; deviation {d.sigma * 1e3:g} mm" for d in self.devices]
-
-
-# The instruments that can be simulated and planned for.
 
 
 def devices() -> DeviceList:

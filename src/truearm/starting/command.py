@@ -1,4 +1,4 @@
-"""``truearm study``."""
+"""``truearm demo``, ``example``, ``new-robot`` and ``study``: ways to begin."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import typer
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.options import Json, command_line, print_json, print_line, print_record, progress
 from truearm.starting.published import find_papers
-
-# ``truearm demo``, ``example`` and ``new-robot``: ways to begin.
 
 
 def demo(

@@ -30,8 +30,6 @@ from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
 from truearm.engine.twin.twin_joint import PERFECT
 
-# What the demonstration shows.
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Demonstration(Record):

@@ -1,4 +1,4 @@
-"""A robot file to fill in."""
+"""A small session to imitate, and a robot file to fill in."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ from truearm.engine.robot.robot_file.reading import robot_from_file
 from truearm.engine.robot.robot_file.schema import RobotFile
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import measure
-
-# Files to begin with.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,8 +79,6 @@ def robot_template() -> str:
     """Return the commented robot file."""
     return (files("truearm.starting.examples") / "new_robot.yaml").read_text("utf-8")
 
-
-# A small session to imitate.
 
 _FILES: Final = ("my_robot.yaml", "measurements.csv", "check.csv", "session.sh")
 

@@ -1,4 +1,4 @@
-"""``truearm validate``."""
+"""``truearm distances``, ``lines``, ``sphere``, ``tolerance`` and ``validate``."""
 
 from __future__ import annotations
 
@@ -26,8 +26,6 @@ from truearm.engine.command.options import (
 )
 from truearm.engine.command.texts import read_lengths
 
-# ``truearm distances``.
-
 
 def distances(
     robot: Annotated[str, typer.Argument(metavar="ROBOT_FILE", help="A calibrated.yaml.")],
@@ -44,9 +42,6 @@ def distances(
         print_json(judged.summary())
     else:
         print_record(judged)
-
-
-# ``truearm lines``.
 
 
 def lines(
@@ -101,9 +96,6 @@ def lines(
         print_line(f"{out}: {len(found.joints)} configurations, {said} joint positions{shown}.")
 
 
-# ``truearm sphere``.
-
-
 def sphere(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Usually a calibrated.yaml.")],
     data: Annotated[
@@ -152,9 +144,6 @@ def sphere(
         if out is not None:
             print_line(f"Written: {out}")
     end_on_error(found.warnings)
-
-
-# ``truearm tolerance``.
 
 
 def tolerance(

@@ -286,8 +286,6 @@ def _distances(points: Array, rows: slice, columns: slice, square: Array, apart:
     return np.sqrt(square, out=square)
 
 
-# How a robot agrees with the distances between measured points.
-
 #: Bars of the histogram where a person reads, about, and signs in the longest.
 _BARS: Final = 20
 _LONGEST: Final = 50

@@ -1,4 +1,4 @@
-"""Do the readings of each target fit another target of the robot: names that were exchanged between two campaigns."""
+"""Do new readings agree with a calibration: its proof, its frames, and the names of its targets."""
 
 from __future__ import annotations
 

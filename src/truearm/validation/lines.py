@@ -126,8 +126,6 @@ def _about_z(angle: float) -> Array:
 
 
 # The line test before and after compensation, on a twin or from data (KR5 paper, section 4.2 and equation 21).
-
-
 @dataclass(frozen=True, eq=False)
 class LineErrors:
     """How far a robot is from the poses of a line test."""
@@ -212,9 +210,6 @@ def from_data(lines: SevenLines, robot: Robot, data: Dataset) -> LineErrors:
 def reduction(before: LineErrors, after: LineErrors, direction: str) -> float:
     """Return by how much the largest error of a line fell [percent]."""
     return 100.0 * (1.0 - after.largest(direction) / before.largest(direction))
-
-
-# A line test: the poses, the joint positions that reach them, and the errors found there.
 
 
 @dataclass(frozen=True, eq=False, repr=False)

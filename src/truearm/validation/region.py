@@ -1,4 +1,4 @@
-"""Parts of a validation as JSON and the command show them: orientations by their angles, errors by their distance."""
+"""Parts of a validation: orientation errors, and distances from where the robot was calibrated."""
 
 from __future__ import annotations
 

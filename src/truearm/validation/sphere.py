@@ -1,4 +1,4 @@
-"""The sphere test: a ballbar between the tool and a fixed ball."""
+"""The sphere test: a ballbar between the tool and a fixed ball (Nubiola, 2.6.3)."""
 
 from __future__ import annotations
 
@@ -38,12 +38,9 @@ from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY
 
-# A ballbar between the tool and a fixed ball: how far the tool is from the sphere it was sent to (Nubiola, 2.6.3).
-#
 # One end of the bar is at a target of the tool, the other at a ball on the table. Whatever the robot does, the bar
 # reads the distance between the two; the robot's model predicts it. No tracker is needed, and no common frame but the
 # centre.
-
 _STEPS: Final = 50
 _SETTLED: Final = 1e-12
 
@@ -136,9 +133,6 @@ def _centre(points: Array, lengths: Array) -> Array:
         if math.sqrt(step @ step) < _SETTLED:
             break
     return np.asarray(centre + about)
-
-
-# Sphere tests: a ballbar's lengths beside those that a robot's models predict, before and after calibration.
 
 
 @dataclass(frozen=True, eq=False)

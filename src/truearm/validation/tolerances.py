@@ -19,14 +19,11 @@ from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.robot import Robot
 from truearm.validation.lines import CONVENTION, design
 
-# Tolerances of a joint's assembly from its errors, errors from tolerances, and what they do at the flange.
-#
+
 # Source: KR5 paper, sections 2.3 and 4.3. A hole of depth l whose far end may lie delta aside of its place lets the
 # axis lean by ``atan(delta / l)`` (equation 8): perpendicularity if the axis is square to its datum, parallelism if it
 # goes along it. Towards mu, from x to y, it leans by ``egamma = -atan(delta sin(mu) / l)`` and ``ebeta = atan(delta
 # cos(mu) cos(egamma) / l)`` (9 and 10, which print them for ``Ry Rx`` and without the sign; equation 5 has ``Rx Ry``).
-
-
 @dataclass(frozen=True)
 class Tolerance:
     """What one joint's assembly uses of its tolerances."""
@@ -107,9 +104,6 @@ def flange_error(robot: Robot, leans: Sequence[float], positions: Sequence[float
             float(np.sqrt((leaning**2).sum(axis=0) + (shifts**2).sum()).max()),
         ),
     )
-
-
-# What joint errors use of their tolerances, and what tolerances may do at the flange.
 
 
 @dataclass(frozen=True, eq=False, repr=False)

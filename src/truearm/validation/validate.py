@@ -55,8 +55,6 @@ from truearm.validation.region import (
     region_distances,
 )
 
-# How a robot agrees with measurements it was not identified from.
-
 #: What a validation writes into its folder.
 VALIDATION_FILES: Final = ("result.json", "report.html")
 

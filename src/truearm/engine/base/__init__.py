@@ -1,1 +1,1 @@
-"""Refusals, units, limits; files as they are read, written and replaced; parts of great work."""
+"""Refusals, units, limits; files as they are read, written and replaced; work done in parts."""

@@ -1,4 +1,4 @@
-"""What an object shows of itself where a person looks at it."""
+"""Errors and notices: :class:`InputError`, :class:`Notice`, printable text, and short displays of objects."""
 
 from __future__ import annotations
 
@@ -56,8 +56,6 @@ def _steers(character: str) -> bool:
 def _escaped(character: str) -> str:
     return ascii(character)[1:-1]
 
-
-# The one exception for input that cannot be used.
 
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.
 _NAMED: Final = re.compile(r"`(?P<name>[a-z][a-z_]*)(?:=(?P<value>[^`]*))?`")
@@ -209,8 +207,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str | None:
     near = nearest_names(name, known)
     return f"Did you mean {' or '.join(near)}?" if near else None
 
-
-# What a person should know about a result although nothing failed.
 
 #: ``note``: good to know. ``warning``: a figure may not hold. ``error``: the result should not be used as it is.
 Level = Literal["note", "warning", "error"]

@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster: reached through its scheduler, which runs whatever it is sent."""
+"""Parts of work done by workers, also those of a Dask cluster, whose scheduler runs whatever it is sent."""
 
 from __future__ import annotations
 
@@ -335,8 +335,7 @@ def _distributed() -> Any:
     return distributed
 
 
-# Parts of great work, done by whoever there is: a bounded number at once, results as they come, the lost repeated.
-
+# Parts of work: a bounded number at once, results as they come, lost ones repeated.
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 

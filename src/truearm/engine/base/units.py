@@ -1,6 +1,7 @@
-"""Whether something comes from a virtual instrument, and how that is said: first, in one line, everywhere alike.
+"""Units at the edges, SI units inside; and the mark of what comes from a virtual instrument.
 
-Data and robots carry a mark, `simulated`. Whatever holds them says by ``simulated_from`` which of the two have it.
+A unit is written in the header of every column and beside every number that leaves the program. Nothing is
+ever guessed from magnitudes.
 """
 
 from __future__ import annotations
@@ -12,11 +13,6 @@ from functools import cache
 from typing import Final, Literal
 
 from truearm.engine.base.errors import InputError, did_you_mean
-
-# Units at the edges; metres, radians, newtons and kilograms inside.
-#
-# A unit is written in the header of every column and beside every number that leaves the program. Nothing is
-# ever guessed from magnitudes.
 
 # How many of the unit make one SI unit (lengths, grams and times, as divisors) or how much SI one unit is (angles,
 # inch): mm to m divides by 1000, which is correctly rounded, where multiplying by 0.001 is not.
@@ -177,6 +173,10 @@ def checked_unit(
         cure=" ".join(filter(None, (meant, "Units are never guessed: name it."))),
     )
 
+
+# Whether something comes from a virtual instrument, and how that is said: first, in one line, everywhere alike.
+#
+# Data and robots carry a mark, `simulated`. Whatever holds them says by ``simulated_from`` which of the two have it.
 
 #: What can be simulated of a result: the measurements, or the calibration of the robot.
 Marked = Literal["data", "robot"]

@@ -31,7 +31,6 @@ from truearm.engine.robot.chain import Array
 # A configuration of a grid or a path has neighbours that are almost the same. A fold of single ones would praise a
 # model for what it took from them. There the folds are made of blocks of neighbours in joint space (Roberts and others
 # 2017, "Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic structure").
-
 FOLDS: Final = 5
 #: How the configurations lie: anywhere, along a way from one to the next, on few positions of each joint, or close to
 #: each other.

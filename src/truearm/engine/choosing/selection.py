@@ -4,7 +4,7 @@ One fit is linearised, and every effect that the robot and the data say somethin
 (:mod:`truearm.engine.choosing.candidates`). Held-out errors of any choice among them then follow in closed form
 (:mod:`truearm.engine.choosing.cross_validation`): of all that are not worse than the best one by a
 standard error, the choice with the fewest parameters is taken. What is taken has to hold in real fits, whose weights,
-penalties and periods are found inside the training folds (:mod:`truearm.engine.choosing.selection`).
+penalties and periods are found inside the training folds.
 """
 
 from __future__ import annotations
@@ -43,8 +43,6 @@ from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.effects.fourier import Fourier
 from truearm.engine.robot.effects.joint_curve import HIGHEST, JointCurve
 from truearm.engine.robot.robot import Robot
-
-# What was chosen, and why: the record of a choice among joint effects.
 
 AUTO: Final = "auto"
 COMPLIANCE: Final = "compliance"
@@ -148,8 +146,6 @@ def model_with(effects: Sequence[str], candidates: Sequence[str] = SELECTABLE) -
     groups = named_model("geometric").groups
     return Model(AUTO, summary, groups, names, tuple(name for name in candidates if name not in names))
 
-
-# Cross-validation by real fits: in every fold the weights, penalties and periods are found from the rest alone.
 
 _TOLERANCE: Final = 1e-3  # priors; errors of folds are not compared more closely
 

@@ -1,4 +1,4 @@
-"""Robots that are read from a calibration by zones."""
+"""Zones of the workspace: boxes, a model for each, and robots that are read from a calibration by zones."""
 
 from __future__ import annotations
 
@@ -29,8 +29,6 @@ from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.entries import STRICT, Name, NotNegative, Number
 from truearm.engine.robot.transform import IDENTITY, Transform
-
-# Where zones of the workspace are: boxes that are named in a file, or cut so that all hold about as much.
 
 #: What a file of zones begins with.
 SCHEMA: Final = "truearm-zones/1"

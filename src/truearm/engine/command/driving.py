@@ -1,4 +1,4 @@
-"""What goes to poses: a target of the robot file by its name, or a place in the flange frame."""
+"""What jobs are told of how an arm is driven: its cell, plans to be replaced, and what goes to the poses."""
 
 from __future__ import annotations
 
@@ -36,8 +36,6 @@ from truearm.engine.motion.constraints import Constraints, joint_window, keep_ou
 from truearm.engine.motion.home import checked_home, safe_configuration
 from truearm.engine.motion.ways import WayFinder
 from truearm.engine.robot.robot import Robot
-
-# What jobs are told of where an arm is driven: a floor, boxes, room to keep, and a safe configuration.
 
 
 def constraints_argument(constraints: object) -> Constraints | None:
@@ -130,8 +128,6 @@ def finder_argument(
 
 
 # Plans that stand where another shall be written: what truearm wrote may be replaced, and that is told.
-
-
 def plan_files_for(names: Collection[str], out: Path, *read: object) -> None:
     """Refuse places of files beside each other that cannot be, that others wrote or changed, or of another result.
 

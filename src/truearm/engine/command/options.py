@@ -1,4 +1,4 @@
-"""Options about a cube and what goes to the poses in it."""
+"""Options that commands share, how refusals name them, and what commands print."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from truearm.engine.base.errors import Notice
     from truearm.engine.document.records import Record
 
-
-# How the command names what jobs call by their parameters.
 
 JointsAreText = Annotated[
     str | None,
@@ -172,7 +170,6 @@ def by_device(command: C, others: Mapping[str, Callable[..., None]]) -> C:
 
 
 # What commands print: results on standard output, progress on standard error.
-
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")]
 
 
@@ -215,7 +212,6 @@ def print_line(line: str, *, err: bool = False) -> None:
 
 
 # Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), and notes.
-
 PayloadText = Annotated[
     str | None,
     typer.Option(

@@ -1,4 +1,4 @@
-"""Readings that were excluded, as results tell of them."""
+"""Robots and measurements that jobs load, and readings that are excluded."""
 
 from __future__ import annotations
 
@@ -62,8 +62,6 @@ def reasons(excluded: Sequence[Excluded]) -> str:
         found[one.row.reason] += one.readings
     return ", ".join(f"{reason} ({count})" for reason, count in found.items())
 
-
-# Readings that a job is told to exclude, and what is said of it.
 
 _RULE: Final = (
     "Exclude readings for reasons of the instrument alone: to exclude what fits badly, or to repeat it, falsifies the "
@@ -157,9 +155,6 @@ def check_excluded(
     ]
 
 
-# A robot by library id or from a file.
-
-
 def load_robot(robot: Robot | str | Path) -> Robot:
     """Return a robot.
 
@@ -175,9 +170,6 @@ def load_robot(robot: Robot | str | Path) -> Robot:
         If there is no such robot, or its file cannot be used; the message names the entry.
     """
     return robot_argument(robot)
-
-
-# Measurements from a canonical CSV file.
 
 
 def load_data(data: Dataset | str | Path, robot: Robot | str | Path | None = None) -> Dataset:

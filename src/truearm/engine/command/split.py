@@ -1,4 +1,4 @@
-"""What a robot's calibration says against its use: refused for programs unless accepted, told otherwise."""
+"""The split into training and held-out configurations, and what a calibration says against its use."""
 
 from __future__ import annotations
 
@@ -23,8 +23,6 @@ from truearm.engine.robot.robot_file.seal import arm_is_known, is_intact
 if TYPE_CHECKING:
     from truearm.engine.programs.program import Language
 
-
-# Which configurations train and which judge, and what speaks against the split.
 
 #: How a calibration says in the robot's history which configurations of which data it was trained on: by the hash of
 #: the file, of the readings, or of both; and how many it left out.

@@ -1,9 +1,4 @@
-"""The poses the device can measure: every design, every way to assemble it, without those that hit the fixture.
-
-A design can be assembled in four ways above the base. Half of these 144 assemblies put the flange between the tool's
-cups and the base, where arm and bar would meet; the other half are the 72 poses. They are numbered as in Nubiola's
-Figure 3.6, as far as the pairs printed in section 3.2 tell.
-"""
+"""The hexapod ballbar device: its designs, its kinematics in closed form, and the poses it can measure."""
 
 from __future__ import annotations
 
@@ -22,7 +17,7 @@ from truearm.engine.robot.transform import cross, dot, rigid_motion, rotation_ve
 #
 # The base fixture and the tool fixture carry three cups each, B1 to B3 and T1 to T3. A design says which of them are
 # joined by the six legs: one base cup has two legs, the next three, the last one, so that one tool cup after the other
-# can be found (:mod:`truearm.engine.data.hexapod`).
+# can be found.
 
 #: Three cups of a fixture in some order, counted from 0.
 Order = tuple[int, int, int]
@@ -144,8 +139,6 @@ def triangle(sides: Sequence[float] | Array, fixture: str) -> Array:
     return cups.reshape(3, 3, *shape)
 
 
-# From lengths to the pose and back, in closed form (Nubiola, 3.3).
-
 #: On which side of their three feet the second and the third tool cup lie, for the document's solutions 1 to 4.
 SOLUTIONS: Final = {1: (1, 1), 2: (1, -1), 3: (-1, 1), 4: (-1, -1)}
 
@@ -248,6 +241,9 @@ _LEADS: Final = (0, 2, 1)
 _FIRST_LEADS: Final = (1, 0, 2)
 
 
+# A design can be assembled in four ways above the base. Half of these 144 assemblies put the flange between the tool's
+# cups and the base, where arm and bar would meet; the other half are the 72 poses. They are numbered as in Nubiola's
+# Figure 3.6, as far as the pairs printed in section 3.2 tell.
 @dataclass(frozen=True, eq=False)
 class HexapodPose:
     """One pose that the device can measure, at nominal lengths, in the frame of the base fixture."""

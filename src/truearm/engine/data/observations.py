@@ -1,4 +1,4 @@
-"""A target as something else sees it: the instrument, or a fixture beside the robot."""
+"""Observations: what readings of a target are compared with, and how predictions move."""
 
 from __future__ import annotations
 
@@ -96,11 +96,7 @@ class Sighting:
         return np.stack([np.sum(axis * vector, axis=at) for axis in self.fixture.rotation], axis=at)
 
 
-# What is compared: an observation predicts a reading from a sighting and knows how the prediction moves.
-#
 # Residuals are prediction minus measurement, so adding a parameter step times the Jacobian moves the prediction.
-
-
 class Observation(ABC):
     """A kind of reading."""
 

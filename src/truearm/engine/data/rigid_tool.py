@@ -119,8 +119,6 @@ def _listed(runs: Sequence[tuple[str, int]], thing: str) -> str:
 
 
 # Where targets were read, configuration by configuration: as many places as readings, and no table of both.
-
-
 @dataclass(frozen=True, eq=False)
 class Places:
     """Positions in the order of their configurations, and in each of them in that of their targets."""

@@ -1,4 +1,4 @@
-"""The motion of the robot's table, seen in reference points that were measured along with the targets."""
+"""Error statistics, and the motion of the robot's table as reference points show it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from truearm.engine.robot.chain import Array, ForwardKinematics
 from truearm.engine.robot.parameters import SCALE
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import quaternion_from_rotation, rigid_motion, rotation_from_quaternion
-
-# Error statistics: how far predictions are from readings.
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A part of a large campaign that is small enough to be compared with a robot, and still tells as much of it."""
+"""Copies and repeated postures in a campaign, and a small part of it that still tells as much."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ import numpy as np
 from truearm.engine.base.errors import Notice, counted, listed
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.dataset_fields import drawn_from
-
-# What stands twice in a campaign: readings and joint positions that were copied, postures that were visited again.
 
 #: Readings at the same joint positions agree within this, whatever loads the arm and from wherever it came [m].
 _LARGEST_CHANGE: Final = 5e-3

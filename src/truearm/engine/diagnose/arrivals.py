@@ -1,13 +1,4 @@
-"""Are the declared deviations far larger than what the readings scatter by.
-
-Residuals alone may not show it. Where sigma is so large that the priors hold the parameters back, the residuals are as
-large as the robot's own errors. So the deviation is sought with which a fit agrees with itself: its residuals, per
-degree of freedom, are as large as it was told. Near the solution a fit is linear, and in the directions of the singular
-value decomposition of its Jacobian per prior each parameter is found alone, so no fit is repeated.
-
-Where joints err at every arrival the residuals are large for that reason, and a sigma that is too large takes a part of
-it for noise. So the likelihood with that sigma is compared with the one in which the noise is free.
-"""
+"""Joint errors at arrivals: lag, separate visits, and declared deviations that are far too large."""
 
 from __future__ import annotations
 
@@ -296,6 +287,14 @@ _MOST_TOLD: Final = 10.0
 _SMALLEST_RATIO: Final = 1e-7
 
 
+# Residuals alone may not show a sigma that is too large. Where sigma is so large that the priors hold the parameters
+# back, the residuals are as large as the robot's own errors. So the deviation is sought with which a fit agrees with
+# itself: its residuals, per degree of freedom, are as large as it was told. Near the solution a fit is linear, and in
+# the directions of the singular value decomposition of its Jacobian per prior each parameter is found alone, so no fit
+# is repeated.
+#
+# Where joints err at every arrival the residuals are large for that reason, and a sigma that is too large takes a part
+# of it for noise. So the likelihood with that sigma is compared with the one in which the noise is free.
 def check_sigma(left: LeftOver) -> list[Notice]:
     """Return a notice if the declared deviations of the readings are far too large."""
     fit = left.fit

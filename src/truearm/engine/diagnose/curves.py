@@ -1,10 +1,4 @@
-"""Readings that a robust loss holds back, and that lie to one side.
-
-Losses such as Huber's are right on average where outliers scatter to all sides. Outliers that lie to one side pull the
-fit along, by less than they would pull least squares, and no interval contains that bias. The sides are compared by
-arrival with what chance does to directions in space (Rayleigh's test; Mardia and Jupp 2000, "Directional statistics",
-section 10.4.1).
-"""
+"""What readings say of the joints' curves, and readings on one side that a loss holds back."""
 
 from __future__ import annotations
 
@@ -27,8 +21,6 @@ from truearm.engine.robot.effects.fourier import Fourier
 from truearm.engine.robot.effects.joint_curve import HIGHEST, JointCurve, curve_names, curve_waves
 from truearm.engine.robot.loads import has_weight
 from truearm.engine.robot.parameters import FreeParameters
-
-# What data say about the joints' curves: which joints got none, and where those that were found are known.
 
 #: A joint that turned through less [rad] can hardly tell a curve from geometry.
 _LITTLE: Final = math.radians(30.0)
@@ -193,6 +185,12 @@ _LEAST: Final = 8
 _BEYOND_CHANCE: Final = 21.1
 
 
+# Readings that a robust loss holds back, and that lie to one side.
+#
+# Losses such as Huber's are right on average where outliers scatter to all sides. Outliers that lie to one side pull
+# the fit along, by less than they would pull least squares, and no interval contains that bias. The sides are compared
+# by arrival with what chance does to directions in space (Rayleigh's test; Mardia and Jupp 2000, "Directional
+# statistics", section 10.4.1).
 def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
     """Return a notice if positions that a loss holds back lie to one side.
 
@@ -223,8 +221,6 @@ def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
         )
     ]
 
-
-# The curves of the joints that a fit found: how large, how often they err, and how well each angle is known.
 
 #: Angles without a training configuration that are wider than this are outside the measured range [rad].
 _GAP_FOUND_CURVES: Final = math.radians(20.0)

@@ -1,10 +1,4 @@
-"""What is to be known where an external force acts on the tool: does the model know how the arm gives way to it.
-
-Gravity loads the joints of a calibration, and nothing else does: it never turns the upright axis of joint 1, so its
-compliance stays what the prior said, and no prediction at rest depends on it. A sideways force at the tool turns that
-joint. What each parameter of the joints' elasticity does to the tip is compared with and without the force; with the
-deviations that the calibration found, the difference says how well the bending is known.
-"""
+"""What to know of payloads and of external forces on the tool."""
 
 from __future__ import annotations
 
@@ -22,8 +16,6 @@ from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY, Transform
 from truearm.engine.robot.wrench import STANDARD_GRAVITY
-
-# Could an arm of this size carry the payload that is given.
 
 #: Payload over the cube of the reach that no arm carries [kg/m^3]. Strong ones carry 45 (2300 kg at 3.7 m), the IRB 120
 #: 15 (3 kg at 0.58 m).
@@ -75,6 +67,10 @@ class _Bending:
     rigid: bool  #: Whether no joint gives way although the force loads some.
 
 
+# Gravity loads the joints of a calibration, and nothing else does: it never turns the upright axis of joint 1, so its
+# compliance stays what the prior said, and no prediction at rest depends on it. A sideways force at the tool turns that
+# joint. What each parameter of the joints' elasticity does to the tip is compared with and without the force; with the
+# deviations that the calibration found, the difference says how well the bending is known.
 def check_force(cases: Sequence[tuple[Robot, Array | Postures]]) -> list[Notice]:
     """Return what is to be said of forces at the tool, or at the flange.
 

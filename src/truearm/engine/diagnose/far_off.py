@@ -1,4 +1,4 @@
-"""Orientations that a robust fit leaves far off, where the positions are right."""
+"""Readings and orientations that a robust fit leaves far off."""
 
 from __future__ import annotations
 

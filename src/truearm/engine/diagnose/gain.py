@@ -1,10 +1,4 @@
-"""How well the robot comes back to a posture, from postures that were visited again.
-
-Readings of a target at the same joint positions, on separate visits, differ by the robot's repeatability and the noise
-of the instrument; no model of the robot is needed. ISO 9283 states it as RP, the mean distance of the visits from their
-barycentre plus three of its standard deviations. Here the scatter of all postures is taken together, the share of the
-instrument is taken out, and RP follows from the distances of a normal distribution with that scatter.
-"""
+"""Is the calibrated robot better than the nominal one on unseen configurations, and how well does it repeat."""
 
 from __future__ import annotations
 
@@ -19,8 +13,6 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
 from truearm.engine.robot.chain import Array
 
-# Is the calibrated robot better than the nominal one, or worse, at configurations that the fit has not seen.
-#
 # Both robots predict the same readings, so their errors are compared in pairs, one pair for each posture: readings of a
 # posture share its errors and are not independent. The signed-rank test (Wilcoxon 1945) needs neither normal errors nor
 # errors of one size, and a few wrong readings, which both robots miss alike, do not decide it. With fewer than seven
@@ -134,6 +126,10 @@ _SAME_REPEATABILITY: Final = 1e-9
 _LEAST_FREEDOM: Final = 10
 
 
+# Readings of a target at the same joint positions, on separate visits, differ by the robot's repeatability and the
+# noise of the instrument; no model of the robot is needed. ISO 9283 states it as RP, the mean distance of the visits
+# from their barycentre plus three of its standard deviations. Here the scatter of all postures is taken together, the
+# share of the instrument is taken out, and RP follows from the distances of a normal distribution with that scatter.
 @dataclass(frozen=True)
 class Repeatability:
     """Of a robot, at the postures that were visited again."""

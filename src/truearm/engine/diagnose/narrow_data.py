@@ -1,4 +1,4 @@
-"""Notice readings that are hardly more numbers than the parameters of a model take up."""
+"""Readings that are too few for a model or too narrow for the workspace, and parameters that move the arm alike."""
 
 from __future__ import annotations
 

@@ -46,8 +46,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.fourier import Fourier
 from truearm.engine.robot.effects.joint_curve import JointCurve
 
-# The steps for what is wrong with configurations, for what moved, and for another model, in words.
-
 #: Configurations named one by one.
 _NAMED: Final = 3
 

@@ -4,7 +4,7 @@ A configuration that is left out moves the fit. What its readings are off then b
 residuals and the share that the free parameters take of them, without another fit (mean-shift outliers: Cook and
 Weisberg 1982, "Residuals and Influence in Regression", section 2.2.2). The worst configuration is left out first, then
 the worst of the rest, because several of them hide each other. What the readings are off by is held against an error of
-one joint (`wrong_joint.py`), which moves all targets of the configuration together.
+one joint (:func:`wrong_joint`), which moves all targets of the configuration together.
 """
 
 from __future__ import annotations

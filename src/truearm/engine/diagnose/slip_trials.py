@@ -1,11 +1,4 @@
-"""Slips with orientations: quaternions in another order, turns the other way round, angles of another convention.
-
-Readings hold quaternions alone. What three angles they came from is not known, so every way to write three numbers is
-tried as the one that was taken, with every other one as the one that was meant: the numbers are found again from the
-orientations by the first, and read by the second. Twelve orders of axes that move along and the same twelve about fixed
-axes (Craig, Introduction to Robotics, appendix B), and rotation vectors; in radians, and in radians that were called
-degrees.
-"""
+"""Slips with units, signs, orders, axes and orientations, each as the data would be with it corrected."""
 
 from __future__ import annotations
 
@@ -32,8 +25,6 @@ from truearm.engine.robot.transform import (
     rotation_vector,
     turned_about,
 )
-
-# The slips that people make with units, signs, orders and axes, each as the data would be with it mended.
 
 #: Largest ratio of the stretches along three axes that is still called a scale.
 _MOST_UNEVEN: Final = 1.2
@@ -246,6 +237,14 @@ def shifted(data: Dataset) -> Iterator[Slip]:
         said = f"The readings of each configuration fit the joint positions of the one {words} it: the columns are "
         yield Slip("rows-shifted", said + "shifted by one row. Shift them back", replace(data, joints=joints))
 
+
+# Slips with orientations: quaternions in another order, turns the other way round, angles of another convention.
+#
+# Readings hold quaternions alone. What three angles they came from is not known, so every way to write three numbers is
+# tried as the one that was taken, with every other one as the one that was meant: the numbers are found again from the
+# orientations by the first, and read by the second. Twelve orders of axes that move along and the same twelve about
+# fixed axes (Craig, Introduction to Robotics, appendix B), and rotation vectors; in radians, and in radians that were
+# called degrees.
 
 #: Codes of what is told here.
 ORIENTATION_SLIPS: Final = frozenset({"quaternion-order", "orientation-order"})

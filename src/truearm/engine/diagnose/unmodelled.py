@@ -35,8 +35,6 @@ from truearm.engine.robot.parameters import FreeParameters, Parameter
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 
-# What a fit leaves of all readings, and what its own parameters could still take of it.
-
 #: Share of the squares of a residual that rounding leaves where parameters explain all of it.
 _ALL_EXPLAINED: Final = 1e-12
 

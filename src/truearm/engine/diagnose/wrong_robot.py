@@ -1,4 +1,4 @@
-"""Can what was fitted be this robot: the rule behind the status ``implausible``.
+"""Can what was fitted be this robot: the rules behind the status ``implausible`` and behind ``wrong-robot``.
 
 A fit converges on anything. Readings that have nothing to do with the robot leave it at its nominal values, with
 residuals as large as the arm; readings in a wrong unit bend it into another robot that agrees with them to the last

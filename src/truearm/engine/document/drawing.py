@@ -1,4 +1,4 @@
-"""Several plane pictures of one kind side by side."""
+"""Numbers as text, and parts of pictures: Plotly figures as dictionaries, so that Plotly is not imported."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.engine.robot.chain import Array
-
-# Numbers with as many digits as mean something.
 
 
 def significant(value: float, digits: int = 3, decimals: int = 4) -> str:
@@ -74,8 +72,6 @@ def rounded_to(values: Array, decimals: int) -> list[Any]:
     made: list[Any] = (np.round(np.asarray(values, float), decimals) + 0.0).tolist()
     return made
 
-
-# What all pictures have in common: plain Plotly figures, that is dictionaries, so that Plotly need not be imported.
 
 Figure = dict[str, Any]
 

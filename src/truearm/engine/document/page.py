@@ -1,4 +1,4 @@
-"""A page of a few sentences, tables and pictures: what results have that need no page of their own kind."""
+"""One HTML file that needs nothing else, not even a network: style, scripts and data are inside."""
 
 from __future__ import annotations
 
@@ -30,8 +30,6 @@ from truearm.engine.base.units import parts_of, said_of, without_mark
 from truearm.engine.base.version import __version__
 from truearm.engine.document.drawing import AFTER, BEFORE, DARK, Figure
 
-# One HTML file that needs nothing else, not even a network: style, scripts and data are inside.
-
 #: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
 _UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
 #: Part of a text, and of nothing else that JSON has.
@@ -42,7 +40,7 @@ def page(template: Path, figures: Mapping[str, Figure], of: object, **content: A
     """Return a page.
 
     Args:
-        template: A template; it includes ``style.css.jinja`` and ``script.html.jinja`` of this room.
+        template: A template; it includes ``style.css.jinja`` and ``script.html.jinja`` of this package.
         figures: Pictures by the name of their place on the page.
         of: The record that it tells about: if that is simulated, the page begins with it.
         content: What the template tells about.

@@ -1,4 +1,4 @@
-"""Measurements that came from files of other programs."""
+"""What every result is: figures with a short text of their own."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from truearm.engine.base.units import Marked, parts_of, with_mark
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
-
-# What every result is: figures with a short text of their own.
 
 
 class Record(ABC):

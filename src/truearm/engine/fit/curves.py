@@ -1,4 +1,4 @@
-"""Curves of the joints in a fit: which coefficients are free, and what is expected of each."""
+"""Curves of the joints in a fit: free coefficients, what is expected of each, and what they are off by."""
 
 from __future__ import annotations
 

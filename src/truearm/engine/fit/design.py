@@ -1,4 +1,4 @@
-"""Which of many possible measurements tell most: a choice by exchange.
+"""Which of many possible measurements tell most: observability indices, and a choice by exchange.
 
 Measurements are added one at a time, then each is exchanged for a better one as long as there is one (Fedorov 1972,
 "Theory of optimal experiments"; Cook and Nachtsheim 1980). What each candidate would add is looked at to first order,
@@ -37,7 +37,6 @@ from truearm.engine.robot.chain import Array
 # reading divided by its deviation, and a column is the move of a parameter by its size: 1 mm and 0.1 deg for base,
 # targets, joint zeros and geometry (or the robot file's own priors), for joint effects what they are believed to be
 # at most. Priors count as measurements. A parameter that no candidate can tell from the others is left out.
-
 _SMALLEST: Final = 1e-300  # for logarithms of what rounding makes zero or less
 
 

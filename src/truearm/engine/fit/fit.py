@@ -1,9 +1,4 @@
-"""What parameters are uncertain by, from fits to configurations drawn anew from those that were measured.
-
-Efron (1979): whole configurations are drawn with replacement, because readings of one share errors of the joints, and
-each draw is fitted as the readings were, under the same loss and bounds. It needs no model of the residuals, and no
-derivative of a loss that has none, such as a sum of absolute values.
-"""
+"""From a nominal robot and training data to an identified robot, and uncertainties by bootstrap."""
 
 from __future__ import annotations
 
@@ -60,6 +55,9 @@ LEAST_FITS: Final = 20
 _SMALL: Final = 1e-4
 
 
+# Efron (1979): whole configurations are drawn with replacement, because readings of one share errors of the joints, and
+# each draw is fitted as the readings were, under the same loss and bounds. It needs no model of the residuals, and no
+# derivative of a loss that has none, such as a sum of absolute values.
 def refit_draws(
     solved: Solved, loss: Loss, count: int, seed: int = 0, progress: Callable[[str], None] = lambda _: None
 ) -> Array:
@@ -107,8 +105,6 @@ def _bar(done: int, count: int, width: int = 20) -> str:
     full = width * done // count
     return f"[{'#' * full}{'.' * (width - full)}]"
 
-
-# From a nominal robot and training data to an identified robot, with what is known about every parameter.
 
 #: ``uninformed``: the data removed less than 5 % of the prior variance, so the value is still a belief.
 ParameterStatus = Literal["identified", "uninformed", "at-bound", "not-determined", "dropped", "held", "fixed"]

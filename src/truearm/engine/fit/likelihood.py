@@ -17,14 +17,13 @@ from truearm.engine.fit.problem import Evaluation, Problem, Rows
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import FreeParameters
 
+
 # What readings of one arrival share: the robot stops once, and every target is read with the same joint errors.
 #
 # With errors of the joints of variance S, the residuals of an arrival, each divided by its own deviation, have the
 # covariance ``V = I + G S G'``, where G is their derivative by the joints. Multiplied by ``V^-1/2`` they are
 # independent again. With ``H = G S^1/2`` that is ``I - H f(H'H) H'`` for a function f of a small matrix, so no matrix
 # of all rows is ever formed.
-
-
 @dataclass(frozen=True, eq=False)
 class Arrivals:
     """Equations gathered by arrival."""

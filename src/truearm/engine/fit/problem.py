@@ -1,13 +1,4 @@
-"""Which parameters cannot be told apart, and in which combination (Nubiola, section 2.5.1; Patel, section 2.3).
-
-Columns are looked at in a fixed order (base, targets, joint zeros, geometry from base to tip), first for those
-that stand well apart from the earlier ones, then for those that stand less and less apart; what the others span
-exactly is redundant, and its coordinates in them are the combination. Taking the first that fits in one pass would
-keep, between two axes that are nearly parallel, the slide that is almost spanned and hold the tilt that is not:
-the classical weakness of DH parameters again. A column of whitened readings that is shorter than a third of a prior
-tells nothing either. Columns are scaled by the parameters' priors, that is to physical
-size, never by their own norm alone: a column of rounding noise must stay noise.
-"""
+"""The whitened residual of a robot on a dataset, its Jacobian, and parameters that cannot be told apart."""
 
 from __future__ import annotations
 
@@ -38,8 +29,6 @@ from truearm.engine.robot.parameters import (
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 
-# The whitened residual of a robot on a dataset, and its Jacobian.
-#
 # Every residual is divided by its standard deviation before it is stacked, so metres never meet radians; a prior is
 # one more row, (value - nominal) / deviation.
 
@@ -442,6 +431,15 @@ _NEGLIGIBLE_UP_TO_GAUGE: Final = 1e-3  # the same up to gauge freedoms: noise hi
 _LEAST_INVOLVED: Final = 0.1  # share of a parameter in the lost directions
 
 
+# Which parameters cannot be told apart, and in which combination (Nubiola, section 2.5.1; Patel, section 2.3).
+#
+# Columns are looked at in a fixed order (base, targets, joint zeros, geometry from base to tip), first for those
+# that stand well apart from the earlier ones, then for those that stand less and less apart; what the others span
+# exactly is redundant, and its coordinates in them are the combination. Taking the first that fits in one pass would
+# keep, between two axes that are nearly parallel, the slide that is almost spanned and hold the tilt that is not:
+# the classical weakness of DH parameters again. A column of whitened readings that is shorter than a third of a prior
+# tells nothing either. Columns are scaled by the parameters' priors, that is to physical
+# size, never by their own norm alone: a column of rounding noise must stay noise.
 @dataclass(frozen=True)
 class Redundancy:
     """A direction in which the parameters can move without changing any reading."""

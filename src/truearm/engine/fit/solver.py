@@ -26,7 +26,6 @@ from truearm.engine.robot.parameters import FreeParameters
 # Unlike the sum of distances (:mod:`truearm.engine.fit.losses`) it depends on how the axes of the instrument
 # lie. Each step is a linear program: with the linearised residual ``J s + r``, minimise ``sum t`` where
 # ``-t <= J s + r <= t``. Its solution is a vertex, so few steps do.
-
 _STEPS: Final = 60
 _LEAST_PROMISE: Final = 1e-9  # share of the objective that a step must promise
 _SMALLEST: Final = 1e-9  # longest step [priors] below which steps that fail are given up
@@ -92,8 +91,6 @@ def _linear_program(A: Array, r: Array, room: Array) -> tuple[Array, float]:
         raise ArithmeticError(f"the linear program of a step was not solved: {found.message}")
     return np.asarray(found.x[:count]), float(found.fun)
 
-
-# Who looks on while a solver takes its steps.
 
 #: Called at every step with the problem, the vector of its free parameters ``(parameters,)`` and the cost there: the
 #: sum of squares that is made small.

@@ -1,11 +1,4 @@
-"""What parameters are uncertain by where no model of the residuals holds: from the scatter of the arrivals themselves.
-
-The parameters answer to the sum of the arrivals' pulls, so the variance of that sum, found from the pulls, gives theirs
-(Huber 1967; Liang and Zeger 1986): ``H^-1 (M + K) H^-1`` with H the information, K that of the priors, and M the sum
-of the squared pulls. A fit has followed each arrival part of the way; the pulls are those of Bell and McCaffrey (2002,
-their second estimator), which are right on average where arrivals are alike and independent, and an interval has their
-degrees of freedom (Pustejovsky and Tipton 2018). With priors all of that holds as it stands, if truths come from them.
-"""
+"""The variances of readings and joints, and what parameters are uncertain by because of them."""
 
 from __future__ import annotations
 
@@ -419,6 +412,14 @@ _LEAST_FREEDOM: Final = 1.0
 _KEPT: Final = 16_000_000
 
 
+# What parameters are uncertain by where no model of the residuals holds: from the scatter of the arrivals themselves.
+#
+# The parameters answer to the sum of the arrivals' pulls, so the variance of that sum, found from the pulls, gives
+# theirs (Huber 1967; Liang and Zeger 1986): ``H^-1 (M + K) H^-1`` with H the information, K that of the priors, and M
+# the sum of the squared pulls. A fit has followed each arrival part of the way; the pulls are those of Bell and
+# McCaffrey (2002, their second estimator), which are right on average where arrivals are alike and independent, and an
+# interval has their degrees of freedom (Pustejovsky and Tipton 2018). With priors all of that holds as it stands, if
+# truths come from them.
 def cluster_covariance(
     parts: Callable[[], Iterable[tuple[Rows, Array, Array]]],
     arrivals: Arrivals,

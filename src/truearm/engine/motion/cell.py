@@ -1,4 +1,4 @@
-"""How far apart two line segments are, the cores of capsules, and how far a segment is from a box."""
+"""What stands around an arm, and how far its links are from it and from each other."""
 
 from __future__ import annotations
 
@@ -74,8 +74,6 @@ def box_distance(p: Array, q: Array, low: Array, high: Array) -> Array:
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray(a[..., 0, :] * b[..., 0, :] + a[..., 1, :] * b[..., 1, :] + a[..., 2, :] * b[..., 2, :])
 
-
-# Whether an arm touches itself, with a capsule along the line from each joint to the next.
 
 _LENGTH: Final = 1e-3  # m: what is shorter is no link of its own
 #: Less room, and not zero, is meant in another unit [m].
@@ -177,8 +175,6 @@ def _apart(robot: Robot, q: Array | Postures) -> tuple[_Segments, list[tuple[int
 def _distance(segments: _Segments, i: int, j: int) -> Array:
     return segment_distance(*(end.T for end in (*segments[i], *segments[j])))
 
-
-# What an arm must keep clear of where it is driven: a floor, boxes and its own links.
 
 #: Room that is kept between the arm and everything else, unless told [m].
 CLEARANCE: Final = 0.05

@@ -22,8 +22,6 @@ from truearm.engine.motion.cell import FLOOR, Cell, box_distance, segment_distan
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 
-# What is kept clear of what, and how much room there is between the two.
-
 
 @dataclass(frozen=True)
 class Piece:

@@ -1,4 +1,4 @@
-"""Where joints are drawn: within their limits, on their principal turn unless limits force another."""
+"""Where an arm may be measured: limits, loads, places, lines of sight (Nubiola, section 2.5)."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.loads import joint_loads
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
-
-# Where an arm may be measured: limits, loads, places, lines of sight (Nubiola, section 2.5).
 
 Allowed = NDArray[np.bool_]
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -166,7 +164,7 @@ def allowed(
 def refuse_clearance_of(robot: Robot, constraints: Constraints | None, where: str) -> None:
     """Refuse a clearance of the constraints that would say nothing of links that can meet.
 
-    See :func:`~.clearance.refuse_clearance`; `robot` has its targets, `where` names the constraints file.
+    See :func:`.refuse_clearance` of the cell; `robot` has its targets, `where` names the constraints file.
     """
     if constraints is not None and constraints.clearance is not None:
         place = f"{where}, clearance"

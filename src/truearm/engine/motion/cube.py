@@ -1,8 +1,4 @@
-"""The seven-direction line test: poses along the axes and diagonals of a box (KR5 paper, sections 3.1 and 4.2).
-
-The document does not say where its lines lie in their box of 600 x 800 x 400 mm. Here all of them go through the middle
-of the box, from side to side, from edge to edge and from corner to corner.
-"""
+"""Poses to test: the cube of ISO 9283 in the workspace, and the seven-direction line test of a box."""
 
 from __future__ import annotations
 
@@ -157,6 +153,10 @@ POSES_EACH: Final = 11
 DOWN: Final = np.diag([1.0, -1.0, -1.0])
 
 
+# The seven-direction line test: poses along the axes and diagonals of a box (KR5 paper, sections 3.1 and 4.2).
+#
+# The document does not say where its lines lie in their box of 600 x 800 x 400 mm. Here all of them go through the
+# middle of the box, from side to side, from edge to edge and from corner to corner.
 @dataclass(frozen=True, eq=False)
 class SevenLines:
     """Poses of the line test, line after line."""

@@ -30,8 +30,6 @@ from truearm.engine.robot.postures import Postures, approach_of
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rotation_vector
 
-# The tip of a robot, seen from the robot's own base frame, in which paths and poses are planned.
-
 
 @dataclass(frozen=True, eq=False)
 class TipState:

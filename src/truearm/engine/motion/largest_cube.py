@@ -1,10 +1,4 @@
-"""The largest cube in front of an arm on whose diagonal planes it reaches every point.
-
-Where the tip gets to is first looked up among many random configurations: a point counts as reached if the tip came
-near to it. The best cubes of a coarse lattice are then moved and grown in ever smaller steps, while damped Newton's
-steps from the nearest of those configurations reach a grid of points on the diagonal planes, edges and corners
-included, within the joint limits and in any orientation.
-"""
+"""The largest cube in front of an arm (ISO 9283), and poses to measure on its diagonal planes."""
 
 from __future__ import annotations
 
@@ -213,6 +207,10 @@ _DAMPING: Final = 1e-3
 _REACHED: Final = 1e-6
 
 
+# Where the tip gets to is first looked up among many random configurations: a point counts as reached if the tip came
+# near to it. The best cubes of a coarse lattice are then moved and grown in ever smaller steps, while damped Newton's
+# steps from the nearest of those configurations reach a grid of points on the diagonal planes, edges and corners
+# included, within the joint limits and in any orientation.
 def largest_cube(
     robot: Robot, *, target: str | None = None, ahead: Direction = "+x", nearest: float = 0.0, floor: float = 0.0
 ) -> Cube:

@@ -1,9 +1,4 @@
-"""When a point is where on its path: from rest to rest, at a stated speed, with continuous acceleration.
-
-The speed rises over a ramp of duration ``T`` as ``V (3x^2 - 2x^3)``, ``x = t / T``, is constant, and falls in the same
-way. The acceleration along the path is then ``6 V/T x (1 - x)``: continuous, zero at rest and at full speed, and at
-most ``1.5 V / T``, which is the acceleration that the caller states. The documents state no law; this one is ours.
-"""
+"""Paths of a point in space, and when the point is where: from rest to rest, at a stated speed."""
 
 from __future__ import annotations
 
@@ -17,8 +12,6 @@ from numpy.typing import ArrayLike
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
-
-# A trajectory: where a point is over time.
 
 #: More samples than anyone means.
 _MOST_SAMPLES: Final = 1_000_000
@@ -58,7 +51,7 @@ def sample_times(duration: float, step: float) -> Array:
 # Paths of a point in space: straight line, circle, and cubic Hermite sections through waypoints.
 #
 # A path says where the point is after a distance along it, in which direction it goes on and how that direction turns.
-# It knows nothing of time: :func:`truearm.engine.motion.paths.timed` adds that.
+# It knows nothing of time: :func:`timed` adds that.
 
 #: Points nearer than this are one point [m].
 _SAME_POINT: Final = 1e-9
@@ -298,6 +291,9 @@ def _shown(points: Array) -> str:
     return f"{np.round(points * 1e3, 4).tolist()} mm"
 
 
+# The speed rises over a ramp of duration ``T`` as ``V (3x^2 - 2x^3)``, ``x = t / T``, is constant, and falls in the
+# same way. The acceleration along the path is then ``6 V/T x (1 - x)``: continuous, zero at rest and at full speed, and
+# at most ``1.5 V / T``, which is the acceleration that the caller states. The documents state no law; this one is ours.
 @dataclass(frozen=True)
 class TimeLaw:
     """The motion along a path of some length, from rest to rest."""

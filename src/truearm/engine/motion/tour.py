@@ -1,4 +1,4 @@
-"""What results say of a tour, and where its stops are written."""
+"""A tour: where the arm stops, from its safe configuration and back to it; as CSV, and in words."""
 
 from __future__ import annotations
 
@@ -19,8 +19,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
-
-# A tour: where the arm stops, one after the other, from its safe configuration and back to it.
 
 #: Why the arm stops: in its safe configuration, on a way around something, right before a measurement, or to measure.
 StopKind = Literal["home", "via", "approach", "measure"]
@@ -69,9 +67,6 @@ class Tour:
         return tuple(stop for stop in self.stops if stop.kind == "measure")
 
 
-# A tour as CSV, and in words.
-
-
 def tour_csv(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> str:
     """Return every stop of a tour as CSV, one row a stop in driving order, joints in deg or mm.
 
@@ -108,7 +103,7 @@ def tour_words(tour: Tour, robot: Robot, joints_are: JointsOf = "model") -> list
 
 
 def distance_words(distances: Mapping[str, float], floor: float | None, surface: str, connected: float) -> str:
-    """Return how near an arm comes to each thing, as :func:`~.nearest.nearest_on` has it; nothing if to none.
+    """Return how near an arm comes to each thing, as ``nearest_on`` has it; nothing if to none.
 
     Args:
         floor: Its height [m]; None if none is kept clear.

@@ -18,8 +18,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rotation_vector
 
-# How near an arm comes to each thing on ways, as a distance that holds all the way.
-
 #: By how much the stated distances may be too small [m], and by which part of themselves.
 _TOLERANCE: Final = 1e-4
 _PART: Final = 0.002
@@ -63,8 +61,6 @@ def _lower(least: Array, thing: NDArray[np.intp], rooms: Array) -> None:
     if rooms.shape[1]:
         np.minimum.at(least, thing, rooms.min(axis=1))
 
-
-# What is to be known of what a plan keeps clear of: links beside their lines, what is left out, odd boxes, limits.
 
 #: A box whose sides are all shorter is meant in another unit [m].
 _TINY: Final = 0.01

@@ -1,4 +1,4 @@
-"""Configurations drawn where an arm can be driven."""
+"""Ways that keep clear, and configurations drawn where an arm can be driven."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the robot carries at the targets of programs: the masses of the tools that the programs define."""
+"""Targets of programs: which are corrected, what only the user can say of them, and what acts on the tool there."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from truearm.engine.programs.program import Program, ProgramTarget
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.wrench import Wrench
-
-# What only the user can say of a program or its controller, asked before anything is written.
 
 
 @dataclass(frozen=True)
@@ -169,8 +167,6 @@ class Patterns:
         """Return whether a target of this name was meant."""
         return name in self._names
 
-
-# What acts on the tool at the targets of programs, target by target.
 
 #: What the flange is called where a target has no tool.
 _FLANGE: Final = "flange"

@@ -1,10 +1,4 @@
-"""Which targets stay where they are, because their correction would rather do harm.
-
-A target is kept where its correction makes it worse with a probability above 10 %. Targets joined by straight or
-circular moves, or written as offsets from each other, must not be torn apart: where keeping some of them would leave a
-step of more than 0.1 mm in such a path, all of them are corrected or all are kept, by the probability that the sum of
-squares of their distances grows.
-"""
+"""One program corrected: its targets before and after, and which of them stay where they are."""
 
 from __future__ import annotations
 
@@ -21,8 +15,6 @@ from truearm.engine.programs.expected_errors import ExpectedErrors
 from truearm.engine.programs.gauge import common_motion, turns_between
 from truearm.engine.programs.program import Edit, Program, Skipped
 from truearm.engine.robot.chain import Array
-
-# One program corrected: its targets before and after, and what became of each.
 
 #: So few targets can be moved almost anyhow by a common motion: of them no remainder says anything.
 _FEW_TARGETS: Final = 3
@@ -110,6 +102,11 @@ def shared_motion(parts: Sequence[tuple[Array, Array, Array]]) -> Shared | None:
         float(np.linalg.norm(left, axis=1).mean()),
     )
 
+
+# A target is kept where its correction makes it worse with a probability above 10 %. Targets joined by straight or
+# circular moves, or written as offsets from each other, must not be torn apart: where keeping some of them would leave
+# a step of more than 0.1 mm in such a path, all of them are corrected or all are kept, by the probability that the sum
+# of squares of their distances grows.
 
 #: Probability that a target gets worse above which it is not corrected.
 LIKELY: Final = 0.1

@@ -22,11 +22,8 @@ from truearm.engine.programs.program import Form, correction_comment, written
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.branches import BRANCHES
 
-# The targets of a program that is written from scratch: joint positions, and poses with their postures.
-#
+
 # Every number has the decimals that the language's own targets have.
-
-
 @dataclass(frozen=True, eq=False)
 class NewTargets:
     """Targets to write."""
@@ -101,7 +98,7 @@ _SLOWEST: Final = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class NewProgram(NewTargets):
-    """The targets of a program to write, of :class:`.new_targets.NewTargets`, and how the robot goes to them.
+    """The targets of a program to write, of :class:`NewTargets`, and how the robot goes to them.
 
     If it has poses, targets are these; else joint positions.
     """

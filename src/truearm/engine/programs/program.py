@@ -267,8 +267,6 @@ def _words(name: str) -> set[str]:
     return set(re.findall(r"[^\W_]+", "".join(c for c in plain if not unicodedata.combining(c))))
 
 
-# Numbers as programs write them, and new numbers in their place.
-
 #: A number in a program.
 NUMBER: Final = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 #: Neither millimetres nor degrees are ever as many.
@@ -313,8 +311,6 @@ def written(value: float, decimals: int) -> str:
     text = f"{value:.{decimals}f}"
     return text if float(text) else text.lstrip("-")
 
-
-# What all texts of programs have: lines, whatever they end with, byte order marks, and words to be replaced.
 
 #: The byte order mark of UTF-8 in a text of one character a byte.
 BYTE_ORDER_MARK: Final = "\xef\xbb\xbf"
@@ -365,8 +361,6 @@ def replaced(text: str, start: int, stop: int, words: Iterable[tuple[int, int, s
         place = end
     return "".join((*parts, text[place:stop]))
 
-
-# The comment by which a person, and truearm, knows a corrected program: by what it was corrected, and when.
 
 #: What stands in a program that was written corrected, in a comment of its own.
 MARK: Final = "corrected by truearm"

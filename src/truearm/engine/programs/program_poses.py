@@ -1,4 +1,4 @@
-"""From the numbers of a program's targets to poses and joints, and back."""
+"""From the numbers of a program's targets to poses and joints, and back; its tools and frames."""
 
 from __future__ import annotations
 
@@ -173,7 +173,6 @@ def _generations(targets: Sequence[ProgramTarget]) -> Iterator[list[int]]:
 
 
 # The tools and frames of a program's targets: where the controller has them, and where they really are.
-
 Kind = Literal["tool", "frame"]
 #: Whether real places were given, or have to be assumed; or follow from base or flange, which the calibration held.
 Provenance = Literal["identified", "assumed", "held"]

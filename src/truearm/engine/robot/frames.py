@@ -1,4 +1,4 @@
-"""A robot at another place: with another base, other targets, other fixtures, all as nominal values."""
+"""Poses and Jacobians in a frame by name, and a robot at another place."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from truearm.engine.robot.transform import IDENTITY, Transform
 if TYPE_CHECKING:
     from truearm.engine.robot.robot import Robot
 
-
-# Poses and Jacobians of a robot as its users ask for them: in a frame by name, of checked joint positions.
 
 #: ``base``, the robot's base frame as it was identified; ``world``, the instrument's frame; ``controller``, the base
 #: frame of its controller.

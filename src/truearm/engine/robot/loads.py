@@ -1,9 +1,4 @@
-"""Equilibrium: an arm bends under loads, and the loads are those of the bent arm.
-
-Each is found from the other in turns. A round leaves a hundredth of what was missing, or half where a joint with play
-is all but balanced; only postures that are not yet settled go through the next one. The few that swing to and fro take
-half of each way later on. A shaft that would have to stand in the middle of its clearance never settles.
-"""
+"""What every joint carries, and equilibrium: an arm bends under loads, and the loads are those of the bent arm."""
 
 from __future__ import annotations
 
@@ -51,7 +46,6 @@ if TYPE_CHECKING:
 # feels: free fall, which is gravity less the acceleration of the frame's origin, and in motion its angular velocity and
 # acceleration; they give each body's wrench. Backward go force and moment, summed, about the origin and in the axes of
 # the frame at hand. At rest that is one vector forward and two backward.
-
 _ZERO: Final[Coordinates] = (0.0, 0.0, 0.0)
 
 
@@ -242,6 +236,10 @@ _MOST_ROUNDS: Final = 100
 _SETTLED: Final = 1e-12
 
 
+# Bending and loads are found from each other in turns. A round leaves a hundredth of what was missing, or half where a
+# joint with play is all but balanced; only postures that are not yet settled go through the next one. The few that
+# swing to and fro take half of each way later on. A shaft that would have to stand in the middle of its clearance never
+# settles.
 def settled(following: Callable[[NDArray[np.intp], Array], Array], start: Array) -> Array:
     """Return where rounds from `start` ``(variables, n)`` settle to 1e-12 rad or m.
 

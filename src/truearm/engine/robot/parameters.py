@@ -1,4 +1,4 @@
-"""The parameters of a robot, and how a tip follows them."""
+"""The parameters of a robot as objects, and how a tip follows them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from truearm.engine.robot.robot_data import RobotData
 
 
-# Parameters as objects: a name, a unit, a value and what is known about it.
-#
 # Vectors of parameters exist only inside solvers, in the order of :class:`FreeParameters`.
 
 #: What parameters of the rigid robot and of what stands beside it describe.

@@ -1,4 +1,4 @@
-"""What stands beside the robot and its targets are measured against: a point, a plane, a frame."""
+"""What a robot is made of, what it carries and what an instrument sees of it; and fixtures beside it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from truearm.engine.base.units import quantity_si
 from truearm.engine.robot.chain import Chain, Element, Motion
 from truearm.engine.robot.conventions.convention import JointKind
 from truearm.engine.robot.transform import Transform, fixed_rotation
-
-# What a robot is made of: joints, masses, what it carries and what an instrument sees of it.
 
 #: Standard gravity, with the base's z upwards [m/s^2].
 GRAVITY: Final = (0.0, 0.0, -9.80665)

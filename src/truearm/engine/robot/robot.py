@@ -1,4 +1,4 @@
-"""Whether two robots are one arm, wherever both stand and whatever was found of one of them."""
+"""A robot as it moves: forward and inverse kinematics, Jacobians, and copies with other values."""
 
 from __future__ import annotations
 
@@ -27,8 +27,6 @@ from truearm.engine.robot.wrench import STANDARD_GRAVITY, Wrench, in_base
 if TYPE_CHECKING:
     from truearm.engine.robot.inverse.pose_solver import JointSolutions, Orientation
 
-
-# A robot as it moves: forward and inverse kinematics, Jacobians, and copies with other values.
 
 Values = Mapping[str, float | Array]
 

@@ -1,25 +1,4 @@
-"""Orientations as the controllers of several makers write them: quaternions, three kinds of angles, rotation vectors.
-
-Numbers stand for one orientation; an orientation can be written with many numbers. Of those, the ones nearest to given
-numbers are returned: the sign of a quaternion, whole turns of angles and what is free in gimbal lock stay as they are.
-
-==================== ======================================== ==================================================
-orientation          numbers                                  rotation matrix
-==================== ======================================== ==================================================
-quaternion           w, x, y, z (RAPID: q1 to q4)             of the unit quaternion
-angles about z y x   A, B, C (KRL)                            Rz(A) Ry(B) Rx(C)
-angles about x y z,  W, P, R (FANUC), Rx, Ry, Rz (Yaskawa)    Rz(R) Ry(P) Rx(W)
-fixed axes
-angles about x y z,  rx, ry, rz (VAL3)                        Rx(rx) Ry(ry) Rz(rz)
-moving axes
-rotation vector      rx, ry, rz (URScript)                    exp of the vector
-==================== ======================================== ==================================================
-
-Sources: ABB, Technical reference manual RAPID, data type orient; KUKA, System Software, operating and programming
-instructions, FRAME; FANUC, R-30iB operator's manual, "position data", and Yaskawa, DX200 operator's manual, "user
-coordinates", for rotations about fixed axes; Staubli, VAL3 reference manual, type trsf; Universal Robots, script
-manual, "poses". They are cited from memory; known postures of each maker's robots are in the tests.
-"""
+"""Rigid transforms: a translation and a unit quaternion (w, x, y, z); and how controllers write orientations."""
 
 from __future__ import annotations
 
@@ -30,8 +9,6 @@ from typing import Final
 import numpy as np
 
 from truearm.engine.robot.chain import Array, Element
-
-# Rigid transforms as people write them: a translation and a unit quaternion (w, x, y, z).
 
 
 def dot(a: Array, b: Array) -> Array:
@@ -168,6 +145,28 @@ _GIMBAL_LOCK: Final = 1e-6
 _TURN: Final = 2.0 * np.pi
 
 
+# Orientations as the controllers of several makers write them: quaternions, three kinds of angles, rotation vectors.
+#
+# Numbers stand for one orientation; an orientation can be written with many numbers. Of those, the ones nearest to
+# given numbers are returned: the sign of a quaternion, whole turns of angles and what is free in gimbal lock stay as
+# they are.
+#
+# ==================== ======================================== ==================================================
+# orientation          numbers                                  rotation matrix
+# ==================== ======================================== ==================================================
+# quaternion           w, x, y, z (RAPID: q1 to q4)             of the unit quaternion
+# angles about z y x   A, B, C (KRL)                            Rz(A) Ry(B) Rx(C)
+# angles about x y z,  W, P, R (FANUC), Rx, Ry, Rz (Yaskawa)    Rz(R) Ry(P) Rx(W)
+# fixed axes
+# angles about x y z,  rx, ry, rz (VAL3)                        Rx(rx) Ry(ry) Rz(rz)
+# moving axes
+# rotation vector      rx, ry, rz (URScript)                    exp of the vector
+# ==================== ======================================== ==================================================
+#
+# Sources: ABB, Technical reference manual RAPID, data type orient; KUKA, System Software, operating and programming
+# instructions, FRAME; FANUC, R-30iB operator's manual, "position data", and Yaskawa, DX200 operator's manual, "user
+# coordinates", for rotations about fixed axes; Staubli, VAL3 reference manual, type trsf; Universal Robots, script
+# manual, "poses". They are cited from memory; known postures of each maker's robots are in the tests.
 @dataclass(frozen=True)
 class Orientation:
     """A way to write orientations."""

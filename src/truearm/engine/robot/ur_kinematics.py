@@ -1,4 +1,4 @@
-"""A robot as a kinematics file of the ROS driver of Universal Robots."""
+"""Kinematics files of Universal Robots: read, placed on a robot of their type, and written."""
 
 from __future__ import annotations
 
@@ -28,8 +28,6 @@ from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.robot.urdf_tree import product, roll_pitch_yaw
 from truearm.engine.robot.urdf_writing import masses_left_out
 
-# Kinematics files of Universal Robots: what stands in them, before it is placed on a robot.
-#
 # ``calibration.conf`` lies in the folder .urcontrol of the controller. Its section ``mounting`` has six numbers each
 # that are added to theta, a, d and alpha of the type's table [rad and m] (forum.universal-robots.com, threads 538 and
 # 18921). Axes 2, 3 and 4 are nearly parallel, so their common normals may lie anywhere: delta_d of tens of metres

@@ -1,4 +1,4 @@
-"""A new URDF of a robot, whatever its convention."""
+"""A new URDF of a robot, whatever its convention, and what files say beside their numbers."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ from truearm.engine.robot.parts import NO_PAYLOAD, Joint
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
 from truearm.engine.robot.urdf_tree import Triple, product, roll_pitch_yaw
-
-# What a file says beside its numbers: what it cannot hold, and which frames the numbers refer to.
 
 #: Two frames less than this apart [m, rad] are the same to any instrument.
 _SAME_FRAME: Final = 1e-9
@@ -98,8 +96,6 @@ def comments(robot: Robot, frame: str, left: Sequence[str]) -> list[str]:
     return [" ".join("".join(c if c.isprintable() else " " for c in line).split()) for line in said]
 
 
-# Joint positions in the columns of a file: ``joint_i`` of the model, or ``axis_i`` as the controller shows them.
-
 #: What columns are called, before their numbers.
 COLUMN: Final[dict[JointsOf, str]] = {"model": "joint", "controller": "axis"}
 
@@ -163,9 +159,6 @@ def joint_cells(values: Array, joints: Sequence[Joint], controller: Controller |
 
 def _units(joints: Sequence[Joint]) -> list[str]:
     return ["deg" if joint.kind == "revolute" else "mm" for joint in joints]
-
-
-# Robots with the constant transforms between their joint variables multiplied into one.
 
 
 def collapsed(robot: Robot) -> tuple[list[Array], list[Array]]:

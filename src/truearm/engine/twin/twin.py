@@ -233,7 +233,6 @@ def _joint_axes(element: Element, bearing: float) -> Array:
 #
 # A slide between axes that are parallel to it may be exchanged for another one without a change of any pose. What the
 # file says of bearings and centres of gravity is about the nominal slides, so it is counted back by what they differ.
-
 _ALIKE: Final = 1.0 - 1e-12
 
 

@@ -1,4 +1,4 @@
-"""Pushes that lie far from the straight line of the others of their direction and cycle."""
+"""Static compliance of ISO 9283, and pushes that lie far from the line of the others."""
 
 from __future__ import annotations
 
@@ -17,8 +17,6 @@ from truearm.iso9283.criteria.rows import AXES, Conditions, Instrument, Value, v
 from truearm.iso9283.plan.criteria import PerformancePlan
 from truearm.iso9283.plan.records import Pushes
 
-# Static compliance: how far the tip gives way to a force at it, along the axes of the robot's base.
-#
 # Public descriptions of ISO 9283:1998: the tip is pushed and pulled along each base axis in steps of a tenth of the
 # rated load, and the displacement is given per force. Here it is the slope of a straight line through the steps of each
 # cycle, along the force, so that the place of the unloaded tip does not count. Play that the first step takes up is a

@@ -1,8 +1,4 @@
-"""Weaving deviations WS and WF: relative errors of stroke and frequency.
-
-WS is the attained stroke minus the commanded one over the commanded one; WF the same of the frequency, whose command is
-the commanded velocity over the wavelength (the issue's table; the standard's text was not at hand).
-"""
+"""Cornering and weaving deviations of ISO 9283: CR, CO, WS and WF."""
 
 from __future__ import annotations
 
@@ -236,6 +232,8 @@ _LEAST_SAMPLES = 20
 _LEAST_PERIODS = 2
 
 
+# WS is the attained stroke minus the commanded one over the commanded one; WF the same of the frequency, whose command
+# is the commanded velocity over the wavelength (the issue's table; the standard's text was not at hand).
 @dataclass(frozen=True, eq=False)
 class WeaveCurves:
     """A weave, for pictures."""

@@ -1,7 +1,27 @@
-"""Intervals of norms and of largest differences, by inverting tests: the values under which what was found is not rare.
+"""Intervals of 95 % for means, spreads, norms and largest values of a few cycles.
 
-Why, and what they are meant to hold, is said in :mod:`truearm.iso9283.criteria.intervals`. How often they hold was
-measured in ``benchmarks/iso9283_coverage.py``.
+The standard has none. What an interval is meant to hold (the estimand) is what the criterion would be after
+infinitely many cycles under the same conditions, scatter of the instrument included:
+
+- AP: the distance of the true mean pose from the command. RP: ``E l + 3 SD l``, l the distance from the true mean.
+- AD: mean distance minus the commanded one. RD and RP of an angle: 3 SD.
+- vAP, E, dAP and dRP: the largest difference of the true ones, among those that were measured.
+
+Norms and largest values are biased upward: scatter alone gives a perfect robot an AP above zero. A bootstrap draws
+its samples about the barycentre that is already too far away, and takes its percentiles for an interval, which then
+hardly ever holds the zero of a perfect robot. Here such criteria are inverted tests, which know the bias: the
+interval holds all values under which an estimate as large, or as small, as the one found is not too rare. Barycentres
+scatter about their true places by a multivariate t distribution, with the scatter of the cycles as its scale. Where
+zero is not too rare the interval begins at zero, and is an upper bound alone. The test that gives the upper end is
+divided by the chance of so small an estimate at zero, as Read (2002) does for signals near a background, so that an
+estimate that is small by luck does not give an interval that is empty.
+
+RP has no bias to speak of, but its scatter depends on the distribution, half as large for a uniform ball as for a
+Gaussian. So the logarithm of RP is divided by its standard error, from the influence of each cycle (Efron and
+Tibshirani 1993, chapter 21), and the quotient is compared with that of simulated Gaussian campaigns with the
+covariance that was found.
+
+How often the intervals hold was measured: ``benchmarks/iso9283_coverage.py``.
 """
 
 from __future__ import annotations
@@ -14,33 +34,6 @@ from typing import Final
 import numpy as np
 
 from truearm.engine.robot.chain import Array
-
-# Intervals of 95 % for means, spreads, norms and largest values of a few cycles.
-#
-# The standard has none. What an interval is meant to hold (the estimand) is what the criterion would be after
-# infinitely many cycles under the same conditions, scatter of the instrument included:
-#
-# - AP: the distance of the true mean pose from the command. RP: ``E l + 3 SD l``, l the distance from the true mean.
-# - AD: mean distance minus the commanded one. RD and RP of an angle: 3 SD.
-# - vAP, E, dAP and dRP: the largest difference of the true ones, among those that were measured.
-#
-# Norms and largest values are biased upward: scatter alone gives a perfect robot an AP above zero. A bootstrap draws
-# its samples about the barycentre that is already too far away, and takes its percentiles for an interval, which then
-# hardly ever holds the zero of a perfect robot. Here such criteria are inverted tests, which know the bias: the
-# interval holds all values under which an estimate as large, or as small, as the one found is not too rare. Barycentres
-# scatter about their true places by a multivariate t distribution, with the scatter of the cycles as its scale. Where
-# zero is not too rare the interval begins at zero, and is an upper bound alone. The test that gives the upper end is
-# divided by the chance of so small an estimate at zero, as Read (2002) does for signals near a background, so that an
-# estimate that is small by luck does not give an interval that is empty.
-#
-# These tests are in :mod:`truearm.iso9283.criteria.intervals`.
-#
-# RP has no bias to speak of, but its scatter depends on the distribution, half as large for a uniform ball as for a
-# Gaussian. So the logarithm of RP is divided by its standard error, from the influence of each cycle (Efron and
-# Tibshirani 1993, chapter 21), and the quotient is compared with that of simulated Gaussian campaigns with the
-# covariance that was found.
-#
-# How often the intervals hold was measured: ``benchmarks/iso9283_coverage.py``.
 
 #: Fewer cycles say too little of their own scatter for an interval.
 LEAST_CYCLES: Final = 5

@@ -47,8 +47,6 @@ from truearm.iso9283.criteria.wild_rows import UnusualRows, WildRow, unusual_row
 from truearm.iso9283.plan.criteria import TEST_OF, TESTS, PerformancePlan, PlannedTest
 from truearm.iso9283.plan.records import AttainedPoses
 
-# What a test lacks that was measured otherwise: poses, approaches, robots, paths without a row.
-
 #: Robots that are exchanged.
 ROBOTS: Final = 5
 

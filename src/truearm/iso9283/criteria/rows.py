@@ -18,8 +18,6 @@ from truearm.iso9283.criteria.intervals import Interval
 from truearm.iso9283.plan.criteria import TEST_OF, TESTS, PerformancePlan
 from truearm.iso9283.plan.records import AttainedPoses, Names, Samples
 
-# A value of a criterion, with its interval and the conditions under which it was measured.
-
 #: ``too-few-cycles``: fewer than planned, the value stands nevertheless. ``instrument-too-coarse``: what the instrument
 #: does not know is more than a quarter of the value.
 Status = Literal["measured", "not-measured", "too-few-cycles", "instrument-too-coarse"]
@@ -88,8 +86,6 @@ class Instrument:
 #: What is not known of a reading may be this share of a value.
 COARSE = 0.25
 
-
-# Values of criteria of poses, each with its status.
 
 AXES: Final[tuple[Literal["x", "y", "z"], ...]] = ("x", "y", "z")
 ANGLES: Final[tuple[Literal["a", "b", "c"], ...]] = ("a", "b", "c")
@@ -256,8 +252,6 @@ def _middle(scatters: Array) -> Array:
 def _name(names: Names, row: int) -> str:
     return names.names[int(names.code[row])]
 
-
-# The order of the cycles in which drift was watched: by their times, held against the file and the cycles' numbers.
 
 #: In a file that is in order but for a few falls of its times by more than this [s], a clock has begun anew.
 _FALLS: Final = 2

@@ -1,4 +1,4 @@
-"""Where on the commanded path the tip was at each sample: found from the geometry, without a trigger."""
+"""Samples over time: their clock, the commanded path, dwells, motions and cycles found in them."""
 
 from __future__ import annotations
 
@@ -112,9 +112,6 @@ def _even(time: Array, number: NDArray[np.intp] | Array, resolution: float) -> A
     return np.asarray(time[0] + begin + slope * number)
 
 
-# The commanded path by its arc length: points, tangents, orientations, and the foot of a point on it.
-
-
 @dataclass(frozen=True, eq=False)
 class CommandedPath:
     """A planned path by its arc length, going on before its begin and behind its end, and the feet of points on it.
@@ -219,8 +216,6 @@ class CommandedPath:
         return foot
 
 
-# Straight lines through the samples within a window about each of many places: values and rates without noise.
-
 #: So many places at once: sums begin anew with each part, which keeps them short and their rounding small.
 _PART = 50_000
 
@@ -285,8 +280,6 @@ def _between(at: Array, values: Array, places: Array, chosen: NDArray[np.bool_],
     value[chosen] = values[after - 1] + slope * (places[chosen] - at[after - 1])[:, None]
     rate[chosen] = slope
 
-
-# Dwells and motions in a stream of samples, and the cycles of a path in it.
 
 #: Half the window over which speed is taken [s], and at least so many samples in it.
 _HALF_WINDOW = 0.04
@@ -630,8 +623,6 @@ def _apart(came: float, allowed: float) -> tuple[str, str]:
             break
     return both
 
-
-# How far an excursion goes: the top of a parabola through the samples about the largest of them.
 
 #: The parabola goes through the samples within this share of the excursion's width at half its height, which of an
 #: oscillation is a third of a period.

@@ -18,8 +18,6 @@ from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.rows import Component, Status
 from truearm.iso9283.plan.criteria import TEST_OF, TESTS, PerformancePlan
 
-# Which values of two results were planned alike: at the same places, with one tip, under the same rated conditions.
-
 #: Places are the same within this length [mm], and turns within this entry of their matrices.
 _SAME_LENGTH: Final = 1e-2
 _SAME_TURN: Final = 1e-4
@@ -138,8 +136,6 @@ def _is_of(name: str, test: str, where: str) -> bool:
         return True
     return test == "vAP" and name.startswith(f"{where} from ")
 
-
-# The file iso9283.json of an evaluation, read again.
 
 _LENIENT = ConfigDict(extra="ignore", frozen=True)
 _Number = Annotated[float, Field(allow_inf_nan=False)]

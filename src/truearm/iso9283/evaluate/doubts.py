@@ -1,4 +1,4 @@
-"""Samples that lie apart from those about them, as in no other cycle: perhaps the robot, perhaps the instrument."""
+"""Doubts about records: read at another place, for another cube, or samples that lie apart from those about them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from truearm.iso9283.criteria.runs import scatter_of
 from truearm.iso9283.criteria.settling import SettlingCurve
 from truearm.iso9283.plan.criteria import PerformancePlan
 from truearm.iso9283.plan.records import Pushes
-
-# Whether files that have no other tie to the plan were read where it has them: where the tip rests, and is pushed.
 
 #: A tip may rest beside its command by this share of the cube's side, and in small cubes by this length [m].
 _BESIDE: Final = 0.1
@@ -103,8 +101,6 @@ def refuse_other_push_place(plan: PerformancePlan, pushes: Pushes, position: Arr
 def _allowed(plan: PerformancePlan) -> float:
     return max(_BESIDE * plan.cube.side, _LEAST_BESIDE)
 
-
-# Poses that lie as those of another cube: measured for another plan, most likely.
 
 #: No robot makes all distances larger or smaller by this share.
 _SCALE: Final = 0.01

@@ -46,8 +46,6 @@ from truearm.iso9283.evaluate.told import said_of_drift, said_of_pushes, said_of
 from truearm.iso9283.plan.criteria import PerformancePlan
 from truearm.iso9283.plan.plan_file import read_plan
 
-# The criteria of ISO 9283 that a robot was tested by, each with its interval, and beside those of another result.
-
 RESULT: Final = "iso9283.json"
 REPORT: Final = "report.html"
 EVALUATION_FILES: Final = (RESULT, REPORT)

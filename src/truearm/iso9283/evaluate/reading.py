@@ -1,4 +1,4 @@
-"""Times of samples that cannot be used: out of order, written twice, or rounded until many are the same."""
+"""Attained poses and pushes of performance tests read from CSV, and times of samples that cannot be used."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from truearm.engine.data.readers.sheets import Columns, named_columns, read_name
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import rotation_from_quaternion
 from truearm.iso9283.plan.records import AttainedPoses, Names, Pushes, resolution_of
-
-# Poses that a robot attained in tests of its performance, and where its tip was while it was pushed: two CSV.
 
 #: Of drift, whose groups have the same cycles again.
 DRIFT: Final = "dAP"

@@ -50,8 +50,6 @@ if TYPE_CHECKING:
     from truearm.iso9283.evaluate.evaluate import Iso9283Evaluation
 
 
-# Pictures of tests by ISO 9283 along paths: deviations, corners, velocity, weaves, and what was found in a stream.
-
 #: A corner is drawn so many times the largest of its deviations about it.
 _ROOM: Final = 4.0
 #: So many whole waves of a weave are drawn.

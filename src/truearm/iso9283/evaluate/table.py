@@ -1,4 +1,4 @@
-"""What is said about the rows of a test by ISO 9283: wild rows, poses with two places of rest, places without a row."""
+"""The values of a test by ISO 9283 as cells of tables, and what is said about its rows."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from truearm.iso9283.evaluate.comparison import Entry, ResultFile
 from truearm.iso9283.evaluate.doubts import other_cube
 from truearm.iso9283.evaluate.evaluation import Evaluation
 from truearm.iso9283.plan.criteria import CRITERIA, TEST_OF, TESTS, PerformancePlan
-
-# The values of a test by ISO 9283 as cells of tables: for the command, and for the report.
 
 #: Unit of each kind of number at the edges, and how many of it one SI unit is.
 UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {

@@ -1,4 +1,4 @@
-"""What is to be said of samples over time, and of the figures that come from them."""
+"""What is to be said of drift, pushes, rounding and samples over time."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from truearm.iso9283.criteria.streams import Clock, pace_along
 from truearm.iso9283.evaluate.doubts import unusual_samples
 from truearm.iso9283.evaluate.evaluation import Evaluation
 from truearm.iso9283.plan.criteria import PerformancePlan
-
-# What is to be said of the times over which drift was watched.
 
 #: From the first group to the last drift is watched for at least and at most this share of the planned time.
 _SHORTEST: Final = 0.9
@@ -73,8 +71,6 @@ def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tupl
 def _fits(lasts: float, planned: float) -> bool:
     return _SHORTEST * planned <= lasts <= _LONGEST * planned
 
-
-# What is to be said of the forces by which the tip was pushed.
 
 #: The largest force of a direction is low below this share of the rated load's weight.
 _LOW: Final = 0.85
@@ -157,8 +153,6 @@ def _standard_error(pushes: Sequence[PushLine], name: str, instrument: Instrumen
             squares.append(float(about @ about))
     return instrument.sigma / float(np.sqrt(sum(squares)))
 
-
-# What is to be said of readings and times that were written with few decimals.
 
 #: So many records are named.
 _NAMED = 4

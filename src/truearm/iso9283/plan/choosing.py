@@ -1,9 +1,9 @@
 """Plans of tests by ISO 9283: poses and paths in the cube, with the posture in which the arm reaches all of them.
 
-The standard tests in the largest cube of the workspace, on one of its diagonal planes (:mod:`.poses.iso9283`). Where
-the cube is left open, the largest one is shrunk until the arm comes to every pose and runs every path of all tests in
-one posture, with one orientation of the tip, so that it does not depend on which of them are planned. The standard
-prints no orientation; the tip points down, ahead, or at right angles to the plane, whichever allows the largest cube.
+The standard tests in the largest cube of the workspace, on one of its diagonal planes. Where the cube is left open, the
+largest one is shrunk until the arm comes to every pose and runs every path of all tests in one posture, with one
+orientation of the tip, so that it does not depend on which of them are planned. The standard prints no orientation; the
+tip points down, ahead, or at right angles to the plane, whichever allows the largest cube.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Where the tip is commanded to be along a planned path: place, orientation and direction by the distance travelled.
-
-On a path on which the orientation changes, it turns from one to the other and back in :data:`TURNS` stretches of equal
-length, evenly in each.
-"""
+"""The performance criteria of ISO 9283:1998, what is commanded in their tests, and planned paths by distance."""
 
 from __future__ import annotations
 
@@ -20,8 +16,6 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rotation_from_vector, rotation_vector
 
-# The performance criteria of ISO 9283:1998: what each is called, what is measured for it, where and how often.
-#
 # The text of the standard was not at hand. Names, cycles and places are those that Nubiola (section 2.6), Patel
 # (chapter 3) and the literature give; who wants to claim conformity must read the standard itself.
 
@@ -101,9 +95,6 @@ TEST_OF: Final[Mapping[str, str]] = {
 }
 #: Every criterion.
 CRITERIA: Final = tuple(TEST_OF)
-
-
-# What is commanded in the tests of ISO 9283: poses, approaches, paths, speeds and loads.
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +183,8 @@ def visited(test: PlannedTest) -> tuple[str, ...]:
 TURNS: Final = 4
 
 
+# On a path on which the orientation changes, it turns from one to the other and back in :data:`TURNS` stretches of
+# equal length, evenly in each.
 @dataclass(frozen=True, eq=False)
 class Way:
     """A planned path by the distance travelled along it.

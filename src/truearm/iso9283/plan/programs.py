@@ -53,8 +53,6 @@ from truearm.iso9283.plan.plan_file import plan_text
 from truearm.iso9283.plan.result import WrittenPrograms
 from truearm.iso9283.plan.routes import SLOW_RUN, Route, Routes, check_slow_run, slow_run_text
 
-# Measuring programs: every test of a plan as a program of its own at each velocity and load.
-#
 # A program begins and ends in P1, slowly. Before each measured pose the robot stops, and stands for the dwell.
 
 #: The first run: no more than this share of the rated velocity, and no faster than this along paths and in joint
@@ -353,8 +351,6 @@ class _Steps:
 def _percent(share: float) -> str:
     return f"{100 * share:.4g}".replace(".", "p")
 
-
-# What tests by ISO 9283 keep clear of where somebody has stated the cell, by the rules of plans of measurements.
 
 #: A message names no more ways.
 _MOST_NAMED: Final = 3

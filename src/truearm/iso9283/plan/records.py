@@ -1,4 +1,4 @@
-"""Measurements of performance as the text of their files: ``poses``, ``paths``, ``settling`` and ``forces.csv``."""
+"""Measurements of performance as records of arrays, and as the text of their files."""
 
 from __future__ import annotations
 
@@ -15,11 +15,8 @@ from truearm.engine.base.units import YES
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import quaternion_from_rotation
 
-# What was measured in tests of performance, each file as one record of arrays.
-#
+
 # A test has up to a million samples, so texts are numbers into a list of names.
-
-
 @dataclass(frozen=True, eq=False)
 class Names:
     """A column of names."""
@@ -99,8 +96,6 @@ class Pushes:
     resolution: float = 0.0  #: Step to which positions were rounded in the file [m]; 0 where it has enough decimals.
     simulated: bool = False  #: Whether a virtual instrument read any of them.
 
-
-# To which step numbers of a column were rounded when they were written.
 
 #: Decimals that are looked for; numbers with more are not rounded by anything that matters.
 _DECIMALS: Final = 7

@@ -1,18 +1,4 @@
-"""The record of the slow run: programs at the full velocity are written only after the slow ones were run to their end.
-
-::
-
-    truearm: truearm-slow-run/1
-    plan: 5d2f...
-    completed: no
-    by: ''
-    date: ''
-    programs:
-      programs/AP_10.mod: 8c1e...
-
-The operator fills in ``completed: yes``, who ran the programs, and the day on which they did (2026-11-23). Plan and
-programs are known by their hashes (SHA-256), so that a record is of this plan and these programs alone.
-"""
+"""Ways of the tip in tests by ISO 9283 as moves of the robot, and the record of the slow run."""
 
 from __future__ import annotations
 
@@ -205,6 +191,20 @@ SLOW_RUN: Final = "slow-run.yaml"
 _SCHEMA: Final = "truearm-slow-run/1"
 
 
+# The record of the slow run: programs at the full velocity are written only after the slow ones were run to their end.
+#
+# ::
+#
+#     truearm: truearm-slow-run/1
+#     plan: 5d2f...
+#     completed: no
+#     by: ''
+#     date: ''
+#     programs:
+#       programs/AP_10.mod: 8c1e...
+#
+# The operator fills in ``completed: yes``, who ran the programs, and the day on which they did (2026-11-23). Plan and
+# programs are known by their hashes (SHA-256), so that a record is of this plan and these programs alone.
 class SlowRunFile(BaseModel):
     """Schema ``truearm-slow-run/1``."""
 

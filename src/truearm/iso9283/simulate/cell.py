@@ -36,8 +36,6 @@ from truearm.iso9283.simulate.moving_arm import (
     zone_of,
 )
 
-# What a simulated instrument has read in tests by ISO 9283, gathered into records.
-
 
 @dataclass(frozen=True)
 class Tracker:
@@ -166,8 +164,6 @@ def pushes_of(pushed: Sequence[Pushed]) -> Pushes:
     )
 
 
-# The cell in which tests by ISO 9283 are simulated: robots, their controller, the instrument and the clock.
-#
 # What is read is noted here; which moves are made is for the tests.
 
 #: The arm stands before it is read, and behind a path [s].
@@ -358,10 +354,6 @@ def conditions(test: PlannedTest) -> Iterator[tuple[float, float]]:
     return ((load, velocity) for load in test.loads for velocity in test.velocities)
 
 
-# Simulated tests by ISO 9283 in motion: the way to a pose, and paths.
-#
-# A path is followed once for each velocity and load; from cycle to cycle the joints are a little elsewhere.
-
 #: The controller commands so often [s].
 _STEP: Final = 1e-3
 #: Each so many commands a correction is computed, and evenly changed between.
@@ -443,8 +435,6 @@ def _correction(cell: Cell, frames: Array, joints: Array, load: float) -> Array:
     return np.stack([np.interp(every, rows, column) for column in added.T], axis=1)
 
 
-# Simulated tests by ISO 9283 at poses: accuracy, distances, exchange of robots, approaches and drift.
-
 #: From one group of cycles to the next where the drift is watched [s].
 _BETWEEN_GROUPS: Final = 1800.0
 #: How many robots are exchanged.
@@ -484,8 +474,6 @@ def run_drift(cell: Cell, test: PlannedTest) -> None:
             cell.stand(test, 0, place, cycle, "", velocity, load, away)
         cell.now = max(cell.now, group + _BETWEEN_GROUPS)
 
-
-# The simulated test of static compliance by ISO 9283: pushes at the tip.
 
 #: Pushes in shares of the rated load.
 _PUSHES: Final = tuple(k / 10 for k in range(11))

@@ -1,4 +1,4 @@
-"""What a controller commands along the planned paths of tests by ISO 9283."""
+"""An arm in motion with its controller: what is commanded along paths, how joints follow, where the tip is."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from truearm.engine.robot.transform import Transform, quaternion_from_rotation, 
 from truearm.engine.twin.twin import REFERENCE_TEMPERATURE, Twin
 from truearm.engine.twin.twin_joint import PERFECT
 from truearm.iso9283.plan.criteria import TURNS, PlannedPath, weave_corners
-
-# How far joints give way to a push, drawn for robots of which nothing is known about that.
 
 #: What a joint of the arm turns by under the moment of the rated load at the tip, in the middle of all robots [rad].
 #: Joint 2 of an IRB 120 turns by 0.0005, joint 3 by 0.002 (Nubiola, Table 2.7); larger arms are stiffer for their load.
@@ -430,7 +428,6 @@ def _between(position: Array, velocity: Array, k: NDArray[np.intp], x: Array, st
 # ``u1``, ``u2``. It passes the corner at ``z |u2 - u1| / 4`` then, ``z sqrt(2) / 4`` at a right angle. Looking ahead,
 # the controller slows down early enough for every corner. Orientations are blended by the same parabola, of rotation
 # vectors.
-
 _STRAIGHT: Final = 1e-12
 
 
@@ -637,7 +634,7 @@ def path_commands(path: PlannedPath, pace: Pace, step: float, *, reoriented: boo
         path: In the robot's base frame.
         pace: How fast.
         step: Between two commands [s].
-        reoriented: Whether the orientation alternates: from one to the other and back, as :class:`.way.Way` has it.
+        reoriented: Whether the orientation alternates: from one to the other and back, as ``Way`` has it.
 
     Raises:
         InputError: If the orientation shall alternate and the path has one alone.

@@ -40,8 +40,6 @@ from truearm.iso9283.plan.records import forces_text, poses_text, samples_text
 from truearm.iso9283.simulate.cell import ROBOTS, Corrected, SimulatedCampaign, Tracker, TrueRobot, simulated_campaign
 from truearm.iso9283.simulate.moving_arm import drawn_compliance
 
-# A simulated campaign of tests by ISO 9283, and the files that hold it.
-
 #: What a campaign may write.
 FILES: Final = ("poses.csv", "paths.csv", "settling.csv", "forces.csv", "alignment.yaml")
 

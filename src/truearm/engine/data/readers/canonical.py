@@ -1,4 +1,4 @@
-"""Rows of the canonical CSV that have to do with fixtures: what stands beside the robot."""
+"""The canonical CSV: one row a reading, with its configuration, joints, target and units in the header."""
 
 from __future__ import annotations
 
@@ -174,10 +174,7 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
     )
 
 
-# The canonical CSV: one row a reading, with its configuration, joints, target and units in the header.
-#
 # Rows of the role ``fixture`` are of no configuration: they say what is known of what stands beside the robot.
-
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _LENGTHS: Final = ("distance", "height")

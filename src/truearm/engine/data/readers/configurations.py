@@ -1,4 +1,4 @@
-"""Where an arm stops right before each configuration: the columns ``approach_i`` of a plan."""
+"""Configurations and poses to go to, without readings: tables of plans and sets of poses."""
 
 from __future__ import annotations
 
@@ -58,8 +58,6 @@ def stops_in(cells: Cells, found: Configurations) -> Configurations | None:
     places, units = zip(*(there[name] for name in names), strict=True)
     return found_configurations(cells, [found.labels[at] for at in found.of_row], places, units, found.joints_are)
 
-
-# Where an arm stands or shall stand, without readings: the table of a plan.
 
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 _LABEL: Final = "configuration"
@@ -169,8 +167,6 @@ def _unseen(cells: Cells, found: Configurations) -> Dataset:
         found,
     )
 
-
-# Poses to go to: a CSV with one row a pose, its columns named as in the canonical CSV.
 
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")

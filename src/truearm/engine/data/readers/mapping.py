@@ -14,8 +14,6 @@ from truearm.engine.base.errors import InputError, counted, is_one_line
 from truearm.engine.data.readers.cells import Layout
 from truearm.engine.robot.controller import JointsOf
 
-# Entries of a mapping file that stand for themselves: layout, orientations, deviations, order and others.
-
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
 

@@ -26,8 +26,6 @@ from truearm.engine.data.readers.rows import Configurations
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_vector, turned_about
 
-# Orientations in the columns of a table: quaternions, rotation vectors, and three angles about any axes.
-
 
 def quaternions_of_angles(angles: Array, entry: AnglesEntry) -> Array:
     """Return the quaternions (w, x, y, z) of angles ``(rows, 3)`` [rad], NaN where one is missing.

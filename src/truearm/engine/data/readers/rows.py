@@ -270,8 +270,6 @@ def unit_quaternions(q: Array, source: str, lines: Sequence[int], names: str = _
     return made
 
 
-# Columns of the canonical CSV that are neither numbers with a unit nor names, and what their rows must agree on.
-
 ROLES: Final = ("target", "reference", "fixture")
 #: What the order of measurement is numbered with.
 _ORDER: Final = "a whole number, 0 or more, of the configuration"

@@ -1,4 +1,4 @@
-"""Columns of a CSV by their names: what small tables check in the same way."""
+"""Sheets of Excel workbooks as cells that know their place, and columns of small tables by their names."""
 
 from __future__ import annotations
 
@@ -23,8 +23,6 @@ from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cell
 from truearm.engine.data.readers.configurations import stops_in
 from truearm.engine.data.readers.rows import Configurations, found_configurations
 from truearm.engine.robot.urdf_writing import JOINT_COLUMN, joint_names
-
-# Sheets of Excel workbooks as cells that know their place, such as ``Points!B7``.
 
 #: Endings of workbooks that are read.
 WORKBOOKS: Final = (".xlsx", ".xlsm")

@@ -1,12 +1,4 @@
-"""Split moves of FANUC programs.
-
-A segment of a move is the same instruction to a position that is added to /POS, with the frame, tool and CONFIG of the
-move's own. It ends with CNT100, so that the robot does not stop there, and leaves out what is to happen once (TB, TA,
-DB, DA). The lines after it are numbered anew, and LINE_COUNT with them; jumps go to labels and stay.
-
-A move is left whole where segments of it would do something else: with a speed in seconds; with options other than
-those and ACC and PTH; to positions with external axes or other motion groups; arcs and splines (A, S).
-"""
+"""The instructions of a FANUC program (/MN): its moves, how they use the positions, and split moves."""
 
 from __future__ import annotations
 
@@ -30,8 +22,6 @@ from truearm.engine.programs.program import (
     replaced,
     rewritten,
 )
-
-# What the instructions of a FANUC program (/MN) say: its moves, and how they use the positions.
 
 #: A reference: to a position by its number, such as P[3:approach]; or its word and what is between its brackets.
 _REFERENCE: Final = r"(P\[[ \t]*+0*(\d{1,9})[ \t]*+(?::[^\[\]\n]*)?\]|([A-Z]\w*)\[((?:[^\[\]\n]|\[[^\[\]\n]*\])*)\])"
@@ -230,6 +220,12 @@ class _Segment(NamedTuple):
     after: str
 
 
+# A segment of a move is the same instruction to a position that is added to /POS, with the frame, tool and CONFIG of
+# the move's own. It ends with CNT100, so that the robot does not stop there, and leaves out what is to happen once (TB,
+# TA, DB, DA). The lines after it are numbered anew, and LINE_COUNT with them; jumps go to labels and stay.
+#
+# A move is left whole where segments of it would do something else: with a speed in seconds; with options other than
+# those and ACC and PTH; to positions with external axes or other motion groups; arcs and splines (A, S).
 def split_moves(program: Program, splits: Sequence[Split]) -> SplitEdits:
     """Split moves."""
     edits: list[Edit] = []

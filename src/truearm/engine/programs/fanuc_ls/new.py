@@ -1,4 +1,4 @@
-"""FANUC TP programs in ASCII with stops, waits and circles.
+"""New FANUC TP programs in ASCII: targets one after the other, or with stops, waits and circles.
 
 Source: FANUC, operator's manual of the controllers R-30iA and R-30iB, program instructions: J, L and C with FINE and
 CNT, WAIT with TIMEOUT, PAUSE and PAYLOAD. The second position of a circle stands on a line of its own. What a payload
@@ -25,8 +25,6 @@ from truearm.engine.programs.new_program import (
     number,
     percent,
 )
-
-# New FANUC TP programs in ASCII.
 
 
 def new_program(program: NewProgram) -> dict[str, str]:

@@ -31,7 +31,6 @@ from truearm.engine.robot.transform import FIXED_XYZ_ANGLES
 # All this holds for arms of six axes with a wrist in line. An L or R is not looked at.
 #
 # Source: FANUC, HandlingTool operator's manual (V9.40), section 11.21.2, by a public repository's notes on it.
-
 _PAIRS: Final = ("NF", "LR", "UD", "TB")
 _TURN: Final = re.compile(r"[ \t]*[+-]?\d{1,2}[ \t]*", re.ASCII)
 
@@ -57,8 +56,6 @@ def configuration(text: str) -> Configuration | None:
                 ranges.append((joint, (2 * turn - 1) * math.pi, (2 * turn + 1) * math.pi))
     return Configuration(shoulder, elbow, ranges=tuple(sorted(ranges)), literal=bool(ranges))
 
-
-# What the numbers of FANUC positions mean.
 
 POSE: Final = Form("XYZWPR", "pose", angle=math.pi / 180, orientation=FIXED_XYZ_ANGLES)
 JOINTS: Final = Form("joints", "joints", angle=math.pi / 180)

@@ -1,4 +1,4 @@
-"""Yaskawa INFORM: the instructions of a job that move the robot, and what the others tell of its positions."""
+"""Yaskawa INFORM: the sections of a job, its table of positions, and the instructions that move the robot."""
 
 from __future__ import annotations
 
@@ -13,14 +13,10 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.programs.program import BYTE_ORDER_MARK, LARGEST, NUMBER, Form, Lines, MoveKind, Source
 from truearm.engine.robot.transform import FIXED_XYZ_ANGLES
 
-# What the numbers of positions in a job mean.
-
 PULSES: Final = Form("pulses", "pulses", decimals=(0, 0))
 ANGLES: Final = Form("joint angles", "joints", angle=radians(1.0))
 POSE: Final = Form("rectangular position", "pose", angle=radians(1.0), orientation=FIXED_XYZ_ANGLES)
 
-
-# Jobs of Yaskawa controllers: the sections of a job file and its table of positions.
 
 JOB: Final = re.compile(rf"(?:\A(?:{BYTE_ORDER_MARK})?|[\r\n])[ \t]*/JOB[ \t]*(?=[\r\n]|\Z)")
 LINE: Final = re.compile(r"[^\r\n]+")

@@ -1,4 +1,4 @@
-"""Yaskawa jobs with stops, waits and circles.
+"""New Yaskawa jobs: targets one after the other, or with stops, waits and circles.
 
 Source: Yaskawa, INFORM language manuals of the controllers DX100, DX200 and FS100: MOVJ, MOVL, MOVC, TIMER, WAIT,
 PAUSE, and the tags VJ, V and PL. The first MOVC of a row is reached on a line: it stands where the arc begins. Between
@@ -24,8 +24,6 @@ from truearm.engine.programs.new_program import (
     Wait,
     number,
 )
-
-# New Yaskawa jobs.
 
 #: The controller writes its own when it loads the job.
 DATE = "2000/01/01 00:00"

@@ -1,4 +1,4 @@
-"""Positions and axis values as KRL writes them in curly brackets, and what Status and Turn say about the posture.
+"""KRL as statements, its positions and axis values, and what Status and Turn say about the posture.
 
 ==== ====================================================== ===================================================
 bit  of Status                                              posture
@@ -27,8 +27,6 @@ from typing import Final, NamedTuple
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.program import LARGEST, NUMBER, Configuration, Form, Lines, Source, without_mark
 from truearm.engine.robot.transform import ZYX_ANGLES
-
-# KRL as statements: one a line, with comments and the inside of strings out of the way.
 
 _LONE_RETURN: Final = re.compile(r"\r(?!\n)")
 #: Lines that are empty, a comment or a header (``&ACCESS``), and then one that is not.

@@ -1,4 +1,4 @@
-"""The tool and the base that hold where a KRL program moves: ``$TOOL``, ``$BASE``, ``FDAT_ACT``, ``BAS`` and ``WITH``.
+"""What a KRL program declares, and tool and base of its moves: ``$TOOL``, ``$BASE``, ``FDAT_ACT``, ``BAS``, ``WITH``.
 
 What ``BAS`` does is written in the controller's own bas.src: ``INITMOV`` takes base 0 and tool 1.
 """
@@ -14,8 +14,6 @@ import numpy as np
 
 from truearm.engine.programs.krl.lines import POSE, Aggregate, Statement, Text, aggregate, short
 from truearm.engine.robot.transform import ZYX_ANGLES, Transform
-
-# What a KRL program declares: targets, the numbers of tools and bases for inline forms, and where a name is known.
 
 #: Types of places that a robot is sent to; a frame may be one.
 TARGET_TYPES: Final = frozenset({"POS", "E3POS", "E6POS", "AXIS", "E3AXIS", "E6AXIS"})

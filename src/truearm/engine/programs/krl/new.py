@@ -1,4 +1,4 @@
-"""KRL programs with stops, waits and circles.
+"""New KRL programs: targets one after the other, or with stops, waits and circles.
 
 Source: KUKA System Software 8, operating and programming instructions for system integrators: PTP, LIN, CIRC, WAIT SEC,
 ``$VEL_AXIS``, ``$VEL``, ``$APO``, ``$ORI_TYPE``, ``$CIRC_TYPE``, ``$LOAD``, HALT. ``BAS(#INITMOV,0)`` gives
@@ -88,8 +88,6 @@ def _carried(carried: Carried | None) -> list[str]:
     load = f"{{M {number(carried.mass, 3)},CM {{{cog},{turned}}},J {{X 0,Y 0,Z 0}}}}"
     return [f"  $TOOL = {{{tip},{turned}}}", f"  $LOAD = {load}"]
 
-
-# New KRL programs.
 
 _NAMES_NEW = ("X", "Y", "Z", "A", "B", "C")
 

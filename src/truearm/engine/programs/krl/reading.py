@@ -1,4 +1,4 @@
-"""Split KRL moves: the same instruction once more for each segment, with its position written out."""
+"""KRL programs read, what the words of their moves mean, and split moves."""
 
 from __future__ import annotations
 
@@ -37,8 +37,6 @@ from truearm.engine.programs.program import (
     replaced,
     written,
 )
-
-# Where the words of a KRL move stand: the place, the auxiliary point of a circle, and what follows.
 
 Span = tuple[int, int]
 
@@ -97,8 +95,6 @@ def with_of(flat: str, statement: Statement) -> int | None:
     found = _WITH.search(flat, after, stop)
     return found.end() if found else None
 
-
-# Finds what the words of a KRL move mean: a place that is written in them, one of a name, or an offset from it.
 
 #: Where the robot stands already: a move there changes nothing.
 _PRESENT: Final = frozenset({"$POS_ACT", "$AXIS_ACT", "$POS_ACT_MES", "$AXIS_ACT_MES"})
@@ -290,8 +286,6 @@ class Finder:
 def _same(one: tuple[str, str], other: tuple[str, str]) -> bool:
     return (one[0].casefold(), one[1].casefold()) == (other[0].casefold(), other[1].casefold())
 
-
-# Reading of KRL programs: follows every routine in the order of its text and puts targets and moves together.
 
 _KINDS: Final[dict[str, MoveKind]] = {
     "PTP": "joint",

@@ -1,4 +1,4 @@
-"""The instructions of RAPID that move the robot, where their arguments are, and those that do not move it.
+"""Data of RAPID written out, and the instructions that move the robot.
 
 Sources: ABB, Technical reference manual, RAPID Instructions, Functions and Data types (3HAC050917-001), syntax of each
 instruction; application manuals Arc and Arc Sensor, Spot options, Dispense, Paint and Continuous Application Platform.
@@ -43,7 +43,6 @@ from truearm.engine.robot.transform import MOVING_XYZ_ANGLES, QUATERNION, Transf
 # 5 bends. Arms that cannot bend backwards have 0 for cfx, whatever they do. So cfx is asked for the elbow alone, which
 # the quadrants leave open: in the words of :mod:`truearm.engine.robot.inverse.branches` the elbow is up where the wrist
 # centre is in front of both or behind both. Of an arm with another number of joints the data mean other things.
-
 _DEGREE: Final = pi / 180.0
 
 ROBTARGET: Final = Form("robtarget", "pose", orientation=QUATERNION, decimals=(3, 7))

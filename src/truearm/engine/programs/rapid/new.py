@@ -1,4 +1,4 @@
-r"""RAPID modules with stops, waits and circles.
+r"""New RAPID modules: targets one after the other, or with stops, waits and circles.
 
 Source: ABB, Technical reference manual, RAPID Instructions, Functions and Data types (3HAC050917-001): MoveAbsJ, MoveL,
 MoveC, CirPathMode, WaitTime, WaitDI, Stop, and the data types speeddata, zonedata and tooldata. ``WaitTime \InPos``
@@ -24,8 +24,6 @@ from truearm.engine.programs.new_program import (
     number,
 )
 from truearm.engine.programs.rapid.data import JOINTTARGET, ROBTARGET
-
-# New RAPID modules.
 
 _NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 

@@ -1,4 +1,4 @@
-"""Extra moves put before the linear and circular moves of a RAPID program.
+"""Extra moves before the linear and circular moves of a RAPID program, and its ConfL and ConfJ.
 
 A move is split into several of the same instruction. Its target is written out in the added ones, with the
 configuration data and external axes of the move's own target; an offset stays one, with other numbers. A stop point
@@ -31,7 +31,6 @@ from truearm.engine.programs.rapid.data import RELTOOL, ROBTARGET_TAIL
 from truearm.engine.programs.rapid.syntax import arguments_of, code_of
 
 # ConfL and ConfJ: where the controller does not look at the configuration data of targets.
-
 _SWITCH: Final = re.compile(r"\bConf([LJ])[ \t]*+\\[ \t]*+(On|Off)\b", re.I)
 
 

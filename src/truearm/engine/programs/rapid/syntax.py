@@ -18,10 +18,6 @@ from typing import Final, NamedTuple
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.program import Lines, Source, without_mark
 
-# What the files of a RAPID program hold: data, instructions, and which name means what at an instruction.
-#
-# Source: ABB, Technical reference manual, RAPID Kernel (3HAC050946-001): sections on lexical elements and scope rules.
-
 _OUTSIDE_CODE: Final = re.compile(r'![^\r\n]*+|"(?:[^"\r\n]|"")*+("?+)')
 _HEADER: Final = re.compile(r"\s*+%%%.*?%%%", re.S)
 _NOT_BRACKETS: Final = bytes(set(range(256)) - set(b"[](){};"))
@@ -170,8 +166,6 @@ def _wrong_bracket(brackets: str) -> int | None:
     return open_ones[-1] if open_ones else None
 
 
-# The arguments of RAPID's instructions and functions.
-#
 # Source: ABB, Technical reference manual, RAPID Kernel (3HAC050946-001), argument lists: optional arguments begin with
 # a backslash and may follow the one before without a comma.
 

@@ -35,8 +35,6 @@ from truearm.engine.programs.rapid.syntax import Arguments, Datum, Instruction, 
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.transform import Transform
 
-# The tools and work objects of a RAPID program: which a move names, and where the program says they are.
-
 _IDENTIFIER: Final = re.compile(r"[^\W\d]\w*+")
 
 Use = tuple[str, str]
@@ -128,8 +126,6 @@ class Frames:
         found = {datum.name: load_of(codes[datum.source], datum.start, datum.stop) for datum in self._tools.unchanged()}
         return {name: load for name, load in found.items() if load is not None}
 
-
-# The words that name targets in a RAPID program, and where the numbers behind them are.
 
 TARGET_TEXTS: Final = {"robtarget": ROBTARGET_TEXT, "jointtarget": JOINTTARGET_TEXT}
 _REFERENCE: Final = re.compile(r"([^\W\d]\w*+)\s*+(?:\{([^{}]*+)\})?+")

@@ -1,4 +1,4 @@
-"""URScript programs with stops, waits and circles.
+"""New URScript programs: targets one after the other, or with stops, waits and circles.
 
 Source: Universal Robots, The URScript programming language: movej, movel, movec, sleep, set_tcp, set_payload,
 get_standard_digital_in, popup. movec takes the orientation evenly from that of its start to that of its end. A popup
@@ -83,9 +83,6 @@ def _looked(signal: str, state: str) -> list[str]:
         "    looks = looks - 1",
         "  end",
     ]
-
-
-# New URScript programs.
 
 
 def new_program(program: NewProgram) -> dict[str, str]:

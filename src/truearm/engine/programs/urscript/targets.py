@@ -1,4 +1,4 @@
-"""The spots and moves of URScript files as a :class:`Program`: which spots are targets, and which have to stay."""
+"""Where the moves of URScript files go and with which TCP: which spots are targets, and which have to stay."""
 
 from __future__ import annotations
 

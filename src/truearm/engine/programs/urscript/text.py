@@ -1,10 +1,4 @@
-"""Split linear and circular moves of URScript: the same call before itself, once for each point on the way.
-
-The robot would stop at every point without a blend radius, and blends must not overlap (script manual, movej: a move
-whose blend overlaps with another one is skipped). So the points on the way get a small radius, and a move is left
-whole where its own radius, or the one it comes with, does not fit into its segments; where a time is given for it;
-where it goes to a target in a frame that the call does not name; and where its end is known to the robot alone.
-"""
+"""The text of a URScript file: values, routines, calls and names; and split moves."""
 
 from __future__ import annotations
 
@@ -252,11 +246,8 @@ def _numbers(found: re.Match[str], group: int) -> Numbers:
     return Numbers("pose" if kind else "joints", tuple(map(float, words)), spans[group + 2 : group + 8], *spans[group])
 
 
-# The routines, assignments and calls of a URScript file.
-#
 # Source: Universal Robots, The URScript Programming Language (script manual, e-Series), "Flow of Control", "Function",
 # "Scoping rules", "Threads", "Program Label", "Secondary Programs".
-
 _NAME_SCRIPT: Final = r"[A-Za-z_]\w*"
 _EVENT: Final = re.compile(
     rf"""
@@ -405,7 +396,6 @@ class Script(Text):
 # A name is looked for in the routine, then among the global variables, then in the routines around it (script manual,
 # "Scoping rules"). Of several assignments the last one before the place of use holds, in the order of the text, or else
 # the first one.
-
 _GLOBAL: Final = -1
 _START: Final = attrgetter("start")
 
@@ -455,6 +445,12 @@ _WORD_SPLIT: Final = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _DECIMALS: Final = 6
 
 
+# Split linear and circular moves of URScript: the same call before itself, once for each point on the way.
+#
+# The robot would stop at every point without a blend radius, and blends must not overlap (script manual, movej: a move
+# whose blend overlaps with another one is skipped). So the points on the way get a small radius, and a move is left
+# whole where its own radius, or the one it comes with, does not fit into its segments; where a time is given for it;
+# where it goes to a target in a frame that the call does not name; and where its end is known to the robot alone.
 def split_moves(program: Program, splits: Sequence[Split]) -> SplitEdits:
     """Split moves."""
     texts: dict[int, _Blends] = {}

@@ -1,4 +1,4 @@
-"""Staubli VAL3: frames and tools, which are chains of fathers."""
+"""Staubli VAL3: the variables of a data file (``.dtx``), and frames and tools, which are chains of fathers."""
 
 from __future__ import annotations
 
@@ -14,12 +14,9 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.programs.program import BYTE_ORDER_MARK, LARGEST, NUMBER, Lines, Source
 from truearm.engine.robot.transform import IDENTITY, MOVING_XYZ_ANGLES, Transform
 
-# Staubli VAL3: the variables of a data file (``.dtx``), with the places of their numbers.
-#
 # Two formats are in use. In that of VAL3 7 and later, ``Data`` names a variable and ``Value`` one of its elements;
 # numbers that are zero need not be written. In that of VAL3 5 and 6 every type has a section, and the numbers of an
 # element are in a tag of their own.
-
 FRAME: Final = ("x", "y", "z", "rx", "ry", "rz")
 #: Numbers of an element of each type.
 NUMBERS: Final = {

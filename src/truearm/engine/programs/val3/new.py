@@ -1,4 +1,4 @@
-"""VAL3 applications with stops, waits and circles.
+"""New VAL3 applications, in files as the controllers of the CS8 and CS9 write them (VAL3 s7).
 
 Source: Staubli, VAL3 reference manual: movej, movel, movec, waitEndMove, delay, watch, userPage, putln, get, and the
 motion descriptor, whose ``vel`` is the share of the joints' speed in percent and ``tvel`` the speed of the tip in mm/s,
@@ -26,8 +26,6 @@ from truearm.engine.programs.new_program import (
 )
 from truearm.engine.programs.program import Form
 from truearm.engine.robot.transform import MOVING_XYZ_ANGLES
-
-# New VAL3 applications, in files as the controllers of the CS8 and CS9 write them (VAL3 s7).
 
 JOINT: Final = Form("jointRx", "joints", angle=radians(1.0))
 POINT: Final = Form("pointRx", "pose", angle=radians(1.0), orientation=MOVING_XYZ_ANGLES)

@@ -1,4 +1,4 @@
-"""Into URDF joints: from one joint variable to the next as an origin, each axis in its own frame."""
+"""Links of a robot in another convention: lines of axes, common normals, directions of axes, URDF joints."""
 
 from __future__ import annotations
 
@@ -29,8 +29,6 @@ from truearm.engine.robot.lines import (
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.urdf_tree import roll_pitch_yaw
 
-# What a conversion works out: the rows of the new robot, and its base where that has to move.
-
 
 @dataclass(frozen=True)
 class Links:
@@ -42,8 +40,6 @@ class Links:
 
 
 # Into the zero-reference model and the product of exponentials: axes in the base frame at zero joint positions.
-
-
 def zero_reference(robot: Robot) -> Links:
     """Return direction and point of every axis."""
     return Links(tuple(_named("axis_", along) | _named("", point) for _, along, point in _axes_in_base(robot)))

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from truearm.engine.robot.robot import Robot
 
 
-# Turns: which of the joint positions a whole turn apart a joint shall have.
-
 _TURN: Final = 2 * np.pi
 #: A joint this far beyond a limit still lies on it [rad or m].
 _ON_LIMIT: Final = 1e-9
@@ -70,8 +68,6 @@ def nearest_turns(robot: Robot, joints: Array, seed: Array) -> Array:
     turned: Array = np.where(turning, joints + _TURN * turns, joints)
     return turned
 
-
-# Candidates: joints that were found for poses, and the choice among them.
 
 #: A pose is reached within this [m, rad].
 REACHED: Final = 1e-9

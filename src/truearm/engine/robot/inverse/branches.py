@@ -1,4 +1,4 @@
-"""All branches of a nominal arm in closed form, as starts for the calibrated one.
+"""The branches of an arm of six joints by name, and all of them in closed form, as starts for the calibrated arm.
 
 The solutions come from EAIK (Ostermeier, Kuelz and Althoff, "Automatic geometric decomposition for analytical inverse
 kinematics", arXiv 2409.14815, with the subproblems of Elias and Wen, arXiv 2211.05737). It needs axes that are exactly

@@ -233,8 +233,6 @@ def _turned(sine: Array, cosine: Array, across: Array) -> Array:
     return np.where(lost, np.pi * across, vector)
 
 
-# What inverse kinematics answers: joint positions for poses, and how far each answer can be trusted.
-
 #: Poses explained one by one where a person looks at the solutions.
 _EXPLAINED: Final = 5
 

@@ -1,9 +1,4 @@
-"""Correlations of a proof in a robot file: rows of numbers, or, where there are thousands of them, one short text.
-
-The factor of hundreds of parameters has tens of thousands of numbers, which nobody reads and YAML reads slowly. They
-are whole multiples of 1e-7 (:mod:`truearm.engine.robot.proof` rounds them) from -1 to 1, and are written as 25 bits
-each in base64: two fifths of their length in digits. Others are written in digits, so that nothing is lost.
-"""
+"""Short entries of a robot file for hundreds of numbers: curves of joints, and correlations of a proof."""
 
 from __future__ import annotations
 
@@ -24,6 +19,11 @@ from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.proof import DECIMALS
 from truearm.engine.robot.robot_file.entries import STRICT
 
+# Correlations of a proof in a robot file: rows of numbers, or, where there are thousands of them, one short text.
+#
+# The factor of hundreds of parameters has tens of thousands of numbers, which nobody reads and YAML reads slowly. They
+# are whole multiples of 1e-7 (:mod:`truearm.engine.robot.proof` rounds them) from -1 to 1, and are written as 25 bits
+# each in base64: two fifths of their length in digits. Others are written in digits, so that nothing is lost.
 Factor = tuple[tuple[float, ...], ...]
 
 #: Parameters up to which rows of numbers are written.
@@ -111,8 +111,6 @@ def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:
         )
     return known
 
-
-# The entry of a joint's curve in a robot file: one line each for what hundreds of parameters would be.
 
 #: What may be left out where it is zero, or not known, for all terms of a joint.
 _OPTIONAL: Final = ("nominal", "deviation", "informed")

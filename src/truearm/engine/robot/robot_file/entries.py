@@ -1,4 +1,4 @@
-"""The entry `reach` of a robot file: how far the arm reaches, as its maker says."""
+"""Entries of a robot file, checked: places, balancers, controller, reach."""
 
 from __future__ import annotations
 
@@ -22,8 +22,6 @@ from truearm.engine.robot.transform import IDENTITY, Transform
 if TYPE_CHECKING:
     from truearm.engine.robot.robot import Robot
 
-
-# What the entries of a robot file are made of: numbers, names, quaternions and places, checked.
 
 #: What a robot and a joint may be called.
 NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}"

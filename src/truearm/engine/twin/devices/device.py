@@ -1,4 +1,4 @@
-"""Instruments that read where targets are: laser tracker and measurement arm (Nubiola, sections 2.2 and 3.5)."""
+"""Instruments: what they see of an arm, and how well; laser tracker and measurement arm (Nubiola, 2.2 and 3.5)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, rigid_motion
 from truearm.engine.twin.truths import DEFAULT_TOOL, at_station
 from truearm.engine.twin.twin import Twin, directions
-
-# An instrument: what it sees of an arm, how well, and what stands beside the robot for it.
 
 IntArray = NDArray[np.intp]
 _DRAWS: Final = 200

@@ -1,4 +1,4 @@
-"""Known points touched by hand: the holes of a calibration table (Li et al.), a printed circle (Patel, 5.5.2)."""
+"""Devices that read lengths or touch known points: hexapod ballbar, telescoping ballbar, strings, plates."""
 
 from __future__ import annotations
 
@@ -19,8 +19,6 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.devices.calibration_table import rectangular_grid
 from truearm.engine.twin.devices.device import Arm, Device, IntArray, recorded
 from truearm.engine.twin.devices.jogging import SPARE, jogged, postures_at, site
-
-# The hexapod ballbar device as an instrument among others: places of three cups from six lengths.
 
 #: Where the fixture is put: shares of the way out to the middle of the reach, and how much lower than that [m].
 _FIXTURE_DISTANCES: Final = (0.6, 0.8, 1.0)
@@ -143,6 +141,7 @@ HEXAPOD: Final = HexapodPoses(
 _STAYS: Final = np.deg2rad(75.0)
 
 
+# Known points touched by hand: the holes of a calibration table (Li et al.), a printed circle (Patel, 5.5.2).
 @dataclass(frozen=True)
 class KnownPoints(Device):
     """A plate with known points that the tip is jogged to by hand, at several places in turn.

@@ -1,7 +1,4 @@
-"""Devices that read a ball's place in a small volume of their own: stereo cameras, five lasers, three linear gauges.
-
-Where they stand is not known; they are put to several places in turn (Nubiola, section 1.7).
-"""
+"""Cameras with artefacts, closed loops, and devices that read a ball's place in a small volume."""
 
 from __future__ import annotations
 
@@ -19,9 +16,8 @@ from truearm.engine.robot.transform import quaternion_from_rotation, rotation_fr
 from truearm.engine.twin.devices.device import Arm, Device, recorded, shown
 from truearm.engine.twin.devices.jogging import SPARE, jogged, postures_at, site
 
+
 # Cameras that read the pose of an artefact: optical CMM, three active markers (Nubiola, 2.2; Patel, 3.3).
-
-
 @dataclass(frozen=True)
 class Artefact(Device):
     """Cameras at the origin of the world that count what they see of an artefact on the flange.
@@ -132,6 +128,9 @@ _BALL: Final = Tool({"ball": (0.02, 0.01, 0.12)})
 _PLACES: Final = ((0.0, -0.15, -0.1), (0.0, 0.15, -0.1), (0.1, 0.0, 0.1))
 
 
+# Devices that read a ball's place in a small volume of their own: stereo cameras, five lasers, three linear gauges.
+#
+# Where they stand is not known; they are put to several places in turn (Nubiola, section 1.7).
 @dataclass(frozen=True)
 class SmallVolume(Device):
     """A device that reads where the centre of a ball is, within a box, in its own frame."""

@@ -6,8 +6,8 @@ import math
 from typing import Final
 
 import numpy as np
-from papers.katana.robot import NAMES
 
+from papers.katana.robot import NAMES
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from papers.li_table.arm import BOUNDS, CAMERA, TIP, arm, believed, board, fit, tables, touched_by_hand, truth
 from tests.simulated import campaign
 
+from papers.li_table.arm import BOUNDS, CAMERA, TIP, arm, believed, board, fit, tables, touched_by_hand, truth
 from truearm.calibration.calibrate import calibrate
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset

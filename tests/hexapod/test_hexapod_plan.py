@@ -7,10 +7,10 @@ from functools import reduce
 
 import numpy as np
 import pytest
-from papers.campaign import Campaign, touching, two_steps
-from papers.placements import identify_placements, in_one_frame
 from scipy.optimize import minimize
 
+from papers.campaign import Campaign, touching, two_steps
+from papers.placements import identify_placements, in_one_frame
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.hexapod import DEVICE, HexapodPose, leg_lengths, poses, triangle

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+import truearm
+from papers import STUDIES, Entry, run_study
 from papers.regions import IRB120
 from papers.seeds import Seed, median_of, over_seeds, seeds_done_by
 from papers.study import Picture, Row, Study, Table, number
 from papers.verdicts import VERDICTS, Comparison
-
-import truearm
-from papers import STUDIES, Entry, run_study
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.workers import Given
 from truearm.engine.document.drawing import axis, figure

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from papers.study import Study
 
 from papers import hexapod_device, irb120_hexapod
+from papers.study import Study
 
 
 def silent(_: str) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+
 from papers.katana.pose_errors import pose_errors, tip_poses, true_poses, zxz
 from papers.katana.printed import TABLE_3_2, TABLE_3_3, column_of_4_6
 from papers.katana.robot import NAMES, TIP, Published, deviations, katana, published
@@ -15,7 +16,6 @@ from papers.katana_influence import study as influence_study
 from papers.katana_tilting import study as tilting_study
 from papers.katana_trajectory import study as trajectory_study
 from papers.study import Study
-
 from truearm.engine.twin.twin import Twin
 
 

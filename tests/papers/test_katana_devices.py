@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from papers.katana.robot import katana
 from papers.katana_devices import study
 from papers.katana_devices.page import OnPage
 from papers.katana_devices.run import together
 from papers.katana_devices.setup import USED, Counts
 from papers.study import Study
-
 from truearm.engine.data.observations import compared
 from truearm.engine.twin.devices import named_device
 from truearm.engine.twin.devices.device import measured_with

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from papers.li_table import study
 from papers.li_table.arm import (
     BEYOND,
@@ -21,7 +22,6 @@ from papers.li_table.arm import (
 from papers.li_table.run import Followed, Following
 from papers.li_table.tables import METHOD_WORDS, SURFACE_WORDS
 from papers.study import Row, Study, Table
-
 from truearm.calibration.calibrate import calibrate
 from truearm.validation.validate import validate
 

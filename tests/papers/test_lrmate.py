@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from papers.lrmate_hexapod import study
 from papers.lrmate_hexapod.identification import (
     NAMES,
@@ -17,7 +18,6 @@ from papers.lrmate_hexapod.identification import (
 from papers.lrmate_hexapod.judgement import allowed_configurations, held_out, judged
 from papers.lrmate_hexapod.robot import FIXTURE, REFERENCE, invented_twin, nominal_robot, touches
 from papers.study import Study, Table
-
 from truearm.engine.data.hexapod import triangle
 from truearm.engine.robot.transform import Transform
 from truearm.engine.twin.twin import Twin, measure

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from papers.katana.robot import NAMES, PERTURBATIONS
 from tests.katana import katana
 
+from papers.katana.robot import NAMES, PERTURBATIONS
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot

@@ -3,9 +3,9 @@ from __future__ import annotations
 import json
 
 import numpy as np
-from papers.katana.robot import NAMES, PERTURBATIONS
 from tests.katana import katana
 
+from papers.katana.robot import NAMES, PERTURBATIONS
 from truearm.simulation.influence_report import influence_figure
 from truearm.simulation.influences import Influence, influence
 

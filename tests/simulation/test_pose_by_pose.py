@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from papers.katana.robot import NAMES, PERTURBATIONS, UNITS
 from tests.katana import UNIT, drawn, katana, readings, values
 
+from papers.katana.robot import NAMES, PERTURBATIONS, UNITS
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of

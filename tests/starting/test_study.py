@@ -7,10 +7,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from papers.study import Study
 from tests.commanding import Truearm
 
 from papers import STUDIES, irb120_simulation
+from papers.study import Study
 from truearm.engine.base.manifest import MANIFEST
 
 WHOLE = irb120_simulation.study

@@ -61,9 +61,8 @@ def study(
         If there is no such study, or its data are missing, or it needs none.
     """
     find_papers()
-    from papers.seeds import seeds_done_by
-
     from papers import run_study
+    from papers.seeds import seeds_done_by
 
     progress_argument(progress)
     name = name_argument(name, "name")

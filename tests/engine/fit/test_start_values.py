@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from papers.katana.tilting import twin as tilting_twin
 
+from papers.katana.tilting import twin as tilting_twin
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from papers.katana.robot import katana, published
 
+from papers.katana.robot import katana, published
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text, read_csv

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -55,14 +55,16 @@ def module_of(path: Path) -> str:
 
 
 def _dotted(node: ast.AST) -> str:
+    if isinstance(node, ast.arg):
+        return f"{node.arg}="
     if isinstance(node, ast.Attribute):
         return f"{_dotted(node.value)}.{node.attr}"
     return node.id if isinstance(node, ast.Name) else "?"
 
 
-def imported(tree: ast.AST) -> Iterator[tuple[str, str, ast.alias]]:
-    """Give what is imported anywhere in it: the name it has here, its dotted name, and its place."""
-    for node in ast.walk(tree):
+def imported(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, str, ast.alias]]:
+    """Give what is imported: the name it has here, its dotted name, and its place."""
+    for node in nodes:
         for alias in node.names if isinstance(node, ast.Import | ast.ImportFrom) else ():
             before = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
             yield alias.asname or alias.name, f"{before}{alias.name}", alias
@@ -81,19 +83,51 @@ class Pruned:
         self.module, self.path, self.text, self.registry = module_of(path), path, text, registry
         self.tree = ast.parse(text)
         self.changed: dict[int, ast.stmt | None] = {}
-        self._known = {name: dotted for name, dotted, _ in imported(self.tree) if "." not in name}
-        self._known |= {name.partition(".")[0]: name.partition(".")[0] for name, _, _ in imported(self.tree) if "." in name}
+        self._trims = 0
+        nodes = [*ast.walk(self.tree)]
+        self.imported = [(name, dotted) for name, dotted, _ in imported(nodes)]
+        self._known = {name: dotted for name, dotted in self.imported if "." not in name}
+        self._known |= {name.partition(".")[0]: name.partition(".")[0] for name, _ in self.imported if "." in name}
         self._docs = {
             id(node.body[0].value)
-            for node in ast.walk(self.tree)
+            for node in nodes
             if isinstance(node, Definition | ast.Module) and node.body and isinstance(node.body[0], ast.Expr)
         }
+        self._parts: dict[str, ast.AST] = {}  # one of each kind of what may be gone, for a quick look
+        for node in nodes:
+            if isinstance(node, ast.Name | ast.Attribute | ast.arg):
+                self._parts.setdefault(_dotted(node), node)
+            elif isinstance(node, ast.Import | ast.ImportFrom):
+                self._parts[f"import {id(node)}"] = node
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and (registry or "truearm" in node.value):
+                self._parts.setdefault(f"text {node.value}", node)
+            elif isinstance(node, ast.Call | ast.List | ast.Tuple) and self._words(node):
+                self._parts[f"words {id(node)}"] = node
+
+    def _words(self, node: ast.Call | ast.List | ast.Tuple) -> list[object]:
+        """Return the words of the command that a call or a list is, if it is one."""
+        nodes = node.args if isinstance(node, ast.Call) else node.elts
+        words = [n.value if isinstance(n, ast.Constant) else None for n in nodes]
+        if isinstance(node, ast.Call) and _dotted(node.func) == "truearm":
+            return [*words]
+        return [*words[words.index("truearm") + 1 :]] if "truearm" in words else []
+
+    def touched(self, gone: Gone) -> bool:
+        """Whether the file may use what is gone."""
+        fixtures = {name for _, name in gone.fixtures}
+        return any(
+            part.arg in fixtures or (self.module, part.arg) in gone.names
+            if isinstance(part, ast.arg)
+            else self._is_gone(part, set(), gone) or self._names(part, gone)
+            for part in self._parts.values()
+        )
 
     def uses(self, node: ast.AST, gone: Gone) -> bool:
         """Whether a part of the file uses what is gone."""
-        own = {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-        own |= {n.arg for n in ast.walk(node) if isinstance(n, ast.arg)}
-        return any(self._is_gone(part, own, gone) for part in ast.walk(node)) or (
+        parts = [*ast.walk(node)]
+        own = {n.id for n in parts if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        own |= {n.arg for n in parts if isinstance(n, ast.arg)}
+        return any(self._is_gone(part, own, gone) for part in parts) or (
             isinstance(node, ast.FunctionDef)
             and (node.name.startswith("test_") or _is_fixture(node))
             and any(self._without(one.arg, gone) for one in node.args.args)
@@ -113,16 +147,10 @@ class Pruned:
             first, _, rest = _dotted(node).partition(".")
             return first not in own and gone.has(f"{self._known.get(first, '?')}.{rest}")
         if isinstance(node, ast.Import | ast.ImportFrom):
-            return any(gone.has(dotted) for _, dotted, _ in imported(node))
+            return any(gone.has(dotted) for _, dotted, _ in imported([node]))
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in self._docs:
             return gone.in_text(node.value)
-        if isinstance(node, ast.Call | ast.List | ast.Tuple):
-            nodes = node.args if isinstance(node, ast.Call) else node.elts
-            words = [n.value if isinstance(n, ast.Constant) else None for n in nodes]
-            runs = isinstance(node, ast.Call) and _dotted(node.func) == "truearm"
-            after = words[words.index("truearm") + 1 :] if "truearm" in words else words if runs else []
-            return gone.called(after)
-        return False
+        return isinstance(node, ast.Call | ast.List | ast.Tuple) and gone.called(self._words(node))
 
     def _names(self, entry: ast.AST, gone: Gone) -> bool:
         """Whether an entry of a registry names what is gone."""
@@ -145,10 +173,12 @@ class Pruned:
                 if not any(part is not None and (self.uses(part, gone) or self._names(part, gone)) for part in (key, value))
             ]
             node.keys, node.values = [key for key, _ in left], [value for _, value in left]
+            self._trims += len(pairs) - len(left)
             return bool(pairs) and not left
         if isinstance(node, ast.List | ast.Tuple | ast.Set):
             before = len(node.elts)
             node.elts = [entry for entry in node.elts if not (self.uses(entry, gone) or self._names(entry, gone))]
+            self._trims += before - len(node.elts)
             return before > 0 and not node.elts
         if isinstance(node, ast.Call | ast.BinOp | ast.keyword | ast.Starred):
             return any([self._trimmed(child, gone) for child in ast.iter_child_nodes(node)])
@@ -158,9 +188,8 @@ class Pruned:
         """Take entries out of the values of a test's parameters; whether none is left."""
         if not (isinstance(one, ast.Call) and _dotted(one.func).endswith("parametrize") and len(one.args) > 1):
             return False
-        before = ast.dump(one.args[1])
-        empty = self._trimmed(one.args[1], gone)
-        if ast.dump(one.args[1]) != before:
+        before, empty = self._trims, self._trimmed(one.args[1], gone)
+        if self._trims > before:
             one.keywords = [k for k in one.keywords if not (k.arg == "ids" and isinstance(k.value, ast.List | ast.Tuple))]
         return empty
 
@@ -169,8 +198,9 @@ class Pruned:
         bound: list[str] = []
         left: ast.stmt | None = node
         if isinstance(node, ast.Import | ast.ImportFrom):
-            kept = [alias for _, dotted, alias in imported(node) if not gone.has(dotted)]
+            kept = [alias for _, dotted, alias in imported([node]) if not gone.has(dotted)]
             bound = [a.asname or a.name for a in node.names if a not in kept]
+            self._trims += len(node.names) - len(kept)
             node.names, left = kept, node if kept else None
         elif isinstance(node, Definition):
             empty = any([self._parametrized(one, gone) for one in node.decorator_list])
@@ -182,9 +212,9 @@ class Pruned:
             keys = _keys(node.value)
             empty = node.value is not None and self._trimmed(node.value, gone) and isinstance(node, ast.Assign)
             if own == ["__all__"] and isinstance(node.value, ast.List | ast.Tuple):
-                node.value.elts = [
-                    e for e in node.value.elts if not (isinstance(e, ast.Constant) and (self.module, e.value) in gone.names)
-                ]
+                gone_here = [e for e in node.value.elts if isinstance(e, ast.Constant) and (self.module, e.value) in gone.names]
+                node.value.elts = [e for e in node.value.elts if e not in gone_here]
+                self._trims += len(gone_here)
             elif empty or node.value is not None and self.uses(node.value, gone):
                 bound, left = own, None
             if self.registry:
@@ -192,7 +222,9 @@ class Pruned:
             if self.module == "truearm":
                 gone.names |= {("truearm", key) for key in keys - _keys(node.value)}
         elif isinstance(node, ast.If | ast.With | ast.Try | ast.For):
+            before = len(node.body)
             node.body = [kept for part in node.body if (kept := self._kept(part, gone)) is not None]
+            self._trims += before - len(node.body)
             left = node if node.body and not self.uses(node, gone) else None
         elif isinstance(node, ast.Expr):
             self._trimmed(node.value, gone)
@@ -206,13 +238,15 @@ class Pruned:
 
     def prune(self, gone: Gone) -> None:
         """Take out of it what uses what is gone; once more where more is gone by now."""
+        if not self.touched(gone):
+            return
         for place, node in enumerate(self.tree.body):
             now = self.changed.get(place, node)
             if now is None:
                 continue
-            before = ast.dump(now)
+            self._trims = 0
             left = self._kept(now, gone)
-            if left is None or ast.dump(left) != before:
+            if left is None or self._trims:
                 self.changed[place] = left
 
     def written(self) -> str:
@@ -241,6 +275,6 @@ def _keys(node: ast.expr | None) -> set[str]:
 def prune(files: list[Pruned], gone: Gone) -> None:
     """Prune files until nothing more is to go."""
     before: object = None
-    while before != (before := (len(gone.names), len(gone.keys), len(gone.fixtures), sum(len(f.changed) for f in files))):
+    while before != (before := (len(gone.names), len(gone.keys), len(gone.fixtures))):
         for file in files:
             file.prune(gone)

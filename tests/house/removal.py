@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Final
 
 from ruamel.yaml import YAML
-from tests.house.pruning import Gone, Pruned, imported, module_of, prune
+from tests.house.pruning import Gone, Pruned, prune
 from tests.mutants.running import copy_of_the_tree, pytest
 from tests.mutants.tree import ROOT
 
@@ -80,12 +80,12 @@ def _piece(module: str) -> str:
     return module if part in IN_PARTS else part
 
 
-def _gone(feature: str, trees: dict[str, ast.Module]) -> Gone:
+def _gone(feature: str, files: dict[str, Pruned]) -> Gone:
     """Return the modules that go with a feature, and their tests."""
     gone = Gone({"papers" if feature == "papers" else f"truearm.{feature}"})
     jobs = {
         key.value: value.value
-        for node in ast.walk(trees["truearm"])
+        for node in ast.walk(files["truearm"].tree)
         if isinstance(node, ast.Dict)
         for key, value in zip(node.keys, node.values, strict=True)
         if isinstance(key, ast.Constant) and isinstance(value, ast.Constant)
@@ -93,15 +93,13 @@ def _gone(feature: str, trees: dict[str, ast.Module]) -> Gone:
     before = 0
     while before != (before := len(gone.modules)):
         gone.names = {("truearm", str(job)) for job, home in jobs.items() if gone.has(str(home))}
-        for module, tree in trees.items():
+        for module, file in files.items():
             if module in REGISTRIES or gone.has(module):
                 continue
-            used = {_dotted for _, _dotted, _ in imported(tree)}
-            used |= {f"truearm.{n.attr}" for n in ast.walk(tree) if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "truearm"}
-            if any(gone.has(dotted) for dotted in used):
+            if file.touched(gone):
                 assert not module.startswith("truearm.engine"), f"{module} uses {feature}"
                 gone.modules.add(_piece(module))
-        pages = {dotted for _, dotted, _ in imported(trees["truearm.studio.pages"]) if ".pages." in dotted}
+        pages = {dotted for _, dotted in files["truearm.studio.pages"].imported if ".pages." in dotted}
         for part, needed in IN_PARTS.items():
             if any(map(gone.has, needed)) or (part == "truearm.studio" and all(map(gone.has, pages))):
                 gone.modules.add(part)
@@ -136,7 +134,7 @@ def removed(feature: str, copy: Path) -> Gone:
         Pruned(path.relative_to(copy), text, registry=str(path.relative_to(copy)).startswith(LISTS))
         for path, text in files.items()
     ]
-    gone = _gone(feature, {file.module: file.tree for file in pruned if file.path.parts[0] != "tests"})
+    gone = _gone(feature, {file.module: file for file in pruned if file.path.parts[0] != "tests"})
     left = [file for file in pruned if not gone.has(file.module)]
     prune([file for file in left if file.module in REGISTRIES], gone)
     _write([file for file in left if file.module in REGISTRIES], copy)

@@ -222,9 +222,9 @@ class Pruned:
             if self.module == "truearm":
                 gone.names |= {("truearm", key) for key in keys - _keys(node.value)}
         elif isinstance(node, ast.If | ast.With | ast.Try | ast.For):
-            before = len(node.body)
-            node.body = [kept for part in node.body if (kept := self._kept(part, gone)) is not None]
-            self._trims += before - len(node.body)
+            body = [one for part in node.body if (one := self._kept(part, gone)) is not None]
+            self._trims += len(node.body) - len(body)
+            node.body = body
             left = node if node.body and not self.uses(node, gone) else None
         elif isinstance(node, ast.Expr):
             self._trimmed(node.value, gone)

@@ -27,9 +27,11 @@ from tests.mutants.running import copy_of_the_tree, pytest
 from tests.mutants.tree import ROOT
 
 #: Modules that list what there is: there a line goes.
-REGISTRIES: Final = ("truearm", "truearm.commands", "truearm.studio.pages", "papers")
+REGISTRIES: Final = ("truearm", "truearm.commands", "truearm.starting.command", "truearm.studio.pages", "papers")
 #: Parts of which single files may go, and what may not: without it the whole part goes.
 IN_PARTS: Final = {"truearm.studio": ("truearm.studio.command",), "papers": ("papers.study",)}
+#: What belongs to the papers and lies elsewhere: what runs them.
+OF_PAPERS: Final = ("truearm.starting.published", "truearm.starting.study")
 #: Files of tests whose lists name jobs.
 LISTS: Final = ("tests/house/", "tests/fuzz/", "tests/honesty/", "tests/kill_every_job.py")
 #: Tests that go through the registries, and are quick; and those of the whole tree, which is not what is here.
@@ -72,17 +74,17 @@ def _part(module: str) -> str:
     return "papers" if module.startswith("papers") else ".".join(module.split(".")[:2])
 
 
-def _piece(module: str) -> str:
-    """Return what goes with a module: its feature, its file of the studio, or its study."""
-    part = _part(module)
-    if part == "papers":
-        return ".".join(module.split(".")[:2])
-    return module if part in IN_PARTS else part
+def _piece(module: str, studies: set[str]) -> str:
+    """Return what goes with a module: its feature, its study, or only itself in the studio and in the papers."""
+    part, study = _part(module), ".".join(module.split(".")[:2])
+    return study if study in studies else module if part in IN_PARTS else part
 
 
 def _gone(feature: str, files: dict[str, Pruned]) -> Gone:
     """Return the modules that go with a feature, and their tests."""
-    gone = Gone({"papers" if feature == "papers" else f"truearm.{feature}"})
+    gone = Gone({"papers", *OF_PAPERS} if feature == "papers" else {f"truearm.{feature}"})
+    names = {n.value for n in ast.walk(files["papers"].tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+    studies = {f"papers.{name.replace('-', '_')}" for name in names}
     jobs = {
         key.value: value.value
         for node in ast.walk(files["truearm"].tree)
@@ -98,13 +100,13 @@ def _gone(feature: str, files: dict[str, Pruned]) -> Gone:
                 continue
             if file.touched(gone):
                 assert not module.startswith("truearm.engine"), f"{module} uses {feature}"
-                gone.modules.add(_piece(module))
+                gone.modules.add(_piece(module, studies))
         pages = {dotted for _, dotted in files["truearm.studio.pages"].imported if ".pages." in dotted}
         for part, needed in IN_PARTS.items():
             if any(map(gone.has, needed)) or (part == "truearm.studio" and all(map(gone.has, pages))):
                 gone.modules.add(part)
-    gone.modules = {m for m in gone.modules if m in ("truearm.studio", "papers") or not (_part(m) in gone.modules and m != _part(m))}
-    gone.modules |= {f"tests.{module.removeprefix('truearm.')}" for module in gone.modules if module.count(".") < 2}
+    gone.modules = {module for module in gone.modules if module == _part(module) or _part(module) not in gone.modules}
+    gone.modules |= {f"tests.{module.removeprefix('truearm.')}" for module in gone.modules if module == _part(module)}
     gone.keys = {name for _, name in gone.names}
     gone.keys |= {m.removeprefix("papers.").replace("_", "-") for m in gone.modules if m.startswith("papers.")}
     return gone

@@ -99,7 +99,9 @@ class Pruned:
                 self._parts.setdefault(_dotted(node), node)
             elif isinstance(node, ast.Import | ast.ImportFrom):
                 self._parts[f"import {id(node)}"] = node
-            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and (registry or "truearm" in node.value):
+            elif (
+                isinstance(node, ast.Constant) and isinstance(node.value, str) and (registry or "truearm" in node.value)
+            ):
                 self._parts.setdefault(f"text {node.value}", node)
             elif isinstance(node, ast.Call | ast.List | ast.Tuple) and self._words(node):
                 self._parts[f"words {id(node)}"] = node
@@ -170,7 +172,9 @@ class Pruned:
             left = [
                 (key, value)
                 for key, value in pairs
-                if not any(part is not None and (self.uses(part, gone) or self._names(part, gone)) for part in (key, value))
+                if not any(
+                    part is not None and (self.uses(part, gone) or self._names(part, gone)) for part in (key, value)
+                )
             ]
             node.keys, node.values = [key for key, _ in left], [value for _, value in left]
             self._trims += len(pairs) - len(left)
@@ -190,7 +194,9 @@ class Pruned:
             return False
         before, empty = self._trims, self._trimmed(one.args[1], gone)
         if self._trims > before:
-            one.keywords = [k for k in one.keywords if not (k.arg == "ids" and isinstance(k.value, ast.List | ast.Tuple))]
+            one.keywords = [
+                k for k in one.keywords if not (k.arg == "ids" and isinstance(k.value, ast.List | ast.Tuple))
+            ]
         return empty
 
     def _kept(self, node: ast.stmt, gone: Gone) -> ast.stmt | None:
@@ -212,7 +218,9 @@ class Pruned:
             keys = _keys(node.value)
             empty = node.value is not None and self._trimmed(node.value, gone) and isinstance(node, ast.Assign)
             if own == ["__all__"] and isinstance(node.value, ast.List | ast.Tuple):
-                gone_here = [e for e in node.value.elts if isinstance(e, ast.Constant) and (self.module, e.value) in gone.names]
+                gone_here = [
+                    e for e in node.value.elts if isinstance(e, ast.Constant) and (self.module, e.value) in gone.names
+                ]
                 node.value.elts = [e for e in node.value.elts if e not in gone_here]
                 self._trims += len(gone_here)
             elif empty or node.value is not None and self.uses(node.value, gone):

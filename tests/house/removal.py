@@ -83,7 +83,9 @@ def _piece(module: str, studies: set[str]) -> str:
 def _gone(feature: str, files: dict[str, Pruned]) -> Gone:
     """Return the modules that go with a feature, and their tests."""
     gone = Gone({"papers", *OF_PAPERS} if feature == "papers" else {f"truearm.{feature}"})
-    names = {n.value for n in ast.walk(files["papers"].tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+    names = {
+        n.value for n in ast.walk(files["papers"].tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)
+    }
     studies = {f"papers.{name.replace('-', '_')}" for name in names}
     jobs = {
         key.value: value.value
@@ -192,8 +194,20 @@ def faults(copy: Path, gone: Gone, *, whole: bool) -> dict[str, str]:
     checks = {
         "imports": ("-c", _IMPORTS, *(() if gone.has("papers") else ("papers",))),
         "names": ("-m", "ruff", "check", "-q", "--select", "F821,F401,F811", "src", "tests"),
-        "types": ("-m", "mypy", "--cache-dir", str(cache), *(p for p in ("src", "papers", "tests") if (copy / p).is_dir())),
-        "contract": ("-c", "from importlinter.cli import lint_imports_command as c; c()", "--config", ".importlinter", "--no-cache"),
+        "types": (
+            "-m",
+            "mypy",
+            "--cache-dir",
+            str(cache),
+            *(p for p in ("src", "papers", "tests") if (copy / p).is_dir()),
+        ),
+        "contract": (
+            "-c",
+            "from importlinter.cli import lint_imports_command as c; c()",
+            "--config",
+            ".importlinter",
+            "--no-cache",
+        ),
         "help": ("-m", "truearm", "--help"),
     }
     found = {}
@@ -206,7 +220,11 @@ def faults(copy: Path, gone: Gone, *, whole: bool) -> dict[str, str]:
             found[name] = run.stdout
         sys.stdout.write(f"    {name} {time.monotonic() - begun:.0f} s\n")
     ignored = [f"--ignore={name}" for name in OF_THE_WHOLE]
-    runs = {"tests": ("tests",)} if whole else {"collection": ("--collect-only", "tests"), "tests": tuple(f"tests/{name}" for name in QUICK)}
+    runs = (
+        {"tests": ("tests",)}
+        if whole
+        else {"collection": ("--collect-only", "tests"), "tests": tuple(f"tests/{name}" for name in QUICK)}
+    )
     for name, words in runs.items():
         begun = time.monotonic()
         code, printed = pytest(copy, *ignored, *words)

@@ -1,4 +1,8 @@
+import sys
 from importlib.metadata import version as installed_version
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # papers/, which is not installed
 
 project = "truearm"
 author = "the truearm developers"

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from papers.session import cups_dataset, joined, measure_poses, set_up
-from papers.simulated import Ballbar
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.hexapod import HexapodPose, triangle
@@ -26,6 +24,7 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, rigid_motion
 from truearm.engine.twin.twin import Twin
 from truearm.hexapod.places import WorldFrame, world_frame
+from truearm.hexapod.rehearsal import Ballbar, cups_dataset, joined, measure_poses, set_up
 from truearm.hexapod.sheet import PlannedRow
 
 

@@ -15,7 +15,6 @@ from typing import Final
 
 import numpy as np
 
-from papers.session import joined
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
@@ -24,6 +23,7 @@ from truearm.engine.fit.models import Model
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rigid_motion
+from truearm.hexapod.rehearsal import joined
 
 #: Turns at most, and the movement of a reading at which the places are taken to stand still [m].
 _MOST_ROUNDS: Final = 30

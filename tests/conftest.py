@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -73,7 +74,14 @@ def measured_data() -> Path:
 #: Files that copy their process hundreds of times, which takes ten times as long once it has grown: begun first of all.
 COPYING = "tests/house/test_killed_runs.py"
 #: Files whose tests, or what they share, take seconds each: begun first, no process is left alone with them at the end.
-SLOW = ("tests/house/test_documents.py", "tests/house/test_measured.py", "tests/simulation/devices/", "tests/studies/")
+LONG = ("tests/house/test_documents.py", "tests/house/test_measured.py", "tests/engine/twin/", "tests/papers/")
+#: What takes a second or more and is left to ``script/test --all``: functions of tests, or whole files.
+SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text().split())
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a part of the tests be chosen: ``--part 3/8``."""
+    parser.addoption("--part", default="1/1", metavar="I/N", help="the I-th of N parts of the tests")
 
 
 def pytest_configure() -> None:
@@ -81,9 +89,16 @@ def pytest_configure() -> None:
     gc.disable()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the slow files first; the order within a file stays, as what its tests share is made once."""
-    items.sort(key=lambda item: (not item.nodeid.startswith(COPYING), not item.nodeid.startswith(SLOW)))
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what is slow, choose a part, and put slow files first; within a file the order stays, for what is shared."""
+    number, of = map(int, config.getoption("--part").split("/"))
+    items[:] = [item for item in items if zlib.crc32(item.nodeid.encode()) % of == number - 1]
+    for item in items:
+        file, _, name = item.nodeid.partition("::")
+        if SLOW & {file, item.nodeid, f"{file}::{name.partition('[')[0]}"}:
+            item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: (not item.nodeid.startswith(COPYING), not item.nodeid.startswith(LONG)))
 
 
 def pytest_collection_finish() -> None:

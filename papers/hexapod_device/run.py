@@ -13,9 +13,6 @@ import numpy as np
 from papers import Progress
 from papers.hexapod_place import PLACE, fixture_at, placed, touched
 from papers.seeds import Seed, over_seeds
-from papers.session import measure_poses, set_up
-from papers.simulated import ballbar
-from papers.tool_changer import ToolChanger
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.hexapod import CUPS, DEVICE, SOLUTIONS, HexapodPose, poses, tool_cups
 from truearm.engine.robot.chain import Array
@@ -25,6 +22,7 @@ from truearm.engine.robot.transform import IDENTITY, Transform, rigid_motion
 from truearm.engine.twin.twin import Twin
 from truearm.hexapod.places import cup_monte_carlo, plain_frame
 from truearm.hexapod.reachable import Reachable, reachable, with_cups
+from truearm.hexapod.rehearsal import ToolChanger, ballbar, measure_poses, set_up
 from truearm.hexapod.sheet import four_cups, side_frames
 
 #: How often the tool is attached, and each pose measured.

@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from papers.hexapod_device.run import ATTACHED, REPEATED, Outcome
-from papers.pose_accuracy import repeatability
 from papers.study import Row, Table
 from truearm.engine.data.hexapod import (
     CUPS,
@@ -28,6 +27,7 @@ from truearm.engine.data.hexapod import (
 from truearm.engine.robot.transform import rigid_motion
 from truearm.hexapod.places import CupUncertainty, all_solutions, cup_uncertainty
 from truearm.hexapod.sheet import SIDES_OF_FOUR, four_cups
+from truearm.validation.pose_accuracy import repeatability
 
 _SIGMA: Final = DEVICE.sigma
 #: Section 3.2: pairs of the three groups, from the closest.

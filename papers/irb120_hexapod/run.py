@@ -15,10 +15,7 @@ from papers.irb120 import without_beta
 from papers.irb120_hexapod.spheres import TRACKER, Spheres, spheres
 from papers.irb120_hexapod.ways import Ways, ways
 from papers.irb120_hexapod.worn import calibrated, in_base, tracked, worn_twin
-from papers.pose_accuracy import PoseErrors, pose_errors, repeatability
 from papers.seeds import Seed, over_seeds
-from papers.session import SetUp, measure_poses, set_up
-from papers.simulated import ballbar
 from truearm.engine.data.hexapod import DEVICE, HexapodPose, leg_lengths, poses, triangle
 from truearm.engine.data.statistics import Spread, errors_of
 from truearm.engine.robot.chain import Array
@@ -28,6 +25,8 @@ from truearm.engine.robot.transform import Transform, rigid_motion
 from truearm.engine.twin.twin import Twin
 from truearm.hexapod.places import plain_frame, world_frame
 from truearm.hexapod.reachable import Reachable, reachable, with_cups
+from truearm.hexapod.rehearsal import SetUp, ballbar, measure_poses, set_up
+from truearm.validation.pose_accuracy import PoseErrors, pose_errors, repeatability
 
 TRAINING: Final = 38
 #: What the tool was turned by, about axis 6, between calibration and test: size and side are chosen for the orientation

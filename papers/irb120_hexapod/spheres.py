@@ -12,7 +12,6 @@ import numpy as np
 from papers import regions
 from papers.irb120 import without_beta
 from papers.irb120_hexapod.worn import calibrated, in_base, tracked, worn_twin
-from papers.simulated import ballbar
 from truearm.engine.data.hexapod import DEVICE
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.kinematics import inverse
@@ -21,6 +20,7 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.twin.twin import Twin
+from truearm.hexapod.rehearsal import ballbar
 from truearm.validation.sphere import SphereTest, sphere_test
 
 #: Deviation of a coordinate read by tracker and C-Track [m]: 0.035 mm over a scale bar, and 0.070 mm in space.

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from papers.irb120_hexapod.run import POSES, REPEATED, TRAINING, Outcome
-from papers.pose_accuracy import PoseErrors
 from papers.study import Row, Table
 from truearm.engine.robot.chain import Array
 from truearm.hexapod.reachable import Reachable
+from truearm.validation.pose_accuracy import PoseErrors
 
 #: Tables 3.2 and 3.3: smallest, largest, mean of each part [mm and deg].
 _TABLE_3_2: Final = (

@@ -9,14 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from papers.fourth_cup import with_fourth
 from papers.hexapod_place import PLACE, fixture_at, placed, touched
 from papers.irb120 import ELASTIC
 from papers.irb120_hexapod.worn import calibrated
 from papers.placements import identify_placements
-from papers.session import SetUp, cups_dataset, joined, measure_poses, set_up
-from papers.simulated import ballbar
-from papers.tool_changer import ToolChanger
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.hexapod import DEVICE, HexapodPose
 from truearm.engine.data.statistics import errors_of
@@ -26,6 +22,16 @@ from truearm.engine.robot.transform import Transform
 from truearm.engine.twin.twin import Twin
 from truearm.hexapod.places import plain_frame, world_frame
 from truearm.hexapod.reachable import reachable
+from truearm.hexapod.rehearsal import (
+    SetUp,
+    ToolChanger,
+    ballbar,
+    cups_dataset,
+    joined,
+    measure_poses,
+    set_up,
+    with_fourth,
+)
 from truearm.hexapod.sheet import PlannedRow, four_cups, side_frames
 
 #: A fixture that lies flat before the robot, and two more at its sides.

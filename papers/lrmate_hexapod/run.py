@@ -23,7 +23,6 @@ from papers.lrmate_hexapod.judgement import (
 )
 from papers.lrmate_hexapod.robot import BACK_DOWN, FIXTURE, FRONT_UP, drawn_twin, invented_twin, nominal_robot, touches
 from papers.seeds import Seed, over_seeds
-from papers.simulated import ballbar
 from truearm.engine.data.hexapod import HexapodPose, poses
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import MODELS
@@ -34,6 +33,7 @@ from truearm.engine.robot.transform import Transform, rotation_vector
 from truearm.engine.twin.twin import Twin, measure
 from truearm.hexapod.places import world_frame
 from truearm.hexapod.reachable import Reachable, reachable
+from truearm.hexapod.rehearsal import ballbar
 from truearm.hexapod.sheet import PlannedRow
 from truearm.planning.choosing import plan_measurements
 

@@ -1,4 +1,4 @@
-"""The command ``truearm``: one file a command, each of them thin."""
+"""The command ``truearm``: every command of every feature, each of them thin."""
 
 from __future__ import annotations
 

@@ -12,7 +12,6 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-from papers.simulated import ballbar, measured_legs, measured_sides
 from tests.engine.data.test_fixture_rows import MIXED
 from tests.engine.data.test_table import JOINTS, POINTS, SPATIAL
 from tests.house.examples import EXAMPLES, performance_files
@@ -22,6 +21,7 @@ from truearm.engine.data.hexapod import poses, triangle
 from truearm.engine.programs.corrected_targets import LEDGER, LedgerEntry, remember
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Joint
+from truearm.hexapod.rehearsal import ballbar, measured_legs, measured_sides
 from truearm.hexapod.sheet import PlannedRow, sheet_csv
 
 PROGRAMS = Path(__file__).parents[1] / "engine" / "programs" / "samples"

@@ -6,7 +6,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from papers.simulated import ballbar, measured_legs, measured_sides
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.hexapod import (
@@ -27,6 +26,7 @@ from truearm.engine.data.hexapod import (
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import rigid_motion
 from truearm.hexapod.places import all_solutions, cup_monte_carlo, cup_uncertainty, world_frame
+from truearm.hexapod.rehearsal import ballbar, measured_legs, measured_sides
 
 #: Nubiola, section 3.2: the three groups of near pairs, from the closest.
 PRINTED = [

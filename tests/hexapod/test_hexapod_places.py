@@ -7,9 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from papers.filled_sheet import filled_sheet, locked_cups
-from papers.simulated import ballbar
-from papers.tool_changer import ToolChanger
 
 import truearm
 from truearm.engine.base.errors import InputError
@@ -21,6 +18,7 @@ from truearm.engine.twin.twin import Twin
 from truearm.hexapod.jobs import HexapodPlan
 from truearm.hexapod.places import plain_frame
 from truearm.hexapod.reachable import reachable_at_places, with_cups
+from truearm.hexapod.rehearsal import ToolChanger, ballbar, filled_sheet, locked_cups
 from truearm.hexapod.sheet import PlannedRow
 
 PLACES = (Transform((0.2268, 0.0, 0.3)), Transform((0.05, 0.25, 0.3), (np.cos(0.2), 0.0, 0.0, np.sin(0.2))))

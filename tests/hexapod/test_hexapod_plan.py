@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from papers.campaign import Campaign, touching, two_steps
 from papers.placements import identify_placements, in_one_frame
-from papers.session import joined
-from papers.simulated import ballbar
 from scipy.optimize import minimize
 
 from truearm.engine.base.errors import InputError
@@ -27,6 +25,7 @@ from truearm.engine.robot.transform import Transform
 from truearm.engine.twin.twin import Twin, measure
 from truearm.engine.twin.twin_joint import JointTruth
 from truearm.hexapod.reachable import Reachable, arm_links, clearance, reachable, steps_text, with_cups
+from truearm.hexapod.rehearsal import ballbar, joined
 
 HALF = np.radians(-15.0)
 #: B1 of a fixture that stands before the robot, turned by -30 deg.

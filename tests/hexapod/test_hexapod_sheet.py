@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from papers.simulated import ballbar, measured_legs, measured_sides
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.hexapod import poses, triangle
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Joint
+from truearm.hexapod.rehearsal import ballbar, measured_legs, measured_sides
 from truearm.hexapod.sheet import PlannedRow, Sheet, sheet_csv
 from truearm.hexapod.sheet_reading import read_sheet, read_touches
 

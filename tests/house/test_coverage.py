@@ -16,7 +16,7 @@ ROWS = [
     for number in range(1, count + 1)
 ]
 #: What runs until it is stopped, and is tested by clicking through it.
-CLICKED = {"U2": Path(__file__).parent / "studio" / "test_story.py"}
+CLICKED = {"U2": Path(__file__).parents[1] / "studio" / "test_story.py"}
 TABLE = re.compile(r"^\| (?P<row>[A-Z]\d+) \| (?P<what>[^|]+) \| [^|]+ \|(?P<command>[^|]*)\|(?P<page>[^|]*)\|$", re.M)
 LISTED = {match["row"]: match for match in TABLE.finditer(PAGE.read_text())}
 

@@ -13,6 +13,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from functools import cache
@@ -28,6 +29,7 @@ from truearm.engine.data.rigid_tool import Suspicion
 from truearm.engine.diagnose.changes import Kind
 
 ROOT = Path(__file__).parents[2]
+ARCHITECTURE = ROOT / "docs" / "architecture.md"
 GUIDE = sorted((ROOT / "docs" / "guide").glob("*.md"))
 DOCUMENTS = [ROOT / "README.md", ROOT / "docs" / "api.md", *GUIDE]
 #: Pages that are one session from top to bottom; elsewhere every block of Python stands for itself.
@@ -240,13 +242,34 @@ def test_every_source_that_is_cited_stands_in_the_bibliography() -> None:
 
 
 def test_every_file_that_the_architecture_names_is_there() -> None:
-    places = [*(ROOT / "src").rglob("*"), *(ROOT / "tests").rglob("*.py")]
+    folders = [ROOT / name for name in ("src", "papers", "tests")]
+    places = [place for folder in folders for place in (folder, *folder.rglob("*"))]
     files = [f"/{place.relative_to(ROOT).as_posix()}" for place in places]
-    text = (ROOT / "docs" / "architecture.md").read_text()
-    named = set(re.findall(r"[\w/]*\w\.py\b|\b[a-z]\w+(?:/\w+)*/(?=[`\s,])", text))
-    assert len(named) > 60
+    named = set(re.findall(r"[\w/]*\w\.py\b|\b[a-z]\w+(?:/\w+)*/(?=[`\s,])", ARCHITECTURE.read_text()))
+    assert len(named) > 110
     for name in named:
         assert any(file.endswith(f"/{name.rstrip('/')}") for file in files), name
+
+
+def test_the_architecture_names_every_part_of_the_package_in_the_order_of_the_contract() -> None:
+    house = re.search(r"^    engine/\n.*?\n\n", ARCHITECTURE.read_text(), re.M | re.S)
+    assert house
+    package = ROOT / "src" / "truearm"
+    for place in package.iterdir():
+        if place.name != "__pycache__":
+            name = f"{place.name}/" if place.is_dir() else place.name
+            assert re.search(rf"(?<![\w/.]){re.escape(name)}(?![\w/])", house[0]), f"{name} is not there"
+    contract = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"][1]
+    rooms = [part.strip() for layer in reversed(contract["layers"]) for part in layer.split("|")]
+    named = [f"truearm.engine.{name}" for name in re.findall(r"^ {8}(\w+)/", house[0], re.M)]
+    assert named == rooms
+    assert {path.name for path in (package / "engine").iterdir() if path.is_dir()} - {"__pycache__"} == {
+        name.rpartition(".")[2] for name in named
+    }
+
+
+def test_the_architecture_can_be_read_at_one_sitting() -> None:
+    assert len(ARCHITECTURE.read_text().splitlines()) <= 250
 
 
 #: What makes a notice, or becomes one, and the level that it has if none is given.

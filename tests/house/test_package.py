@@ -40,6 +40,18 @@ def test_the_wheel_calibrates_outside_the_clone(unpacked_wheel: Path, tmp_path: 
     assert (tmp_path / "demo" / "report.html").stat().st_size > 1_000_000
 
 
+def test_an_installation_says_where_the_studies_are(unpacked_wheel: Path, tmp_path: Path) -> None:
+    script = (
+        f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nfrom truearm.commands import main\n"
+        "sys.argv[1:] = ['study', 'li-table', '--out', 'found']\nmain()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "the published experiments are no part of an installation. Get the source of truearm" in done.stderr
+    assert not (tmp_path / "found").exists()
+    assert not list(unpacked_wheel.rglob("papers"))
+
+
 def test_the_wheel_is_typed_and_licensed(unpacked_wheel: Path) -> None:
     assert (unpacked_wheel / "truearm" / "py.typed").exists()
     assert list(unpacked_wheel.glob("*.dist-info/licenses/LICENSE"))

@@ -7,10 +7,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from papers.fourth_cup import with_fourth
-from papers.session import SetUp, cups_dataset, joined, measure_poses
-from papers.simulated import ballbar
-from papers.tool_changer import ToolChanger
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.hexapod import CUPS, DEVICE, Device, poses, triangle
@@ -22,6 +18,7 @@ from truearm.engine.robot.transform import IDENTITY, Transform
 from truearm.engine.twin.twin import Twin
 from truearm.engine.twin.twin_joint import JointTruth
 from truearm.hexapod.places import plain_frame
+from truearm.hexapod.rehearsal import SetUp, ToolChanger, ballbar, cups_dataset, joined, measure_poses, with_fourth
 from truearm.hexapod.sheet import SIDES_OF_FOUR, PlannedRow, four_cups, side_frames
 
 EXACT = Device(sigma=0.0)

@@ -21,7 +21,7 @@ from truearm.planning.accuracy import accuracy_goal, predict, sensitivity
 from truearm.planning.choosing import APPROACH, MeasurementPlan, plan_measurements, random_candidates, with_targets
 from truearm.planning.result import Plan
 
-POLISHING = Path(__file__).parents[1] / "compensation" / "programs" / "samples" / "rapid" / "polish.mod"
+POLISHING = Path(__file__).parents[1] / "engine" / "programs" / "samples" / "rapid" / "polish.mod"
 MODEL = {model.name: model for model in MODELS}
 
 

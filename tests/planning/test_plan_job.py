@@ -110,7 +110,7 @@ POSES = """pose,x [mm],y [mm],z [mm],qw,qx,qy,qz
 a,400,0,300,0,0,1,0
 b,450,100,300,0,0,1,0
 """
-RAPID = Path(__file__).parents[1] / "compensation" / "programs" / "samples" / "rapid" / "polish.mod"
+RAPID = Path(__file__).parents[1] / "engine" / "programs" / "samples" / "rapid" / "polish.mod"
 
 
 @pytest.mark.parametrize("nominal", [True, False])

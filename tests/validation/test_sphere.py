@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from papers.pose_accuracy import pose_errors, repeatability
 from scipy.spatial.transform import Rotation
 
 from truearm.engine.base.errors import InputError
@@ -13,6 +12,7 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.twin.twin import Twin
+from truearm.validation.pose_accuracy import pose_errors, repeatability
 from truearm.validation.sphere import sphere_test
 
 

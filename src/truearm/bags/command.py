@@ -36,8 +36,7 @@ def ros(
         typer.Option("--reference", metavar="NAME=TOPIC", help="Topic of a point beside the robot; repeat for each."),
     ] = None,
     joint_topic: Annotated[
-        str | None,
-        typer.Option(metavar="TOPIC", help="Topic of the joint positions.", show_default="the only one"),
+        str | None, typer.Option(metavar="TOPIC", help="Topic of the joint positions.", show_default="the only one")
     ] = None,
     joint_names: Annotated[
         str | None,

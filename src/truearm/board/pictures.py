@@ -25,13 +25,7 @@ from truearm.engine.robot.chain import Array
 #: Dictionaries of markers, as OpenCV names them behind ``DICT_``, and how many markers each has.
 DICTIONARIES: Final[dict[str, int]] = {
     f"{bits}X{bits}_{count}": count for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)
-} | {
-    "ARUCO_ORIGINAL": 1024,
-    "APRILTAG_16h5": 30,
-    "APRILTAG_25h9": 35,
-    "APRILTAG_36h10": 2320,
-    "APRILTAG_36h11": 587,
-}
+} | {"ARUCO_ORIGINAL": 1024, "APRILTAG_16h5": 30, "APRILTAG_25h9": 35, "APRILTAG_36h10": 2320, "APRILTAG_36h11": 587}
 _WHOLE: Final = "14x10,25mm,18mm,5X5_250"
 _MOST: Final = 100
 

@@ -349,9 +349,7 @@ def calibrate(
     for given, name in ((trials, "monte_carlo"), (wanted_zones, "zones")):
         if given is not None and hold:
             raise InputError(
-                "this is not made with places that are held",
-                parameter=name,
-                cure="Leave it out, or leave out `hold`.",
+                "this is not made with places that are held", parameter=name, cure="Leave it out, or leave out `hold`."
             )
     payload, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(

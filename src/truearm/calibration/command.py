@@ -72,9 +72,7 @@ def calibrate(
     bootstrap: Annotated[
         int,
         typer.Option(
-            metavar="N",
-            help="Deviations from N fits to configurations drawn anew.",
-            show_default="from the residuals",
+            metavar="N", help="Deviations from N fits to configurations drawn anew.", show_default="from the residuals"
         ),
     ] = 0,
     effects: Annotated[

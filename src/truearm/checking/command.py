@@ -12,12 +12,10 @@ from truearm.engine.command.options import Json, end_on_error, print_json, print
 
 def check(
     robot: Annotated[
-        str | None,
-        typer.Argument(metavar="[ROBOT]", help="A library id, a robot file or a URDF.", show_default=False),
+        str | None, typer.Argument(metavar="[ROBOT]", help="A library id, a robot file or a URDF.", show_default=False)
     ] = None,
     data: Annotated[
-        str | None,
-        typer.Argument(metavar="DATA.csv", help="Measurements in the canonical CSV.", show_default=False),
+        str | None, typer.Argument(metavar="DATA.csv", help="Measurements in the canonical CSV.", show_default=False)
     ] = None,
     device: Annotated[
         str | None,

@@ -45,10 +45,7 @@ def compensate(
     frames: Annotated[
         Path | None,
         typer.Option(
-            "--frame",
-            metavar="FILE",
-            help="Where the program's frames really are.",
-            show_default="no shift on average",
+            "--frame", metavar="FILE", help="Where the program's frames really are.", show_default="no shift on average"
         ),
     ] = None,
     payload: PayloadText = None,

@@ -123,10 +123,7 @@ def _space(followed: FollowedPath) -> Drawing:
         words = f"In the frame of the path. What the robot misses it by is drawn {times:g} times as large."
     scene = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
     drawn = figure(
-        traces,
-        560,
-        scene={**scene, "aspectmode": "data", "camera": CAMERA},
-        margin={"l": 0, "r": 0, "t": 40, "b": 0},
+        traces, 560, scene={**scene, "aspectmode": "data", "camera": CAMERA}, margin={"l": 0, "r": 0, "t": 40, "b": 0}
     )
     return Drawing("space", "The path", words, drawn)
 

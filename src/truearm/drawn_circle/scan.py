@@ -371,12 +371,7 @@ def follow(ink: Ink, start: Candidate, sectors: int, threshold: float) -> Line |
         return None
     own = np.abs(radii - np.where(seen, profile, np.inf)[:, None]) <= width
     beside = (np.where(own, 0.0, rays) > threshold).any(axis=1)
-    return Line(
-        centre=centre,
-        radius=radius,
-        profile=profile,
-        beside=float(beside.mean()),
-    )
+    return Line(centre=centre, radius=radius, profile=profile, beside=float(beside.mean()))
 
 
 def _rays(ink: Ink, centre: Array, radius: float, reach: float, sectors: int) -> tuple[Array, Array]:

@@ -22,8 +22,7 @@ def fleet(
     manifest: Annotated[str, typer.Argument(metavar="MANIFEST.yaml", help="Which robots, or which experiment.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the parts and the result.")],
     workers: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="Processes of this machine; one a processor by default."),
+        int | None, typer.Option(metavar="N", min=1, help="Processes of this machine; one a processor by default.")
     ] = None,
     scheduler: Annotated[
         str | None,

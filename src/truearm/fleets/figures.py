@@ -192,11 +192,7 @@ def parameters_figure(found: KindFound) -> Figure:
                 "y": rounded(np.array([shown[place] for _, place in marks]), 4),
                 "text": [html.escape(one.robot) for one, _ in marks],
                 "customdata": rounded(np.array(sizes), 4),
-                "marker": {
-                    "size": 11,
-                    "color": _ALARM,
-                    "symbol": [_symbol(size, edge) for size in sizes],
-                },
+                "marker": {"size": 11, "color": _ALARM, "symbol": [_symbol(size, edge) for size in sizes]},
                 "hovertemplate": "%{text}, %{x}: %{customdata} of its prior<extra></extra>",
             }
         )

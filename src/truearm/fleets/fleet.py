@@ -264,11 +264,7 @@ def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
 
 
 def _computed(
-    recorded: Recorded,
-    known: Known,
-    make: Callable[[int], Task],
-    workers: Workers,
-    progress: Callable[[str], None],
+    recorded: Recorded, known: Known, make: Callable[[int], Task], workers: Workers, progress: Callable[[str], None]
 ) -> Run:
     """Let workers do what is missing, and write each part as it comes."""
     asked, before = recorded.manifest, len(known.done)

@@ -294,13 +294,7 @@ class MonteCarlo:
 
 
 def monte_carlo(
-    robot: Robot,
-    q: Array,
-    model: Model,
-    sigma: float,
-    trials: int,
-    rng: np.random.Generator,
-    held_out: Array,
+    robot: Robot, q: Array, model: Model, sigma: float, trials: int, rng: np.random.Generator, held_out: Array
 ) -> MonteCarlo:
     """Simulate calibrations from position readings of all targets of a robot.
 

@@ -69,12 +69,7 @@ def world_frame(points: Array, sides: Sequence[float] | Array) -> WorldFrame:
     R_frame = R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     origin = points[0] + R[:, :2] @ shift
     places = origin + np.pad(q, ((0, 0), (0, 1))) @ R_frame.T
-    return WorldFrame(
-        frame=Transform.from_matrix(R_frame, origin),
-        plain=plain,
-        seen=seen,
-        residual=points - places,
-    )
+    return WorldFrame(frame=Transform.from_matrix(R_frame, origin), plain=plain, seen=seen, residual=points - places)
 
 
 #: The design of Table 3.1. The document takes its 35 permutations to be the same; the frame, which begins at B1 and B2,

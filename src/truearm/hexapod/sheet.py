@@ -435,10 +435,7 @@ def _refuse_others(one: Sheet, other: Sheet) -> None:
                 allowed=f"distances between its cups that differ by {_SAME_FIXTURE * 1e3:g} mm at most",
                 cure="Solve the sheets of each tool on their own. If the tool is the same, measure its cups again.",
             )
-    for what, values in (
-        ("places", (one.places, other.places)),
-        ("attachments", (one.attachments, other.attachments)),
-    ):
+    for what, values in (("places", (one.places, other.places)), ("attachments", (one.attachments, other.attachments))):
         if (values[0] is None) != (values[1] is None):
             raise InputError(
                 f"only one of the sheets names its {what}",

@@ -163,11 +163,7 @@ def _held(cells: Cells, column: tuple[int, str], values: Array, first: Array) ->
 
 
 def _refuse_strange_legs(
-    cells: Cells,
-    columns: Columns,
-    found: Sequence[Design],
-    named: Sequence[tuple[str, ...]],
-    legs: dict[str, Array],
+    cells: Cells, columns: Columns, found: Sequence[Design], named: Sequence[tuple[str, ...]], legs: dict[str, Array]
 ) -> None:
     for row, (design, names) in enumerate(zip(found, named, strict=True)):
         for name, values in legs.items():

@@ -21,9 +21,7 @@ def matrices(
     references: Annotated[
         list[str] | None,
         typer.Option(
-            "--reference",
-            metavar="NAME=FILE",
-            help="Positions of a fixed point beside the robot; repeat for each.",
+            "--reference", metavar="NAME=FILE", help="Positions of a fixed point beside the robot; repeat for each."
         ),
     ] = None,
     joints_are: JointsAreText = None,

@@ -73,10 +73,7 @@ def read_matrices(
         for name in names:
             if not is_one_line(name) or name != name.strip():
                 raise InputError(
-                    "a point needs a name",
-                    parameter=parameter,
-                    came=name,
-                    allowed="one line without blanks around it",
+                    "a point needs a name", parameter=parameter, came=name, allowed="one line without blanks around it"
                 )
     for name in references:
         if name in targets:

@@ -261,10 +261,7 @@ def _write_labels(
     label, target, pattern = _names(left, several)
     if pattern is not None and label is not None:
         text.add(
-            "names",
-            "",
-            "the names have parts between ::",
-            f"names: {{column: {named(label)}, pattern: '{pattern}'}}",
+            "names", "", "the names have parts between ::", f"names: {{column: {named(label)}, pattern: '{pattern}'}}"
         )
     elif label is not None:
         because = "its name or its texts"
@@ -296,10 +293,7 @@ def _write_labels(
             start = "    "
         elif target is not None:
             text.add(
-                "readings.target_column",
-                named(target),
-                "its name or its texts",
-                f"  - target_column: {named(target)}",
+                "readings.target_column", named(target), "its name or its texts", f"  - target_column: {named(target)}"
             )
             start = "    "
         else:

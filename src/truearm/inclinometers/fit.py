@@ -120,11 +120,7 @@ def decided(robot: Robot, posture: Postures, *, upright: bool) -> NDArray[np.boo
 
 
 def change_derivatives(
-    robot: Robot,
-    pairs: Pairs,
-    names: Sequence[str],
-    seats: Array | None = None,
-    instruments: Instruments | None = None,
+    robot: Robot, pairs: Pairs, names: Sequence[str], seats: Array | None = None, instruments: Instruments | None = None
 ) -> Array:
     """Return the derivative of changes of inclination by parameters and seats.
 

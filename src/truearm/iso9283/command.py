@@ -42,8 +42,7 @@ def plan(
         float | None, typer.Option(metavar="KG", help="Rated load.", show_default="that of the robot file")
     ] = None,
     velocity: Annotated[
-        float | None,
-        typer.Option(metavar="MM/S", help="Rated velocity along a path.", show_default="1000"),
+        float | None, typer.Option(metavar="MM/S", help="Rated velocity along a path.", show_default="1000")
     ] = None,
     velocities: Annotated[str, typer.Option(metavar="%,..", help="Percent of the rated velocity.")] = "100,50,10",
     loads: Annotated[str, typer.Option(metavar="%,..", help="Percent of the rated load.")] = "100",
@@ -130,8 +129,7 @@ def simulate(
     rate: Annotated[float, typer.Option(metavar="HZ", help="Readings in a second, 10 to 2000.")] = 500.0,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of all that is drawn.")] = 0,
     corrected: Annotated[
-        str | None,
-        typer.Option(metavar="ROBOT", help="Correct commands by this calibrated robot.", show_default=False),
+        str | None, typer.Option(metavar="ROBOT", help="Correct commands by this calibrated robot.", show_default=False)
     ] = None,
 ) -> None:
     """Run the tests of a plan on a twin that moves, and read it with a simulated instrument."""
@@ -170,9 +168,7 @@ def evaluate(
     alignment: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE",
-            help="How the instrument was tied to the base.",
-            show_default="best fit, with a warning",
+            metavar="FILE", help="How the instrument was tied to the base.", show_default="best fit, with a warning"
         ),
     ] = None,
     noise: Annotated[float, typer.Option(metavar="MM", help="Of the instrument, of a coordinate.")] = 0.01,

@@ -41,12 +41,7 @@ _SCHEMA: Final = "truearm-measuring/1"
 
 
 def begin(
-    folder: Path,
-    plan: list[Any],
-    robot: Robot,
-    session: Session,
-    virtual: dict[str, Any] | None,
-    about: About,
+    folder: Path, plan: list[Any], robot: Robot, session: Session, virtual: dict[str, Any] | None, about: About
 ) -> None:
     """Write down what is fixed from now on, or refuse what is not as it was when the measuring began.
 

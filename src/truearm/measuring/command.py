@@ -73,8 +73,7 @@ def measure(
         typer.Option(metavar="DIR", help="Readings from a folder into which software writes.", rich_help_panel=_REAL),
     ] = None,
     mapping: Annotated[
-        str | None,
-        typer.Option("--map", metavar="MAPPING.yaml", help="What the columns mean.", rich_help_panel=_REAL),
+        str | None, typer.Option("--map", metavar="MAPPING.yaml", help="What the columns mean.", rich_help_panel=_REAL)
     ] = None,
     listen: Annotated[
         int | None,

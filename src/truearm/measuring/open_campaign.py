@@ -170,12 +170,7 @@ class _Said:
 
 
 def open_campaign(
-    plan: str | Path,
-    robot: Robot | str | Path,
-    out: str | Path,
-    *,
-    command: str | None = None,
-    **asked: Unpack[Asked],
+    plan: str | Path, robot: Robot | str | Path, out: str | Path, *, command: str | None = None, **asked: Unpack[Asked]
 ) -> OpenCampaign:
     """Open the measuring of a plan; keywords as for :func:`truearm.measure`.
 

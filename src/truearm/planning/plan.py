@@ -67,12 +67,7 @@ from truearm.planning.result import PAGE, Plan
 
 
 def plan_inputs(
-    robot: object,
-    candidates_from: object,
-    constraints: object,
-    accurate_at: object,
-    tools: object,
-    frames: object,
+    robot: object, candidates_from: object, constraints: object, accurate_at: object, tools: object, frames: object
 ) -> dict[str, str]:
     """Return the SHA-256 of each file that :func:`truearm.plan` is given, by its parameter, before they are read.
 

@@ -33,13 +33,7 @@ from truearm.engine.robot.inverse.kinematics import inverse
 from truearm.engine.robot.robot import Robot
 
 #: Every set by its name, and how many poses it has where that can be chosen.
-POSE_SETS: Final[dict[str, int | None]] = {
-    "p1-p5": None,
-    "iso-cube": None,
-    "diagonal": 25,
-    "118": POSES,
-    "sphere": 50,
-}
+POSE_SETS: Final[dict[str, int | None]] = {"p1-p5": None, "iso-cube": None, "diagonal": 25, "118": POSES, "sphere": 50}
 #: The golden angle: points on a sphere that turn on by it from one to the next lie evenly.
 _GOLDEN_ANGLE: Final = math.pi * (3.0 - math.sqrt(5.0))
 

@@ -346,10 +346,7 @@ def _speed(value: Any) -> tuple[float, float]:
     share = shares[0] if shares else usual.share
     if not 0.01 <= share <= 1.0:
         raise InputError(
-            "this is no share of the joints' speed",
-            parameter="speed",
-            came=f"{100 * share:g} %",
-            allowed="1 to 100 %",
+            "this is no share of the joints' speed", parameter="speed", came=f"{100 * share:g} %", allowed="1 to 100 %"
         )
     return speed, share
 

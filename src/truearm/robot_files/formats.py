@@ -130,10 +130,7 @@ def read_dh_csv(path: Path, convention_name: TableConvention) -> DHTable:
         kind: JointKind = "prismatic" if entry.get("type") == "prismatic" else "revolute"
         if entry.get("type", kind) != kind:
             raise InputError(
-                "a joint has no such type",
-                where=f"{where}, type",
-                came=entry["type"],
-                allowed="revolute, prismatic",
+                "a joint has no such type", where=f"{where}, type", came=entry["type"], allowed="revolute, prismatic"
             )
         si = {name: _si(entry[name], unit, f"{where}, {name}") for name, unit in columns if unit}
         rows.append(DHRow(entry["joint"], kind, **si))
@@ -397,9 +394,7 @@ def _constants(robot: Robot) -> dict[str, str]:
     }
 
 
-def _bodies(
-    robot: Robot,
-) -> tuple[list[tuple[Row, Row]], list[tuple[int, float, Row]], list[tuple[object, ...]]]:
+def _bodies(robot: Robot) -> tuple[list[tuple[Row, Row]], list[tuple[int, float, Row]], list[tuple[object, ...]]]:
     """Return places of joints and flange, every joint along z from its bearing, and masses and balancers in them."""
     origins, behind = collapsed(robot)
     turned = []  # from the axis and its own x and y, at the bearing, to those of the convention

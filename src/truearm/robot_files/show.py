@@ -289,10 +289,7 @@ class RobotDescription(Record):
             "effects": list(robot.effect_names),
             "masses_kg": {f"link {m.joint}": m.mass for m in robot.masses},
             "balancers": [balancer_entry(balancer) for balancer in robot.balancers],
-            "payload": {
-                "mass_kg": robot.payload.mass,
-                "cog_mm": [written(v, "mm") for v in robot.payload.cog],
-            },
+            "payload": {"mass_kg": robot.payload.mass, "cog_mm": [written(v, "mm") for v in robot.payload.cog]},
             "rated_load_kg": robot.rated_load,
             **reach_summary(robot.reach),
             "gravity": list(robot.gravity),
@@ -400,10 +397,7 @@ def _share(value: float, name: str) -> str:
 
 
 def show(
-    robot: Robot | str | Path,
-    *,
-    joints: Array | Sequence[float] | None = None,
-    joints_are: JointsOf | None = None,
+    robot: Robot | str | Path, *, joints: Array | Sequence[float] | None = None, joints_are: JointsOf | None = None
 ) -> RobotDescription:
     """Say what is known about a robot, and where it stands at joint positions, to compare with its pendant.
 

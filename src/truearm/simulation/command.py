@@ -46,8 +46,7 @@ def devices(json: Json = False) -> None:
 def influence(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
     data: Annotated[
-        str | None,
-        typer.Argument(metavar="[DATA.csv]", help="Measurements in the canonical CSV.", show_default=False),
+        str | None, typer.Argument(metavar="[DATA.csv]", help="Measurements in the canonical CSV.", show_default=False)
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")] = None,
     model: Annotated[

@@ -64,10 +64,7 @@ def influence_html(found: InfluenceResult) -> str:
     if found.identified is not None:
         figures["errors"] = errors_figure(found.identified)
         spread = [
-            {
-                "words": WAYS[way],
-                "figures": [significant(v * 1e3, 3) for v in (s.mean, s.rms, s.p95, s.max)],
-            }
+            {"words": WAYS[way], "figures": [significant(v * 1e3, 3) for v in (s.mean, s.rms, s.p95, s.max)]}
             for way, errors in found.identified.errors.items()
             if (s := errors.position) is not None
         ]
@@ -139,8 +136,5 @@ def errors_figure(found: Identified) -> Figure:
         "hovertemplate": "%{x}: mean %{y} mm, 95 % below %{customdata} mm<extra></extra>",
     }
     return figure(
-        [trace],
-        380,
-        xaxis=axis("") | {"type": "category"},
-        yaxis=axis("position error [mm]") | {"rangemode": "tozero"},
+        [trace], 380, xaxis=axis("") | {"type": "category"}, yaxis=axis("position error [mm]") | {"rangemode": "tozero"}
     )

@@ -330,12 +330,7 @@ class _Poses:
 
 
 def _poses(
-    robot: Robot,
-    data: Dataset,
-    names: Sequence[str],
-    target: str,
-    tolerance: float,
-    units: Mapping[str, float] | None,
+    robot: Robot, data: Dataset, names: Sequence[str], target: str, tolerance: float, units: Mapping[str, float] | None
 ) -> _Poses:
     robot.target(target)
     unit = sizes_of(robot, names, UNIT, units or {}, "unit")

@@ -308,11 +308,7 @@ class Distances(Record):
         return {
             "configurations": self.configurations,
             "pairs": found.pairs,
-            "distance_mm": {
-                "mean": found.mean * 1e3,
-                "deviation": found.deviation * 1e3,
-                "max": found.maximum * 1e3,
-            },
+            "distance_mm": {"mean": found.mean * 1e3, "deviation": found.deviation * 1e3, "max": found.maximum * 1e3},
             "positive": found.positive,
             "histogram": {"edges_mm": self._edges(), "counts": found.counts.tolist()},
         }

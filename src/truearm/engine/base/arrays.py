@@ -92,12 +92,7 @@ def axes(given: object) -> int:
 
 
 def finite_number(
-    value: object,
-    parameter: str,
-    *,
-    where: str | None = None,
-    lowest: float = -math.inf,
-    allowed: str | None = None,
+    value: object, parameter: str, *, where: str | None = None, lowest: float = -math.inf, allowed: str | None = None
 ) -> float:
     """Return a finite number, `lowest` or more; `allowed` says what belongs here if not that."""
     if type(value) is float and math.isfinite(value) and value >= lowest:  # nearly all of them, and they are many

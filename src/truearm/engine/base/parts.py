@@ -389,11 +389,7 @@ class _Run(Generic[Part, Result]):
     """What is being done, and what will be repeated alone because a worker died while it was done."""
 
     def __init__(
-        self,
-        work: Callable[[Part], Result],
-        parts: Iterator[Part],
-        workers: Workers,
-        tell: Callable[[str], None],
+        self, work: Callable[[Part], Result], parts: Iterator[Part], workers: Workers, tell: Callable[[str], None]
     ) -> None:
         self._work, self._parts, self._workers, self._tell = work, parts, workers, tell
         self.running: dict[Future[Result], Part] = {}

@@ -18,18 +18,9 @@ _ENTRIES: Final = "NAME: VALUE, each on a line of its own"
 def validated(content: object, schema: type[Model], where: str) -> Model:
     """Return `content` as `schema`, or refuse it naming the entry that is wrong."""
     if content is None:
-        raise InputError(
-            "the file holds no entries, only comments or nothing",
-            where=where,
-            allowed=_ENTRIES,
-        )
+        raise InputError("the file holds no entries, only comments or nothing", where=where, allowed=_ENTRIES)
     if not isinstance(content, Mapping):
-        raise InputError(
-            "the file must hold named entries",
-            where=where,
-            came=shown_entry(content),
-            allowed=_ENTRIES,
-        )
+        raise InputError("the file must hold named entries", where=where, came=shown_entry(content), allowed=_ENTRIES)
     try:
         made = schema.model_validate(dict(content))
     except ValidationError as error:

@@ -216,9 +216,7 @@ class Given:
     def renew(self) -> None:
         """Refuse: it is not ours."""
         raise InputError(
-            "the workers of the executor are gone",
-            parameter="executor",
-            cure=f"Make a new one. {_RUN_AGAIN}",
+            "the workers of the executor are gone", parameter="executor", cure=f"Make a new one. {_RUN_AGAIN}"
         )
 
     def news(self) -> list[str]:

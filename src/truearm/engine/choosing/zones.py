@@ -343,10 +343,7 @@ def judge_zones(
     training, held_out = parts
     verdicts = []
     for box in boxes:
-        mine, judges = (
-            np.flatnonzero(box.holds(places[0], overlap)),
-            np.flatnonzero(box.holds(places[1])),
-        )
+        mine, judges = (np.flatnonzero(box.holds(places[0], overlap)), np.flatnonzero(box.holds(places[1])))
         fit = None
         if len(mine) >= LEAST_CONFIGURATIONS and len(judges) >= LEAST_HELD_OUT:
             part = training.of_configurations(mine)

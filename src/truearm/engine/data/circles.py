@@ -88,12 +88,7 @@ class Circle:
         """Return the circle with its normal pointing the other way; x stays."""
         flip = np.diag([1.0, -1.0, 1.0])
         return replace(
-            self,
-            y=-self.y,
-            normal=-self.normal,
-            axial=-self.axial,
-            angle=-self.angle,
-            shares=flip @ self.shares @ flip,
+            self, y=-self.y, normal=-self.normal, axial=-self.axial, angle=-self.angle, shares=flip @ self.shares @ flip
         )
 
 

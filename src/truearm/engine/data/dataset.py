@@ -242,11 +242,7 @@ class Dataset:
                 cure="Load them with the robot, truearm.load_data(data, robot), which knows how its controller counts.",
             )
         return Postures(
-            self.joints,
-            approach=self.approach,
-            number=self.number,
-            temperature=self.temperature,
-            wrench=self.wrench,
+            self.joints, approach=self.approach, number=self.number, temperature=self.temperature, wrench=self.wrench
         )
 
     @property

@@ -39,10 +39,7 @@ VISITS: Final = "whole numbers, 0 or more"
 #: Highest standard deviation of an instrument's scale that is meant.
 LARGEST_SCALE: Final = 0.1
 #: Lowest and highest standard deviation that is meant [m, rad].
-_DEVIATIONS: Final = {
-    "sigma": accepted_range("m", deviation=True),
-    "sigma_rot": accepted_range("rad", deviation=True),
-}
+_DEVIATIONS: Final = {"sigma": accepted_range("m", deviation=True), "sigma_rot": accepted_range("rad", deviation=True)}
 
 
 def refuse_unsound(data: Dataset) -> None:

@@ -251,14 +251,7 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
         doubted = [*mistaken, *check_orientations(fit, data, errors, alone), *often_off(data, off)]
         turned = alone
     return Comparison(
-        [
-            *wrong,
-            *found,
-            *doubted,
-            *_one_point(fit, data),
-            *check_rounding(fit, data),
-            *_computed(robot, data, off),
-        ],
+        [*wrong, *found, *doubted, *_one_point(fit, data), *check_rounding(fit, data), *_computed(robot, data, off)],
         suspects,
         fit,
         without_orientations(data, turned),

@@ -164,10 +164,7 @@ def expected_error_map(places: Array, error: Array, measured: Array) -> Figure:
     """
     top = _colour_end(error * 1e3)
     reach = float(np.abs(places).max()) * 1e3
-    views = (
-        (_from_the_side, "distance from the base's z axis", "z"),
-        (_from_above, "x", "y"),
-    )
+    views = ((_from_the_side, "distance from the base's z axis", "z"), (_from_above, "x", "y"))
     traces: list[Figure] = []
     axes: Figure = {}
     for number, (seen, right, up) in enumerate(views, start=1):
@@ -212,12 +209,7 @@ def expected_error_map(places: Array, error: Array, measured: Array) -> Figure:
             "constrain": "domain",
         }
     bar = {"title": {"text": "expected error [mm]"}, "thickness": 14, "outlinewidth": 0}
-    return figure(
-        traces,
-        480,
-        **axes,
-        coloraxis={"colorscale": _ERROR_SCALE, "cmin": 0, "cmax": top, "colorbar": bar},
-    )
+    return figure(traces, 480, **axes, coloraxis={"colorscale": _ERROR_SCALE, "cmin": 0, "cmax": top, "colorbar": bar})
 
 
 def _from_the_side(points: Array) -> Array:

@@ -17,11 +17,7 @@ from truearm.engine.fit.refit import Refit
 from truearm.engine.robot.parts import Payload
 
 #: How configurations lie that are held out in blocks, in words.
-LAYOUT: Final = {
-    "path": "follow a path",
-    "grid": "lie on a grid",
-    "close": "lie close to each other",
-}
+LAYOUT: Final = {"path": "follow a path", "grid": "lie on a grid", "close": "lie close to each other"}
 #: What deviations of a bootstrap follow from, after their number.
 BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 

@@ -30,10 +30,7 @@ _DECIMALS: Final = {
 _WIDTH_90: Final = 3.29
 #: Correlated pairs that are listed.
 _PAIRS: Final = 10
-_SIGMA_SHOWN: Final = {
-    **dict.fromkeys(("position", "distance", "height"), ("mm", 1e3)),
-    "orientation": ("mrad", 1e3),
-}
+_SIGMA_SHOWN: Final = {**dict.fromkeys(("position", "distance", "height"), ("mm", 1e3)), "orientation": ("mrad", 1e3)}
 _PER: Final = {"position": "coordinate", "orientation": "rotation axis", "distance": "reading", "height": "reading"}
 
 

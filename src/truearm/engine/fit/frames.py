@@ -211,12 +211,7 @@ def _turn_axes(R: Array) -> Array:
     """Return sin(angle) times the axis of the turns between neighbours and against the first."""
     pairs = np.concatenate([R[1:] @ np.swapaxes(R[:-1], 1, 2), R[1:] @ R[:1].swapaxes(1, 2)])
     return 0.5 * np.stack(
-        [
-            pairs[:, 2, 1] - pairs[:, 1, 2],
-            pairs[:, 0, 2] - pairs[:, 2, 0],
-            pairs[:, 1, 0] - pairs[:, 0, 1],
-        ],
-        axis=1,
+        [pairs[:, 2, 1] - pairs[:, 1, 2], pairs[:, 0, 2] - pairs[:, 2, 0], pairs[:, 1, 0] - pairs[:, 0, 1]], axis=1
     )
 
 

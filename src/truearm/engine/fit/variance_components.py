@@ -145,14 +145,7 @@ def variance_components(
     covariance, parts = _covariance(best, taken, noise)
     weighing = likeliest if holds else _variances(best, kinds, noise)
     return Components(
-        likeliest,
-        weighing,
-        tuple(estimated),
-        holds,
-        covariance,
-        parts,
-        squares * best.factors,
-        traces * best.factors,
+        likeliest, weighing, tuple(estimated), holds, covariance, parts, squares * best.factors, traces * best.factors
     )
 
 

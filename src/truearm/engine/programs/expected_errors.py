@@ -144,12 +144,7 @@ class ExpectedErrors:
 
 
 def expected_errors(
-    robot: Robot,
-    proof: Proof,
-    programs: Sequence[TargetsReached],
-    frames: Provenance,
-    *,
-    taught_tools: bool = False,
+    robot: Robot, proof: Proof, programs: Sequence[TargetsReached], frames: Provenance, *, taught_tools: bool = False
 ) -> tuple[ExpectedErrors, ...]:
     """Return what is expected of the targets of programs that are corrected together.
 

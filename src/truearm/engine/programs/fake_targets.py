@@ -52,13 +52,7 @@ def controllers_robot(robot: Robot) -> Robot:
 
 def _nominal(robot: Robot) -> Robot:
     return replace(
-        robot,
-        effect_names=(),
-        wrench=None,
-        base_quaternion=(1.0, 0.0, 0.0, 0.0),
-        known={},
-        targets=(),
-        fixtures=(),
+        robot, effect_names=(), wrench=None, base_quaternion=(1.0, 0.0, 0.0, 0.0), known={}, targets=(), fixtures=()
     )
 
 

@@ -150,9 +150,7 @@ def _transform(frame: Array) -> Transform:
 
 
 def _rows(
-    joints: Sequence[Joint],
-    numbers: Sequence[tuple[float, float, float, float]],
-    convention_name: DHConvention,
+    joints: Sequence[Joint], numbers: Sequence[tuple[float, float, float, float]], convention_name: DHConvention
 ) -> tuple[DHRow, ...]:
     normals = [(a, alpha) for _, _, a, alpha in numbers]
     if convention_name == "modified-dh":

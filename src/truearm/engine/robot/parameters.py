@@ -150,9 +150,7 @@ def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
     def add(name: str, unit: Unit, group: Group, nominal: float) -> None:
         if name in found:
             raise InputError(
-                "two parameters of the robot would have the same name",
-                where=name,
-                cure="Rename the target or fixture.",
+                "two parameters of the robot would have the same name", where=name, cure="Rename the target or fixture."
             )
         found[name] = robot.known.get(name) or parameter(name, unit, group, nominal, robot.priors)
 

@@ -27,11 +27,7 @@ Triple = tuple[float, float, float]
 
 ZERO: Final[Triple] = (0.0, 0.0, 0.0)
 #: Kind of joint for each URDF type that moves about or along one axis.
-KIND: Final[Mapping[str, JointKind]] = {
-    "revolute": "revolute",
-    "continuous": "revolute",
-    "prismatic": "prismatic",
-}
+KIND: Final[Mapping[str, JointKind]] = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 _TYPES: Final = (*KIND, "fixed", "floating", "planar")
 #: Links that name the end of a robot, best first (ROS-Industrial's convention).
 _ENDS: Final = ("tool0", "flange")
@@ -162,9 +158,7 @@ def _parse(content: bytes, where: str) -> Tag:
         raise InputError(f"this is not valid XML ({reason})", where=f"{where}, line {error.lineno}") from error
     except (LookupError, ValueError) as error:
         raise InputError(
-            f"the encoding that the file declares cannot be read ({error})",
-            where=where,
-            cure="Save it as UTF-8.",
+            f"the encoding that the file declares cannot be read ({error})", where=where, cure="Save it as UTF-8."
         ) from error
     return top[0]
 

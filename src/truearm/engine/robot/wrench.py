@@ -97,10 +97,7 @@ class Wrench:
         parts = text.split(",")
         if len(parts) != 6:
             raise InputError(
-                "three forces and three moments belong here",
-                parameter=parameter,
-                came=text,
-                allowed=_EXAMPLE,
+                "three forces and three moments belong here", parameter=parameter, came=text, allowed=_EXAMPLE
             )
         numbers = [
             _quantity(part, FORCE_UNITS if number < 3 else MOMENT_UNITS, parameter) for number, part in enumerate(parts)

@@ -156,10 +156,7 @@ def _widened(interval: Interval, value: float, tied: Array) -> Interval:
     outermost hundredth of them, and what cycles scatter by is added to it.
     """
     low, high = np.quantile(tied, [0.005, 0.995])
-    return (
-        max(min(value, float(low)) - (value - interval[0]), 0.0),
-        max(value, float(high)) + (interval[1] - value),
-    )
+    return (max(min(value, float(low)) - (value - interval[0]), 0.0), max(value, float(high)) + (interval[1] - value))
 
 
 def _changes(courses: Array) -> Array:

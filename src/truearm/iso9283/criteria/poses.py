@@ -244,16 +244,7 @@ def _changes(row: WildRow, values: Sequence[Value], others: Sequence[Value]) -> 
 def _cloud(one: Cycles) -> PoseCloud:
     rp = float(repeatability(one.points)) if len(one) > 1 else _NOTHING
     return PoseCloud(
-        one.test,
-        one.robot,
-        one.pose,
-        one.approach,
-        one.velocity,
-        one.load,
-        one.command,
-        one.points,
-        one.barycentre,
-        rp,
+        one.test, one.robot, one.pose, one.approach, one.velocity, one.load, one.command, one.points, one.barycentre, rp
     )
 
 

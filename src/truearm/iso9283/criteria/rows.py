@@ -322,12 +322,7 @@ _TRIED: Final = 500
 
 
 def refuse_far_orientations(
-    attained: Array,
-    commanded: Array,
-    turn: Array,
-    line: NDArray[np.intp],
-    source: str,
-    limit: float = LIMIT,
+    attained: Array, commanded: Array, turn: Array, line: NDArray[np.intp], source: str, limit: float = LIMIT
 ) -> None:
     """Refuse orientations that are further from their command than a limit.
 
@@ -528,10 +523,7 @@ def _planned_conditions(plan: PerformancePlan, readings: AttainedPoses) -> Array
     made = np.empty((len(readings.cycle), 2))
     for planned in plan.tests:
         rows = np.flatnonzero(readings.criterion.are(planned.id))
-        pairs = (
-            ("velocity", readings.velocity, planned.velocities),
-            ("load", readings.load, planned.loads),
-        )
+        pairs = (("velocity", readings.velocity, planned.velocities), ("load", readings.load, planned.loads))
         for column, (name, read, known) in enumerate(pairs):
             apart = np.abs(read[rows, None] - np.array(known))
             made[rows, column] = np.array(known)[apart.argmin(axis=1)]

@@ -339,13 +339,7 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                     )
                 cycles.append(
                     Cycle(
-                        number or count,
-                        time,
-                        position[first : last + 1],
-                        rotation,
-                        along,
-                        samples.line[chosen],
-                        clock,
+                        number or count, time, position[first : last + 1], rotation, along, samples.line[chosen], clock
                     )
                 )
             refuse_wild(samples, rows, position, wild, number, clock)

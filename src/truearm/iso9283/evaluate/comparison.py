@@ -60,10 +60,7 @@ class Rated(BaseModel):
 def plan_summary(plan: PerformancePlan) -> dict[str, Any]:
     """Return what another result has to know of a plan, as JSON holds it."""
     tip = plan.robot.tool_place(plan.target)
-    poses = {
-        **plan.poses,
-        **{f"{pose} from {approach}": start for (pose, approach), start in plan.starts.items()},
-    }
+    poses = {**plan.poses, **{f"{pose} from {approach}": start for (pose, approach), start in plan.starts.items()}}
     return {
         "tip": _place([np.array(tip.translation)], [tip.rotation]),
         "limit_band_mm": plan.limit_band * 1e3,

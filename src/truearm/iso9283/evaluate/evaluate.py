@@ -252,13 +252,7 @@ def iso9283_evaluate(
     inputs = files_of(plan_path, *files.values(), tie_path, other)
     folder = None if out is None else folder_beside(EVALUATION_FILES, RESULT, out, *inputs)
     call = command_argument(command) or python_call(
-        "iso9283_evaluate",
-        plan,
-        **given,
-        alignment=alignment,
-        noise=noise,
-        noise_rot=noise_rot,
-        compare=compare,
+        "iso9283_evaluate", plan, **given, alignment=alignment, noise=noise, noise_rot=noise_rot, compare=compare
     )
     with noted_reads() as noted:
         with refusals_of("plan"):

@@ -219,12 +219,7 @@ def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str, ot
             text=[html.escape(cloud.pose) for cloud in clouds],
             textposition="top center",
         ),
-        _in_space(
-            f"to the barycentre, times {times:g}",
-            arrows(tips),
-            "lines",
-            line={"color": COLOURS[0], "width": 5},
-        ),
+        _in_space(f"to the barycentre, times {times:g}", arrows(tips), "lines", line={"color": COLOURS[0], "width": 5}),
         _in_space(
             "barycentre",
             tips,

@@ -346,14 +346,7 @@ def _details(values: Sequence[Value], parts: Sequence[Component]) -> tuple[tuple
 def _compared(comparison: Comparison) -> Figures:
     """Return what differs of position by more than its intervals leave open, and what does not."""
     rows = tuple(
-        (
-            row.id,
-            row.where,
-            row.under,
-            f"{row.value:.4f} {row.unit}",
-            f"{row.other:.4f} {row.unit}",
-            row.verdict,
-        )
+        (row.id, row.where, row.under, f"{row.value:.4f} {row.unit}", f"{row.other:.4f} {row.unit}", row.verdict)
         for row in comparison.rows
         if row.component == "position"
     )

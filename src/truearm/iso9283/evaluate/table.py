@@ -27,23 +27,9 @@ UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {
     "speed": ("mm/s", 1e3),
     "compliance": ("mm/N", 1e3),
 }
-_DECIMALS: Final[Mapping[Quantity, int]] = {
-    "length": 4,
-    "angle": 4,
-    "time": 3,
-    "ratio": 3,
-    "speed": 2,
-    "compliance": 6,
-}
+_DECIMALS: Final[Mapping[Quantity, int]] = {"length": 4, "angle": 4, "time": 3, "ratio": 3, "speed": 2, "compliance": 6}
 #: Columns of :attr:`Worst.cells`.
-HEADING: Final = (
-    "Criterion",
-    "Worst place",
-    "Value",
-    "95 %, or range",
-    "Other velocities",
-    "Status",
-)
+HEADING: Final = ("Criterion", "Worst place", "Value", "95 %, or range", "Other velocities", "Status")
 #: Where the value is the worst of several places already.
 _ALL_PLACES: Final = "all poses"
 

@@ -110,8 +110,7 @@ def _low(plan: PerformancePlan, pushes: Sequence[PushLine]) -> Notice | None:
     )
     told = ", ".join(f"{name} {largest[name]:.4g} N" for name in low)
     return Notice(
-        "low-forces",
-        f"The largest forces are well below the weight of the rated load, {most:.4g} N: {told}.{asked}",
+        "low-forces", f"The largest forces are well below the weight of the rated load, {most:.4g} N: {told}.{asked}"
     )
 
 

@@ -98,13 +98,7 @@ def _poses(plan: PerformancePlan) -> Figures:
     rows = []
     for pose in plan.poses.values():
         turned = quaternion_from_rotation(pose.rotation[None])[0]
-        rows.append(
-            (
-                pose.name,
-                *(f"{v * 1e3:.3f}" for v in pose.position),
-                *(f"{v + 0.0:.6f}" for v in turned),
-            )
-        )
+        rows.append((pose.name, *(f"{v * 1e3:.3f}" for v in pose.position), *(f"{v + 0.0:.6f}" for v in turned)))
     heading = ("Pose", "x [mm]", "y [mm]", "z [mm]", "qw", "qx", "qy", "qz")
     return Figures("Poses in the robot's base frame", heading, tuple(rows))
 

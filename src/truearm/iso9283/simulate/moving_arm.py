@@ -263,9 +263,7 @@ class MovingArm:
         for number in range(1, len(robot.joints) + 1):
             truth = self.twin.joints.get(number, PERFECT)
             joints[number] = replace(
-                truth,
-                hysteresis=truth.hysteresis or self.drives.play,
-                growth=truth.growth or self.warming.growth,
+                truth, hysteresis=truth.hysteresis or self.drives.play, growth=truth.growth or self.warming.growth
             )
         return replace(self.twin, robot=replace(placed, payload=self.payload, wrench=None), joints=joints)
 

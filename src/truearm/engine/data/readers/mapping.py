@@ -211,9 +211,7 @@ class OrderEntry(Entry):
     def _format(cls, time: str | None) -> str | None:
         if time is not None and time != "iso" and not _is_format(time):
             raise InputError(
-                "this is no format of times",
-                came=time,
-                allowed="iso, or signs of Python such as %d.%m.%Y %H:%M:%S",
+                "this is no format of times", came=time, allowed="iso, or signs of Python such as %d.%m.%Y %H:%M:%S"
             )
         return time
 

@@ -41,11 +41,7 @@ class Configurations:
 
 
 def found_configurations(
-    cells: Cells,
-    labels: Sequence[str],
-    columns: Sequence[int],
-    units: Sequence[str],
-    joints_are: JointsOf = "model",
+    cells: Cells, labels: Sequence[str], columns: Sequence[int], units: Sequence[str], joints_are: JointsOf = "model"
 ) -> Configurations:
     """Gather the configurations of a table in which every row has a label and all joints.
 

@@ -53,17 +53,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
             state = now
         lines.append(f"C{row:05d}={','.join(numbers)}")
     comments = [f"'{line[:32]}" for line in program.comments]
-    lines += [
-        "//INST",
-        f"///DATE {DATE}",
-        "///ATTR SC,RW",
-        "///GROUP1 RB1",
-        "NOP",
-        *comments,
-        *steps,
-        "END",
-        "",
-    ]
+    lines += ["//INST", f"///DATE {DATE}", "///ATTR SC,RW", "///GROUP1 RB1", "NOP", *comments, *steps, "END", ""]
     return {f"{name}.JBI": "\n".join(lines)}
 
 

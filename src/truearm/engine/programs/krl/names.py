@@ -352,10 +352,7 @@ class Frames:
         if equals is None:  # of a component, such as $TOOL.X
             unknown = Setting(problem=f"{word} is changed in part")
             both = word == "FDAT_ACT"
-            return Holding(
-                unknown if both or word == "$TOOL" else None,
-                unknown if both or word == "$BASE" else None,
-            )
+            return Holding(unknown if both or word == "$TOOL" else None, unknown if both or word == "$BASE" else None)
         if word != "FDAT_ACT":
             return self._assigned(text, word, equals.end(), stop, scopes)
         if flat[equals.end() : equals.end() + 1] == "{":

@@ -74,11 +74,7 @@ class Variable:
     elements: dict[str, Element] = field(default_factory=dict)
 
 
-def parse(
-    source: Source,
-    started: Callable[[str, Attributes, int], None],
-    ended: Callable[[str, int], None],
-) -> None:
+def parse(source: Source, started: Callable[[str, Attributes, int], None], ended: Callable[[str, int], None]) -> None:
     """Go through the tags of a file, or refuse it if it is not well-formed.
 
     Args:

@@ -59,14 +59,10 @@ CONVENTIONS: Final = (
     ),
     Convention("s-model", (*_DH, ("gamma", "Rz"), ("b", "Tz"))),
     CpcConvention(
-        "cpc",
-        ((JOINT, "Rz"), ("beta", "Rz"), ("l_x", "Tx"), ("l_y", "Ty"), ("l_z", "Tz")),
-        optional=("beta", "l_z"),
+        "cpc", ((JOINT, "Rz"), ("beta", "Rz"), ("l_x", "Tx"), ("l_y", "Ty"), ("l_z", "Tz")), optional=("beta", "l_z")
     ),
     Convention(
-        "mcpc",
-        ((JOINT, "Rz"), ("alpha", "Rx"), ("beta", "Ry"), ("gamma", "Rz"), *_POINT),
-        optional=("gamma", "z"),
+        "mcpc", ((JOINT, "Rz"), ("alpha", "Rx"), ("beta", "Ry"), ("gamma", "Rz"), *_POINT), optional=("gamma", "z")
     ),
     ZeroReferenceConvention("zero-reference", _POINT),
     ExponentialsConvention("product-of-exponentials", ()),

@@ -59,10 +59,7 @@ def _known_effect(name: str) -> str:
     known = [effect.name for effect in EFFECTS]
     if name not in known:
         raise InputError(
-            "there is no joint effect of this name",
-            came=name,
-            allowed=", ".join(known),
-            cure=did_you_mean(name, known),
+            "there is no joint effect of this name", came=name, allowed=", ".join(known), cure=did_you_mean(name, known)
         )
     return name
 

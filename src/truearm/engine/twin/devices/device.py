@@ -327,15 +327,7 @@ def positions(
     configuration, target = np.nonzero(seen)
     place = np.array([frames[names[t]][c, :3, 3] for c, t in zip(configuration, target, strict=True)])
     place = place + sigma * rng.standard_normal(place.shape)
-    return recorded(
-        nominal,
-        source,
-        joints,
-        configuration,
-        [names[t] for t in target],
-        position=place,
-        sigma=sigma,
-    )
+    return recorded(nominal, source, joints, configuration, [names[t] for t in target], position=place, sigma=sigma)
 
 
 TRACKER: Final = Tracker(

@@ -41,6 +41,7 @@ class Gone:
         return "truearm" in text and (
             any(self.has(found) for found in re.findall(r"\btruearm(?:\.\w+)+", text))
             or any(self.called(found.split()) for found in re.findall(r"\btruearm ([\w -]+)", text))
+            or any(self.has(f"truearm.{found}") for found in re.findall(r"\bfrom truearm import (\w+)", text))
         )
 
     def called(self, words: Sequence[object]) -> bool:
@@ -185,7 +186,7 @@ class Pruned:
             self._trims += before - len(node.elts)
             return before > 0 and not node.elts
         if isinstance(node, ast.Call | ast.BinOp | ast.keyword | ast.Starred):
-            return any([self._trimmed(child, gone) for child in ast.iter_child_nodes(node)])
+            return any([self._trimmed(child, gone) for child in ast.iter_child_nodes(node)])  # noqa: C419 - all are trimmed
         return False
 
     def _parametrized(self, one: ast.expr, gone: Gone) -> bool:
@@ -209,7 +210,7 @@ class Pruned:
             self._trims += len(node.names) - len(kept)
             node.names, left = kept, node if kept else None
         elif isinstance(node, Definition):
-            empty = any([self._parametrized(one, gone) for one in node.decorator_list])
+            empty = any([self._parametrized(one, gone) for one in node.decorator_list])  # noqa: C419 - all are trimmed
             if empty or self.uses(node, gone):
                 bound, left = [node.name], None
         elif isinstance(node, ast.Assign | ast.AnnAssign):
@@ -217,13 +218,15 @@ class Pruned:
             own = [n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)]
             keys = _keys(node.value)
             empty = node.value is not None and self._trimmed(node.value, gone) and isinstance(node, ast.Assign)
+            if isinstance(node, ast.AnnAssign):
+                empty |= self.uses(node.annotation, gone)
             if own == ["__all__"] and isinstance(node.value, ast.List | ast.Tuple):
                 gone_here = [
                     e for e in node.value.elts if isinstance(e, ast.Constant) and (self.module, e.value) in gone.names
                 ]
                 node.value.elts = [e for e in node.value.elts if e not in gone_here]
                 self._trims += len(gone_here)
-            elif empty or node.value is not None and self.uses(node.value, gone):
+            elif empty or (node.value is not None and self.uses(node.value, gone)):
                 bound, left = own, None
             if self.registry:
                 gone.keys |= keys - _keys(node.value)

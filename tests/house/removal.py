@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -151,6 +152,7 @@ def removed(feature: str, copy: Path) -> Gone:
     prune(tests, gone)
     _write(tests, copy)
     _recordings(copy, gone)
+    _slow(copy, gone)
     _contract(copy, gone)
     _run(copy, "-m", "ruff", "check", "-q", "--select", "F401", "--fix", "src", "tests", "papers")
     return gone
@@ -169,11 +171,19 @@ def _recordings(copy: Path, gone: Gone) -> None:
     content = yaml.load(path)
     for name, group in [*content["groups"].items()]:
         steps = [step.split() for step in group["steps"] if isinstance(step, str)]
-        if gone.commands and name == "help" or any(gone.called(step) for step in steps):
+        if (gone.commands and name == "help") or any(gone.called(step) for step in steps):
             del content["groups"][name]
             gone.tests.append(f"recording {name}")
     with path.open("w", encoding="utf-8") as stream:
         yaml.dump(content, stream)
+
+
+def _slow(copy: Path, gone: Gone) -> None:
+    """Take what is gone out of the list of slow tests."""
+    path = copy / "tests" / "slow.txt"
+    entries = [line.partition("[")[0] for line in path.read_text(encoding="utf-8").splitlines()]
+    left = [entry for entry in entries if (copy / entry.partition("::")[0]).exists() and entry not in gone.tests]
+    path.write_text("".join(f"{entry}\n" for entry in left), encoding="utf-8")
 
 
 def _contract(copy: Path, gone: Gone) -> None:
@@ -216,7 +226,9 @@ def faults(copy: Path, gone: Gone, *, whole: bool) -> dict[str, str]:
         run = _run(copy, *words)
         if run.returncode:
             found[name] = f"{run.stdout}{run.stderr}"
-        elif name == "help" and any(f" {words[0]} " in run.stdout for words in gone.commands if len(words) == 1):
+        elif name == "help" and any(
+            re.search(rf"(?m)^\W*{words[0]} ", run.stdout) for words in gone.commands if not words[1:]
+        ):
             found[name] = run.stdout
         sys.stdout.write(f"    {name} {time.monotonic() - begun:.0f} s\n")
     ignored = [f"--ignore={name}" for name in OF_THE_WHOLE]

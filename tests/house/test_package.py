@@ -31,12 +31,12 @@ def test_the_wheel_calibrates_outside_the_clone(unpacked_wheel: Path, tmp_path: 
     script = (
         f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nimport truearm\nfrom truearm.commands import main\n"
         f"assert {str(unpacked_wheel)!r} in truearm.__file__\n"
-        "for words in ('robots', 'demo --out demo', 'new-robot mine.yaml', 'show mine.yaml'):\n"
-        "    sys.argv[1:] = words.split()\n"
+        "for said in ('truearm robots', 'truearm demo --out demo', 'truearm new-robot a.yaml', 'truearm show a.yaml'):\n"
+        "    sys.argv = said.split()\n"
         "    try:\n        main()\n    except SystemExit as end:\n        assert not end.code\n"
     )
     subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True)
-    assert (tmp_path / "mine.yaml").exists()
+    assert (tmp_path / "a.yaml").exists()
     assert (tmp_path / "demo" / "report.html").stat().st_size > 1_000_000
 
 

@@ -269,7 +269,8 @@ class Pruned:
             last, text = node.end_lineno or node.lineno, "" if left is None else f"{ast.unparse(left)}\n"
             if isinstance(left, Definition):
                 last, text = left.lineno - 1, "".join(f"@{ast.unparse(one)}\n" for one in left.decorator_list)
-            lines[first - 1 : last] = [text]
+            ignored = re.search(r"# type: ignore.*", "".join(lines[first - 1 : last]))
+            lines[first - 1 : last] = [f"{text[:-1]}  {ignored[0]}\n" if text and ignored else text]
         return "".join(lines)
 
 

@@ -31,8 +31,8 @@ def test_the_wheel_calibrates_outside_the_clone(unpacked_wheel: Path, tmp_path: 
     script = (
         f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nimport truearm\nfrom truearm.commands import main\n"
         f"assert {str(unpacked_wheel)!r} in truearm.__file__\n"
-        "for said in ('truearm robots', 'truearm demo --out demo', 'truearm new-robot a.yaml', 'truearm show a.yaml'):\n"
-        "    sys.argv = said.split()\n"
+        "for c in ('truearm robots', 'truearm demo --out demo', 'truearm new-robot a.yaml', 'truearm show a.yaml'):\n"
+        "    sys.argv = c.split()\n"
         "    try:\n        main()\n    except SystemExit as end:\n        assert not end.code\n"
     )
     subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True)

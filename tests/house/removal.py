@@ -9,6 +9,7 @@ other tests (:mod:`tests.house.pruning`). Of the studio and of the papers single
 from __future__ import annotations
 
 import ast
+import gc
 import json
 import os
 import re
@@ -130,6 +131,7 @@ def _commands(tree: Path) -> set[tuple[str, ...]]:
 def removed(feature: str, copy: Path) -> Gone:
     """Delete a feature in a copy of the tree, and what names it."""
     before = _commands(copy)
+    gc.disable()  # nothing of the trees is garbage before the end
     files = {
         path: path.read_text(encoding="utf-8")
         for part in ("src", "papers", "tests")
@@ -139,6 +141,7 @@ def removed(feature: str, copy: Path) -> Gone:
         Pruned(path.relative_to(copy), text, registry=str(path.relative_to(copy)).startswith(LISTS))
         for path, text in files.items()
     ]
+    gc.enable()
     gone = _gone(feature, {file.module: file for file in pruned if file.path.parts[0] != "tests"})
     left = [file for file in pruned if not gone.has(file.module)]
     prune([file for file in left if file.module in REGISTRIES], gone)

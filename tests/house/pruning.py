@@ -89,6 +89,7 @@ class Pruned:
         self.imported = [(name, dotted) for name, dotted, _ in imported(nodes)]
         self._known = {name: dotted for name, dotted in self.imported if "." not in name}
         self._known |= {name.partition(".")[0]: name.partition(".")[0] for name, _ in self.imported if "." in name}
+        self._commanding = any(dotted.startswith("tests.commanding.") for _, dotted in self.imported)
         self._docs = {
             id(node.body[0].value)
             for node in nodes
@@ -110,10 +111,11 @@ class Pruned:
     def _words(self, node: ast.Call | ast.List | ast.Tuple) -> list[object]:
         """Return the words of the command that a call or a list is, if it is one."""
         nodes = node.args if isinstance(node, ast.Call) else node.elts
-        words = [n.value if isinstance(n, ast.Constant) else None for n in nodes]
-        if isinstance(node, ast.Call) and _dotted(node.func) == "truearm":
-            return [*words]
-        return [*words[words.index("truearm") + 1 :]] if "truearm" in words else []
+        words: list[object] = [n.value if isinstance(n, ast.Constant) else _dotted(n) for n in nodes]
+        if "truearm" in words:
+            return words[words.index("truearm") + 1 :]
+        called = not isinstance(node, ast.Call) or isinstance(node.func, ast.Name)
+        return words if called and self._commanding else []
 
     def touched(self, gone: Gone) -> bool:
         """Whether the file may use what is gone."""

@@ -7,7 +7,6 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -195,10 +194,7 @@ def _touches() -> Arguments:
 
 
 def _program(folder: Path) -> Path:
-    path = folder / "plate.mod"
-    if not path.exists():
-        path.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
-    return path
+    return _recorded(folder, "plate.mod")
 
 
 def _cell(folder: Path) -> Path:

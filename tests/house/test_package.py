@@ -43,7 +43,7 @@ def test_the_wheel_calibrates_outside_the_clone(unpacked_wheel: Path, tmp_path: 
 def test_an_installation_says_where_the_studies_are(unpacked_wheel: Path, tmp_path: Path) -> None:
     script = (
         f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nfrom truearm.commands import main\n"
-        "sys.argv[1:] = ['study', 'li-table', '--out', 'found']\nmain()\n"
+        "sys.argv = 'truearm study li-table --out found'.split()\nmain()\n"
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 2

@@ -63,7 +63,8 @@ def test_what_uses_a_deleted_module_goes_and_nothing_else() -> None:
     prune([test, helper], gone)
     assert helper.written() == ("from truearm.wheels.wheel import roll\nFRICTION = {'roll': lambda: roll(2)}\n")
     assert test.written() == (
-        "import pytest\nimport truearm\nfrom tests.commanding import Truearm\nfrom tests.helper import FRICTION\nSLOW = ('roll',)\n"
+        "import pytest\nimport truearm\nfrom tests.commanding import Truearm\n"
+        "from tests.helper import FRICTION\nSLOW = ('roll',)\n"
         "@pytest.mark.parametrize('job', ['roll'])\ndef test_of_both(job):\n    assert FRICTION[job]  # of each\n"
         "def test_of_another():\n    turned = 3\n    truearm.roll(turned)\n"
     )

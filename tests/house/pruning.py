@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -87,7 +88,8 @@ class Pruned:
         self._trims = 0
         nodes = [*ast.walk(self.tree)]
         self.imported = [(name, dotted) for name, dotted, _ in imported(nodes)]
-        self._known = {name: dotted for name, dotted in self.imported if "." not in name}
+        meant = Counter(name for name, _ in {*self.imported})  # what functions import under one name is looked at there
+        self._known = {name: dotted for name, dotted in self.imported if "." not in name and meant[name] == 1}
         self._known |= {name.partition(".")[0]: name.partition(".")[0] for name, _ in self.imported if "." in name}
         self._commanding = any(dotted.startswith("tests.commanding.") for _, dotted in self.imported)
         self._docs = {

@@ -37,7 +37,7 @@ OF_PAPERS: Final = ("truearm.starting.published", "truearm.starting.study")
 #: Files of tests whose lists name jobs.
 LISTS: Final = ("tests/house/", "tests/fuzz/", "tests/honesty/", "tests/kill_every_job.py")
 #: Tests that go through the registries, and are quick; and those of the whole tree, which is not what is here.
-QUICK: Final = ("test_contract", "test_every_job", "test_package", "test_refusals", "test_slow")
+QUICK: Final = ("test_contract.py", "test_every_job.py", "test_package.py", "test_refusals.py", "test_slow.py")
 OF_THE_WHOLE: Final = ("tests/mutants", "tests/house/test_documents.py", "tests/house/test_removal.py")
 
 _COMMANDS = """

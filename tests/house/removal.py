@@ -203,7 +203,9 @@ def _contract(copy: Path, gone: Gone) -> None:
 
 def faults(copy: Path, gone: Gone, *, whole: bool) -> dict[str, str]:
     """Return what is wrong with the rest, by what found it."""
-    cache = ROOT / ".mypy_cache" / "removal"
+    cache = (
+        ROOT / ".mypy_cache" / f"removal{os.environ.get('PYTEST_XDIST_WORKER', '')}"
+    )  # two at once must not share it
     checks = {
         "imports": ("-c", _IMPORTS, *(() if gone.has("papers") else ("papers",))),
         "names": ("-m", "ruff", "check", "-q", "--select", "F821,F401,F811", "src", "tests"),

@@ -25,6 +25,7 @@ class Gone:
     modules: set[str] = field(default_factory=set)  #: By their dotted names.
     names: set[tuple[str, str]] = field(default_factory=set)  #: Of other modules: module and name.
     keys: set[str] = field(default_factory=set)  #: By which registries of the tests know jobs and other things.
+    kept: set[str] = field(default_factory=set)  #: Jobs that stay: where one list loses them, others do not.
     commands: set[Words] = field(default_factory=set)  #: By their words.
     fixtures: set[tuple[str, str]] = field(default_factory=set)  #: Where they hold, and their names.
     tests: list[str] = field(default_factory=list)  #: Test functions, each with its file.
@@ -233,7 +234,7 @@ class Pruned:
             elif empty or (node.value is not None and self.uses(node.value, gone)):
                 bound, left = own, None
             if self.registry:
-                gone.keys |= keys - _keys(node.value)
+                gone.keys |= keys - _keys(node.value) - gone.kept
             if self.module == "truearm":
                 gone.names |= {("truearm", key) for key in keys - _keys(node.value)}
         elif isinstance(node, ast.If | ast.With | ast.Try | ast.For):

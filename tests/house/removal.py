@@ -112,6 +112,7 @@ def _gone(feature: str, files: dict[str, Pruned]) -> Gone:
     gone.modules = {module for module in gone.modules if module == _part(module) or _part(module) not in gone.modules}
     gone.modules |= {f"tests.{module.removeprefix('truearm.')}" for module in gone.modules if module == _part(module)}
     gone.keys = {name for _, name in gone.names}
+    gone.kept = {str(job) for job in jobs} - gone.keys
     gone.keys |= {m.removeprefix("papers.").replace("_", "-") for m in gone.modules if m.startswith("papers.")}
     return gone
 

@@ -57,7 +57,7 @@ def test_of_another():
 
 
 def test_what_uses_a_deleted_module_goes_and_nothing_else() -> None:
-    gone = Gone({"truearm.gears"}, {("truearm", "turn")}, {"turn"}, {("gears",)})
+    gone = Gone({"truearm.gears"}, {("truearm", "turn")}, {"turn"}, {"roll"}, {("gears",)})
     test = Pruned(Path("tests/house/test_gears.py"), TEST, registry=True)
     helper = Pruned(Path("tests/helper.py"), HELPER, registry=True)
     prune([test, helper], gone)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.answered import compensate
 from tests.compensation.test_program_on_twin import plate
+from tests.plate import PLATE
 
 import truearm
 from truearm import InputError
@@ -21,7 +21,7 @@ from truearm.engine.robot.transform import quaternion_from_rotation
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
 
-ORIGINAL = (files("truearm.starting.examples") / "plate.mod").read_text()
+ORIGINAL = PLATE
 NOISE = 2e-5
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.answered import compensate
+from tests.plate import PLATE
 
 import truearm
 from truearm.compensation.program_correction import commanded
@@ -38,7 +38,7 @@ def worn(effects: tuple[str, ...] = ()) -> Robot:
 
 def plate(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
     path = folder / "plate.mod"
-    path.write_text((files("truearm.starting.examples") / "plate.mod").read_text().replace(*change))
+    path.write_text(PLATE.replace(*change))
     return path
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import shlex
 import shutil
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.answered import ANSWERS
 from tests.commanding import Truearm
+from tests.plate import PLATE
 from tests.simulated import campaign
 
 from truearm.calibration.calibrate import calibrate
@@ -39,7 +39,7 @@ def stiff() -> Robot:
 def cell(tmp_path: Path) -> Path:
     """A folder with a calibrated robot, the plate's program and a file of its tool and frame."""
     (tmp_path / "calibrated.yaml").write_text(robot_text(worn()))
-    (tmp_path / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    (tmp_path / "plate.mod").write_text(PLATE)
     (tmp_path / "cell.yaml").write_text(
         "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
         "tools:\n  tProbe: {of: flange, translation: [0.2, 0, 125]}\n"

@@ -7,12 +7,12 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.answered import compensate
+from tests.plate import PLATE
 from tests.simulated import campaign
 
 import truearm
@@ -32,7 +32,7 @@ def calibrated() -> Robot:
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
     path = tmp_path / "plate.mod"
-    path.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    path.write_text(PLATE)
     return path
 
 

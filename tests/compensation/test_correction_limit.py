@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import pytest
 from tests.house.examples import PATH
+from tests.plate import PLATE
 
 import truearm
 from truearm.compensation.limit import CorrectionLimit, check_size, correction_limit
@@ -37,7 +37,7 @@ def longer() -> Robot:
 
 def plate(folder: Path) -> Path:
     path = folder / "plate.mod"
-    path.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    path.write_text(PLATE)
     return path
 
 

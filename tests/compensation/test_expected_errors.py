@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.plate import PLATE
 from tests.simulated import campaign
 
 from truearm.calibration.calibrate import calibrate
@@ -26,7 +26,7 @@ DRAWS = 25
 
 def program() -> Program:
     """Return the plate's program, a tenth of its targets and a posture by joints among them."""
-    text = (files("truearm.starting.examples") / "plate.mod").read_text()
+    text = PLATE
     lines = [line for line in text.splitlines() if not line.startswith("    Move") or "Circle" in line]
     jumps = [f"    MoveJ pHole{i},v20,fine,tProbe\\WObj:=wobjPlate;" for i in (1, 6, 8)]
     at = next(i for i, line in enumerate(lines) if "PROC main" in line)
@@ -115,7 +115,7 @@ def test_what_is_not_known_is_not_said(robot: Robot) -> None:
 
 
 def test_one_target_alone_has_no_correction_of_which_something_could_be_promised(robot: Robot) -> None:
-    text = (files("truearm.starting.examples") / "plate.mod").read_text()
+    text = PLATE
     lines = [line for line in text.splitlines() if "Move" not in line and "CONST" not in line]
     pose = "[[20,20,0],[-0.069237,-0.008501,0.990128,0.121572],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
     move = f"    MoveJ {pose},v20,fine,tProbe\\WObj:=wobjPlate;"

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.known_frames import frames_of
+from tests.plate import PLATE
 from tests.simulated import campaign
 from typer.testing import CliRunner
 
@@ -146,9 +147,8 @@ def test_the_base_stays_known_when_the_robot_is_placed_anew(tmp_path: Path) -> N
 
 
 def plate() -> Program:
-    from importlib.resources import files
 
-    return RAPID.read([Source(Path("plate.mod"), (files("truearm.starting.examples") / "plate.mod").read_text())])
+    return RAPID.read([Source(Path("plate.mod"), PLATE)])
 
 
 def test_no_base_and_no_flange_is_assumed_in_programs_where_they_were_held(tmp_path: Path) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.plate import PLATE
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
@@ -57,7 +57,7 @@ def plate(text: str) -> Program:
 
 
 def original() -> str:
-    return (files("truearm.starting.examples") / "plate.mod").read_text()
+    return PLATE
 
 
 def missed(twin: Twin, calibration: Calibration, program: Program, meant: np.ndarray, rows: np.ndarray) -> np.ndarray:

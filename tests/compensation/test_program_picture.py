@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.answered import compensate
+from tests.plate import PLATE
 
 import truearm
 from truearm.compensation.report import _flat_view, path_figure
@@ -19,7 +19,7 @@ GRID = np.array([[x, y, 0.0] for x in (0.0, 100.0, 200.0) for y in (0.0, 50.0)])
 @pytest.fixture(scope="module")
 def plate(tmp_path_factory: pytest.TempPathFactory) -> ProgramCorrection:
     folder = tmp_path_factory.mktemp("plate")
-    (folder / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    (folder / "plate.mod").write_text(PLATE)
     data = truearm.simulate("irb120", truth="random", poses=20, noise=5e-5, seed=1).data
     robot = truearm.calibrate("irb120", data, model="offsets").robot
     return compensate(

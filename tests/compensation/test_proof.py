@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.answered import compensate
+from tests.plate import PLATE
 from tests.simulated import campaign
 
 import truearm
@@ -34,7 +34,7 @@ def robot() -> Robot:
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
     path = tmp_path / "plate.mod"
-    path.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    path.write_text(PLATE)
     return path
 
 

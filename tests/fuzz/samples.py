@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import tempfile
+from collections.abc import Callable
 from datetime import datetime
 from functools import cache
 from importlib.resources import files
@@ -168,71 +169,90 @@ def _workbook(path: Path) -> None:
     book.save(path)
 
 
+#: Jobs that write samples, and what else they write or use is called here.
+WRITING: dict[str, dict[str, str]] = {
+    "calibrate": {},
+    "import_table": {},
+    "import_matrices": {},
+    "import_robodk": {},
+    "import_circle": {},
+    "import_sockets": {},
+    "import_hand_eye": {},
+    "import_ros": {},
+    "tolerance": {"axes/joint-errors.yaml": "joint-errors.yaml"},
+    "tilting": {},
+    "compensate": {"result/calibrated.yaml": "calibrated.yaml"},
+    "revert": {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"},
+    "path": {"result/calibrated.yaml": "calibrated.yaml"},
+    "sphere": {},
+}
+#: What samples hold that are nothing but a text.
+TEXTS = {
+    "fixtures.csv": MIXED,
+    "points.csv": POINTS,
+    "spatial.yaml": SPATIAL,
+    "joints.csv": JOINTS,
+    "bounds.yaml": BOUNDS,
+    "fleet.yaml": FLEET,
+    "robots.csv": ROBOTS,
+    "experiment.yaml": EXPERIMENT,
+    "zones.yaml": ZONES,
+    "excluded.csv": "configuration,target,reason\n1,1,beam broken\n2,2,touched\n",
+    "constraints.yaml": CONSTRAINTS,
+    "cube.yaml": CUBE,
+    "whole.csv": WHOLE_TABLE,
+    "whole.yaml": WHOLE_MAPPING,
+    "driven.csv": DRIVEN,
+    "workbook.yaml": WORKBOOK_MAPPING,
+    "about.yaml": ABOUT,
+    "rows.csv": ROWS,
+    "rows.yaml": ROWS_MAPPING,
+}
+
+
 @cache
 def folder() -> Path:
     """Return a folder with all of them, made once."""
     place = Path(tempfile.mkdtemp(prefix="truearm-fuzz-"))
     atexit.register(shutil.rmtree, place, ignore_errors=True)
-    for job in (
-        "calibrate",
-        "import_table",
-        "import_matrices",
-        "import_robodk",
-        "import_circle",
-        "import_sockets",
-        "import_hand_eye",
-        "import_ros",
-        "tolerance",
-        "tilting",
-        "compensate",
-        "revert",
-        "path",
-        "sphere",
-    ):
+    for job, names in WRITING.items():
         EXAMPLES[job](place)
-    truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))
-    _rename(place, {"result/calibrated.yaml": "calibrated.yaml", "axes/joint-errors.yaml": "joint-errors.yaml"})
-    truearm.measure(**EXAMPLES["measure"](place))
-    _rename(place, {"measured/readings.csv": "log.csv"})
-    _rename(place, {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"})
+        _rename(place, names)
     remember(place / LEDGER, [LedgerEntry(program="plate.mod", date="2026-11-27", robot="irb120", targets="AAAAAAAA")])
     for name in ("irb120", "kr5"):
         (place / f"{name}.yaml").write_text((files("truearm.engine.robot.library") / f"{name}.yaml").read_text())
-    truearm.new_robot(place / "robot.yaml")
+    for make in MAKING:
+        make(place)
+    for name, text in TEXTS.items():
+        (place / name).write_text(text)
+    # the same readings twice are refused
+    (place / "again.csv").write_text((place / "data.csv").read_text() + "\n")
+    _workbook(place / "points.xlsx")
+    _pose_set(place)
+    return place
+
+
+def _pose_set(place: Path) -> None:
+    at = load_robot("irb120").forward_kinematics(np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0]]))
+    numbers = ",".join(f"{v:.9g}" for v in (*(at.position[:, 0] * 1e3), 0.5, 0.5, 0.5, 0.5))
+    (place / "poses.csv").write_text(f"pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\na,{numbers}\nb,{numbers}\n")
+
+
+def _log(place: Path) -> None:
+    truearm.measure(**EXAMPLES["measure"](place))
+    _rename(place, {"measured/readings.csv": "log.csv"})
+
+
+def _robots(place: Path) -> None:
+    """Write robots of other formats."""
+    truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))
     truearm.export(place / "ur10-controller.yaml", "ur-kinematics", out=place / "ros-kinematics.yaml")
     for form, name in (("urdf", "arm.urdf"), ("dh", "dh.csv"), ("mdh", "mdh.csv"), ("hayati", "hayati.csv")):
         truearm.export("puma560" if form == "mdh" else "irb1600" if form == "dh" else "irb120", form, out=place / name)
-    at = load_robot("irb120").forward_kinematics(np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0]]))
-    numbers = ",".join(f"{v:.9g}" for v in (*(at.position[:, 0] * 1e3), 0.5, 0.5, 0.5, 0.5))
-    texts = {
-        "poses.csv": f"pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\na,{numbers}\nb,{numbers}\n",
-        "fixtures.csv": MIXED,
-        "points.csv": POINTS,
-        "spatial.yaml": SPATIAL,
-        "joints.csv": JOINTS,
-        "bounds.yaml": BOUNDS,
-        "fleet.yaml": FLEET,
-        "robots.csv": ROBOTS,
-        "experiment.yaml": EXPERIMENT,
-        "zones.yaml": ZONES,
-        "excluded.csv": "configuration,target,reason\n1,1,beam broken\n2,2,touched\n",
-        "constraints.yaml": CONSTRAINTS,
-        "cube.yaml": CUBE,
-        "sheet.csv": _sheet(),
-        "touches.csv": _touches(),
-        "whole.csv": WHOLE_TABLE,
-        "whole.yaml": WHOLE_MAPPING,
-        "driven.csv": DRIVEN,
-        "workbook.yaml": WORKBOOK_MAPPING,
-        "about.yaml": ABOUT,
-        "rows.csv": ROWS,
-        "rows.yaml": ROWS_MAPPING,
-    }
-    _workbook(place / "points.xlsx")
-    texts["again.csv"] = (place / "data.csv").read_text() + "\n"  # the same readings twice are refused
-    for name, text in (texts | _performance()).items():
-        (place / name).write_text(text)
-    return place
+
+
+def _new_robot(place: Path) -> None:
+    truearm.new_robot(place / "robot.yaml")
 
 
 @cache
@@ -247,11 +267,12 @@ def _rename(place: Path, names: dict[str, str]) -> None:
         (place / new).write_bytes((place / old).read_bytes())
 
 
-def _performance() -> dict[str, str]:
-    """Return a plan of tests by ISO 9283 and what was read for it, few samples of each cycle."""
+def _performance(place: Path) -> None:
+    """Write a plan of tests by ISO 9283 and what was read for it, few samples of each cycle."""
     texts = performance_files()
     texts = texts | {name: _thinned(texts[name]) for name in ("paths.csv", "settling.csv")}
-    return {PERFORMANCE[name]: text.replace("robot: robot.yaml", "robot: tested.yaml") for name, text in texts.items()}
+    for name, text in texts.items():
+        (place / PERFORMANCE[name]).write_text(text.replace("robot: robot.yaml", "robot: tested.yaml"))
 
 
 def _thinned(text: str) -> str:
@@ -259,15 +280,15 @@ def _thinned(text: str) -> str:
     return header + "".join(rows[::4])
 
 
-def _sheet() -> str:
-    """Return a sheet with two places, two sides of four cups and two attachments of the tool."""
+def _sheet(place: Path) -> None:
+    """Write a sheet with two places, two sides of four cups and two attachments of the tool."""
     found, bar, base = poses(), ballbar(np.random.default_rng(0)), triangle([0.3] * 3, "B")
     rows, lengths = [], []
     for label, number in zip("abcdefgh", (5, 40, 66, 12, 20, 33, 50, 70), strict=True):
-        place, side, attachment = ("l", 1 + number % 2, "1") if label in "abcd" else ("r", 1, "2")
+        at, side, attachment = ("l", 1 + number % 2, "1") if label in "abcd" else ("r", 1, "2")
         pose = found[number - 1]
         row = PlannedRow(
-            label, "front-up-flip", number, pose.design, pose.solution, np.full(6, 0.1), place, side, attachment
+            label, "front-up-flip", number, pose.design, pose.solution, np.full(6, 0.1), at, side, attachment
         )
         read = measured_legs(bar, pose.design, base, pose.cups)
         lengths.append({name: read[own] for name, own in zip(row.leg_names, pose.design.leg_names, strict=True)})
@@ -275,10 +296,16 @@ def _sheet() -> str:
         if label in "ae":
             lengths[-1] |= measured_sides(bar, base, "B") | dict.fromkeys(("B1-B4", "B2-B4", "B3-B4"), 0.3)
     lengths[0] |= measured_sides(bar, found[0].cups, "T")
-    return sheet_csv(rows, [Joint(f"axis_{n}", "revolute", {}) for n in range(1, 7)], lengths)
+    joints = [Joint(f"axis_{n}", "revolute", {}) for n in range(1, 7)]
+    (place / "sheet.csv").write_text(sheet_csv(rows, joints, lengths))
 
 
-def _touches() -> str:
+def _touches(place: Path) -> None:
     joints = np.degrees(EXAMPLES["hexapod_world_frame"](Path())["touches"])
     rows = [f"{cup},{','.join(f'{v:.6f}' for v in row)}" for cup, row in zip(("B1", "B2", "B3"), joints, strict=True)]
-    return "\n".join([f"cup,{','.join(f'joint_{n} [deg]' for n in range(1, 7))}", *rows]) + "\n"
+    header = f"cup,{','.join(f'joint_{n} [deg]' for n in range(1, 7))}"
+    (place / "touches.csv").write_text("\n".join([header, *rows]) + "\n")
+
+
+#: What writes samples after all others.
+MAKING: tuple[Callable[[Path], None], ...] = (_log, _new_robot, _robots, _performance, _sheet, _touches)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 from tests.answered import ANSWERS
 from tests.honesty.telling import Told, told, written
 from tests.lookalikes import campaign_of
+from tests.plate import PLATE
 
 from truearm.engine.robot.library import load_robot
 
@@ -17,7 +17,7 @@ from truearm.engine.robot.library import load_robot
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("another")
-    (made / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    (made / "plate.mod").write_text(PLATE)
     poses = [f"  movel(p[-0.{6 + i}, -0.3, 0.{2 + i}, 0.1, 3.1, 0.0], a=1.2, v=0.25)" for i in range(3)]
     (made / "job.script").write_text("\n".join(["def job():", "  set_tcp(p[0, 0, 0.1, 0, 0, 0])", *poses, "end", ""]))
     written(made, campaign_of(load_robot("ur10e"), 60, 1)[1])

@@ -7,7 +7,6 @@ import json
 import shutil
 from dataclasses import replace
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +15,7 @@ import pytest
 from tests.commanding import Truearm
 from tests.commanding import truearm as truearm
 from tests.honesty.telling import told, written
+from tests.plate import PLATE
 from tests.simulated import campaign
 
 import truearm as package
@@ -110,7 +110,7 @@ def test_a_fit_that_is_worse_than_the_nominal_robot_is_an_error(tmp_path: Path) 
     assert found.code == 3
     assert found.says("worse-than-nominal", "error", r"1 %\)"), found
     program = tmp_path / "plate.mod"
-    program.write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    program.write_text(PLATE)
     refused = told("compensate", tmp_path / "out" / "calibrated.yaml", program, "--out", tmp_path / "corrected")
     assert refused.code == 2
     assert "--accept worse-than-nominal" in refused.refusal

@@ -6,12 +6,12 @@ import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.answered import compensate
+from tests.plate import PLATE
 from tests.simulated import campaign, more_of
 
 import truearm
@@ -82,7 +82,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
     twin, data = campaign("irb120", 60, NOISE, 3)
     for name, readings in (("first", data), ("second", more_of(twin, 60, NOISE, 4))):
         truearm.calibrate("irb120", readings, out=folder / name)
-    (folder / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    (folder / "plate.mod").write_text(PLATE)
     place = (
         twin.robot.base.matrix @ best_agreement(twin.robot)[0] @ read(folder / "plate.mod").frames["wobjPlate"].matrix
     )
@@ -117,7 +117,7 @@ def reformatted(text: str) -> str:
 
 def some_targets(text: str) -> str:
     """Return it as another program that has taken two of its targets over: the rest are the original ones."""
-    original = (files("truearm.starting.examples") / "plate.mod").read_text()
+    original = PLATE
     for name in ("pHole3", "pHole7"):
         taken = re.search(rf"{name}:=(.*);", text)
         assert taken is not None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from tests.answered import ANSWERS
 from tests.honesty.telling import Told, told, written
+from tests.plate import PLATE
 from tests.simulated import campaign
 
 from truearm.engine.twin.twin import measure
@@ -22,7 +22,7 @@ NOISE: Final = 2e-5
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("programs")
-    (made / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    (made / "plate.mod").write_text(PLATE)
     return made
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -264,7 +265,8 @@ def records() -> list[type[Record]]:
     for module in pkgutil.walk_packages(truearm.__path__, "truearm."):
         if not module.name.endswith(("__main__", "python_template")):
             import_module(module.name)
-    import_module("papers.study")
+    if find_spec("papers"):
+        import_module("papers.study")
 
     found, left = list[type[Record]](), [Record]
     while left:

@@ -31,19 +31,19 @@ def test_the_wheel_calibrates_outside_the_clone(unpacked_wheel: Path, tmp_path: 
     script = (
         f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nimport truearm\nfrom truearm.commands import main\n"
         f"assert {str(unpacked_wheel)!r} in truearm.__file__\n"
-        "for words in ('robots', 'demo --out demo', 'new-robot mine.yaml', 'show mine.yaml'):\n"
-        "    sys.argv[1:] = words.split()\n"
+        "for c in ('truearm robots', 'truearm demo --out demo', 'truearm new-robot a.yaml', 'truearm show a.yaml'):\n"
+        "    sys.argv = c.split()\n"
         "    try:\n        main()\n    except SystemExit as end:\n        assert not end.code\n"
     )
     subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True)
-    assert (tmp_path / "mine.yaml").exists()
+    assert (tmp_path / "a.yaml").exists()
     assert (tmp_path / "demo" / "report.html").stat().st_size > 1_000_000
 
 
 def test_an_installation_says_where_the_studies_are(unpacked_wheel: Path, tmp_path: Path) -> None:
     script = (
         f"import sys\nsys.path.insert(0, {str(unpacked_wheel)!r})\nfrom truearm.commands import main\n"
-        "sys.argv[1:] = ['study', 'li-table', '--out', 'found']\nmain()\n"
+        "sys.argv = 'truearm study li-table --out found'.split()\nmain()\n"
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 2

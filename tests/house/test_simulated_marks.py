@@ -161,7 +161,10 @@ def test_files_of_a_result_say_it_once(job: str, simulated: Path, real: Path, tm
 
 def test_a_corrected_program_its_record_and_its_report_say_it(simulated: Path, real: Path) -> None:
     for folder, marked in ((simulated, True), (real, False)):
-        truearm.compensate(**EXAMPLES["compensate"](folder))
+        arguments = EXAMPLES["compensate"](folder)
+        if not marked:
+            unmark(real)
+        truearm.compensate(**arguments)
         record = json.loads((folder / "compensated" / "plate.mod.truearm.json").read_text())
         assert record["applied"].get("simulated", False) is marked
         page = (folder / "compensated" / "compensation.html").read_text()

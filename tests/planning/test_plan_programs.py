@@ -59,8 +59,6 @@ def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_
             "--wait: there is no such wait; got 'button'; allowed: time; input",
         ),
         (("--clearance", "-5"), "--clearance: the length is out of range; got '-5 mm'; allowed: 0 mm to"),
-        (("--device", "inclinometers", "--program", "rapid"), "--program: this says nothing for inclinometers"),
-        (("--device", "inclinometers", "--approach"), "--approach: this says nothing for inclinometers"),
     ],
 )
 def test_refusals_write_nothing(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], message: str) -> None:

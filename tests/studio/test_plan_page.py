@@ -6,7 +6,6 @@ import json
 import re
 import shlex
 from html import unescape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 from tests.commanding import Truearm
 from tests.commanding import truearm as truearm
+from tests.plate import PLATE
 from tests.studio.conftest import Serving
 from tests.studio.pressing import at_once, below
 from tests.studio.test_jog_page import act, eventually
@@ -393,7 +393,7 @@ def test_a_cell_file_is_given_for_what_it_has(
     }
     head = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
     (folder / "cell.yaml").write_text(head + "".join(has[part] for part in parts))
-    (folder / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text("utf-8"))
+    (folder / "plate.mod").write_text(PLATE)
     window.edit(cell="cell.yaml", plan={"poses": "20", "candidates": 60, "accurate_at": "plate.mod"})
     page = page_of(studio)
     act(page._run)

@@ -6,7 +6,6 @@ import re
 import shlex
 from dataclasses import replace
 from html import unescape
-from importlib.resources import files
 from pathlib import Path
 from shutil import copytree
 from typing import Any
@@ -16,6 +15,7 @@ import pytest
 from tests import ur_controller as ur
 from tests.commanding import Truearm
 from tests.commanding import truearm as truearm
+from tests.plate import PLATE
 from tests.simulated import campaign
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, below, notices
@@ -46,7 +46,7 @@ def project(place: Path) -> Path:
     """Make a project with a program, whose correction needs nothing more than a result."""
     folder = place / "project"
     folder.mkdir()
-    (folder / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text("utf-8"))
+    (folder / "plate.mod").write_text(PLATE)
     (folder / "truearm-studio.yaml").write_text(
         "truearm: truearm-studio/1\nrobot: irb120\nprogram: plate.mod\ntaught: [none]\ncontroller_kinematics: nominal\n"
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from tests.answered import ANSWERS, compensate
 from tests.calibration.test_external_force import HIGH, LOW, elastic_twin
+from tests.plate import PLATE
 from typer.testing import CliRunner
 
 import truearm
@@ -40,7 +40,7 @@ def cell(campaign: tuple[Twin, Robot], tmp_path: Path) -> Path:
     from truearm.engine.robot.robot_file.writing import robot_text
 
     (tmp_path / "calibrated.yaml").write_text(robot_text(campaign[1]))
-    (tmp_path / "plate.mod").write_text((files("truearm.starting.examples") / "plate.mod").read_text())
+    (tmp_path / "plate.mod").write_text(PLATE)
     return tmp_path
 
 

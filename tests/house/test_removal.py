@@ -1,0 +1,72 @@
+"""Every feature can be deleted: the rest is imported, is typed, lists what is left, and passes its tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.house.pruning import Gone, Pruned, prune
+from tests.house.removal import faults, features, removed
+from tests.mutants.running import copy_of_the_tree
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("feature", features())
+def test_a_feature_can_be_deleted(feature: str, tmp_path: Path) -> None:
+    copy = copy_of_the_tree(tmp_path)
+    gone = removed(feature, copy)
+    assert not (copy / "src" / "truearm" / feature).exists()
+    assert faults(copy, gone, whole=False) == {}
+
+
+HELPER = """\
+from truearm.gears.gear import turn
+from truearm.wheels.wheel import roll
+FRICTION = {"turn": lambda: turn(1), "roll": lambda: roll(2)}  # both
+def turned() -> int:
+    return turn(3)
+"""
+TEST = """\
+import pytest
+import truearm
+from tests.commanding import Truearm
+from tests.helper import FRICTION, turned
+SLOW = ("turn", "roll")
+@pytest.fixture
+def geared():
+    return turned()
+@pytest.mark.parametrize("job", ["turn", "roll"])
+def test_of_both(job):
+    assert FRICTION[job]  # of each
+@pytest.mark.parametrize("job", ["turn"])
+def test_of_one(job):
+    assert FRICTION[job]
+def test_with_a_fixture(geared): pass
+def test_by_the_package(): truearm.turn(1)
+def test_by_a_command(truearm): truearm("gears", "turn", "x")
+def test_by_words(truearm):
+    for words in (["show", 1], ["gears", "turn"]):
+        truearm(*words)
+def test_in_a_text(): run("from truearm import turn")
+def test_inside():
+    from truearm.gears import gear
+def test_of_another():
+    turned = 3
+    truearm.roll(turned)
+"""
+
+
+def test_what_uses_a_deleted_module_goes_and_nothing_else() -> None:
+    gone = Gone({"truearm.gears"}, {("truearm", "turn")}, {"turn"}, {"roll"}, {("gears",)})
+    test = Pruned(Path("tests/house/test_gears.py"), TEST, registry=True)
+    helper = Pruned(Path("tests/helper.py"), HELPER, registry=True)
+    prune([test, helper], gone)
+    assert helper.written() == ("from truearm.wheels.wheel import roll\nFRICTION = {'roll': lambda: roll(2)}\n")
+    assert test.written() == (
+        "import pytest\nimport truearm\nfrom tests.commanding import Truearm\n"
+        "from tests.helper import FRICTION\nSLOW = ('roll',)\n"
+        "@pytest.mark.parametrize('job', ['roll'])\ndef test_of_both(job):\n    assert FRICTION[job]  # of each\n"
+        "def test_of_another():\n    turned = 3\n    truearm.roll(turned)\n"
+    )
+    went = ("of_one", "with_a_fixture", "by_the_package", "by_a_command", "by_words", "in_a_text", "inside")
+    assert sorted(gone.tests) == sorted(f"tests/house/test_gears.py::test_{name}" for name in went)

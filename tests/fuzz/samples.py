@@ -179,6 +179,7 @@ WRITING: dict[str, dict[str, str]] = {
     "import_sockets": {},
     "import_hand_eye": {},
     "import_ros": {},
+    "axes": {},
     "tolerance": {"axes/joint-errors.yaml": "joint-errors.yaml"},
     "tilting": {},
     "compensate": {"result/calibrated.yaml": "calibrated.yaml"},

@@ -297,3 +297,10 @@ def test_damaged_bags_are_refused(tmp_path: Path) -> None:
         except InputError:
             outcomes.add("refused")
     assert "refused" in outcomes
+
+
+def test_a_text_that_is_no_text_is_told_in_plain_words(tmp_path: Path) -> None:
+    bag = write_ros1(tmp_path / "cell.bag", [*OF_JOINTS, *OF_TARGET])
+    name = NAMES[2].encode()
+    bag.write_bytes(bag.read_bytes().replace(name, b"\x81" + name[1:]))
+    assert refused(bag, "the bag cannot be read").came == "a text that is no UTF-8"

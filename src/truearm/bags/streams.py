@@ -105,10 +105,11 @@ def _opened(bag: Path) -> Iterator[Any]:
     except InputError:
         raise
     except Exception as error:  # of a damaged bag the library lets out errors of any kind
+        said = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(
             "the bag cannot be read",
             where=str(bag),
-            came=" ".join(str(error).split())[:200] or type(error).__name__,
+            came="a text that is no UTF-8" if "codec can't decode" in said else said,
             cure="Mend it with the tools of ROS ('rosbag reindex', 'ros2 bag reindex'), or record it again.",
         ) from error
 

@@ -103,6 +103,11 @@ def named(node: ast.AnnAssign) -> str:
     return name_of(node.target)
 
 
+def is_option(node: ast.AnnAssign) -> bool:
+    """Return whether this declares an option of a request."""
+    return isinstance(node.value, ast.Call) and name_of(node.value.func) in ("option", "required")
+
+
 def imported(tree: ast.AST, files: dict[str, Path]) -> set[str]:
     """Return the modules that a module imports anywhere, but for types alone."""
     found, left = set[str](), list(ast.iter_child_nodes(tree))
@@ -164,9 +169,12 @@ def counted() -> tuple[dict[str, Counter[str]], dict[str, int], list[str]]:
     jobs = next(n for n in trees[PACKAGE / "__init__.py"].body if isinstance(n, ast.AnnAssign) and named(n) == "JOBS")
     homes = ast.literal_eval(jobs.value or jobs)
     for job, home in homes.items():
-        function = next(n for n in trees[modules[home]].body if isinstance(n, ast.FunctionDef) and n.name == job)
-        requests.add(function)
-        options |= {one.arg for one in function.args.kwonlyargs} - {"progress", "command"}
+        for function in trees[modules[home]].body:
+            if isinstance(function, ast.FunctionDef) and function.name == job:
+                requests.add(function)
+                options |= {one.arg for one in function.args.kwonlyargs} - {"progress", "command"}
+    for tree in trees.values():
+        options |= {named(one) for one in ast.walk(tree) if isinstance(one, ast.AnnAssign) and is_option(one)}
     for dotted, path in modules.items():
         graph[dotted] = imported(trees[path], modules) - {dotted}
         for node in ast.walk(trees[path]):
@@ -179,6 +187,8 @@ def counted() -> tuple[dict[str, Counter[str]], dict[str, int], list[str]]:
                     continue
                 arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
                 declared.update(one.arg for one in arguments if one.arg in options)
+            elif isinstance(node, ast.AnnAssign) and is_option(node):
+                declared[named(node)] += 1
             elif isinstance(node, ast.ClassDef) and DECLARING.match(dotted):
                 held = [n.target for n in node.body if isinstance(n, ast.AnnAssign)]
                 declared.update(name_of(one) for one in held if name_of(one) in options)

@@ -49,9 +49,9 @@ if TYPE_CHECKING:
     from truearm.inclinometers.pairs import plan_inclinometers as plan_inclinometers
     from truearm.inclinometers.pairs import simulate_inclinometers as simulate_inclinometers
     from truearm.inclinometers.tilting import tilting as tilting
-    from truearm.iso9283.evaluate.evaluate import iso9283_evaluate as iso9283_evaluate
-    from truearm.iso9283.plan.plan import iso9283_plan as iso9283_plan
-    from truearm.iso9283.simulate.simulate import iso9283_simulate as iso9283_simulate
+    from truearm.iso9283.jobs import iso9283_evaluate as iso9283_evaluate
+    from truearm.iso9283.jobs import iso9283_plan as iso9283_plan
+    from truearm.iso9283.jobs import iso9283_simulate as iso9283_simulate
     from truearm.measuring.measure import measure as measure
     from truearm.planning.plan import plan as plan
     from truearm.planning.poses import poses as poses
@@ -109,9 +109,9 @@ JOBS: Final = {
     "axes": "truearm.axis_circles.axes",
     "tolerance": "truearm.validation.tolerances",
     "lines": "truearm.validation.lines",
-    "iso9283_plan": "truearm.iso9283.plan.plan",
-    "iso9283_simulate": "truearm.iso9283.simulate.simulate",
-    "iso9283_evaluate": "truearm.iso9283.evaluate.evaluate",
+    "iso9283_plan": "truearm.iso9283.jobs",
+    "iso9283_simulate": "truearm.iso9283.jobs",
+    "iso9283_evaluate": "truearm.iso9283.jobs",
     "influence": "truearm.simulation.influence",
     "sphere": "truearm.validation.sphere",
     "hexapod_enumerate": "truearm.hexapod.jobs",

@@ -16,13 +16,13 @@ from typer.models import CommandInfo
 from truearm.axis_circles.command import axes
 from truearm.bags.command import ros
 from truearm.board.command import hand_eye
-from truearm.calibration.command import calibrate
+from truearm.calibration.calibrate import Calibrate
 from truearm.checking.command import check
 from truearm.compensation.command import compensate, path
 from truearm.drawn_circle.command import circle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
-from truearm.engine.command.options import CommandError, Commands, by_device
+from truearm.engine.command.options import CommandError, Commands, add, by_device
 from truearm.fleets.command import fleet
 from truearm.hexapod.command import app as hexapod
 from truearm.importing.command import guess, matrices, robodk, sockets, table
@@ -80,7 +80,7 @@ importing.command("ur-kinematics")(ur_kinematics)
 importing.command()(ros)
 
 app.command()(check)
-app.command()(calibrate)
+add(app, Calibrate)
 app.command()(tilting)
 app.command()(validate)
 app.command()(distances)

@@ -32,8 +32,8 @@ from truearm.engine.twin.twin import Twin, measure
 from truearm.engine.twin.twin_joint import PERFECT, JointTruth
 from truearm.validation.validate import validate
 
-#: The module, whose name the job of the same name hides.
-calibrating = import_module("truearm.calibration.calibrate")
+#: The module of the job.
+calibrating = import_module("truearm.calibration.calibrating")
 NOISE = 2e-5
 ELASTIC = next(model for model in MODELS if model.name == "elastic")
 

@@ -71,7 +71,7 @@ def test_what_is_kept_is_written_and_read(cut: tuple[Path, Calibration]) -> None
     assert run.zones is not None
     names = {path.name for path in (folder / "out").iterdir()}
     kept = [verdict.box.name for verdict in run.zones.kept]
-    assert names == {*run.files, "truearm.manifest.json"}
+    assert names == {*run.written, "truearm.manifest.json"}
     assert {f"zone-{name}.yaml" for name in kept} < names
     found = json.loads((folder / "out" / "result.json").read_text())["zones"]
     assert found["kept"] == kept
@@ -116,7 +116,7 @@ def test_zones_of_a_file(bending: tuple[Twin, Dataset], tmp_path: Path) -> None:
     assert corner.fit is None
     assert corner.why.startswith("only ")
     assert "held-out configurations, and a judgement needs 5" in corner.why or "a model needs 12" in corner.why
-    assert run.files[-2:] == ("zones.yaml", "zone-left.yaml")
+    assert run.written[-2:] == ("zones.yaml", "zone-left.yaml")
     assert run.summary()["validation"] is not None
     again = calibrate("irb120", bending[1], zones=tmp_path / "out" / "zones.yaml").zones
     assert again is not None

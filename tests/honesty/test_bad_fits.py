@@ -182,7 +182,7 @@ def test_python_hands_out_the_result_that_was_not_written(sound: Path, tmp_path:
     before = state(sound)
     with pytest.raises(ResultKeptError, match=r"another `out`, or .* with `replace`") as refusal:
         package.calibrate("irb120", bad("six"), out=sound)
-    kept = refusal.value.calibration
+    kept = refusal.value.result
     assert kept.faults[0] == "rank-loss"
     assert refusal.value.parameter == "out"
     with pytest.raises(ResultKeptError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import json
 import math
@@ -54,10 +55,22 @@ def parameters(job: str) -> dict[str, inspect.Parameter]:
     return dict(inspect.signature(function(job)).parameters)
 
 
+@cache
+def hints_of(job: str) -> dict[str, Any]:
+    """Return the types of a job's parameters and result, those that its requests import for types alone included."""
+    names = dict(vars(import_module(JOBS[job]))) | {"np": np}
+    request = getattr(function(job), "request", None)
+    for module in {owner.__module__ for owner in request.__mro__[:-1]} if request else ():
+        tree = ast.parse(Path(import_module(module).__file__ or "").read_text())
+        typed = [node.body for node in tree.body if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
+        exec(compile(ast.Module([line for body in typed for line in body], []), module, "exec"), names)
+        names = dict(vars(import_module(module))) | names
+    return get_type_hints(function(job), names)
+
+
 def kinds(job: str, name: str) -> set[Any]:
     """Return the types that a parameter takes, unions opened."""
-    module = import_module(JOBS[job])
-    hint = get_type_hints(function(job), vars(module) | {"np": np})[name]
+    hint = hints_of(job)[name]
 
     def opened(hint: Any) -> Iterator[Any]:
         origin = typing.get_origin(hint)
@@ -139,7 +152,7 @@ def test_every_job_is_exported_and_has_an_example() -> None:
 
 @pytest.mark.parametrize("job", JOBS)
 def test_every_parameter_and_the_result_have_a_type_and_a_word(job: str) -> None:
-    hints = get_type_hints(function(job), vars(import_module(JOBS[job])))
+    hints = hints_of(job)
     assert set(hints) == {*inspect.signature(function(job)).parameters, "return"}
     text = inspect.getdoc(function(job))
     assert text
@@ -232,7 +245,7 @@ def test_no_text_outside_the_command_names_an_option() -> None:
         f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
         for path in sorted((ROOT / "src" / "truearm").rglob("*"))
         if path.suffix in (".py", ".jinja", ".yaml")
-        and path.name not in ("command.py", "commands.py", "options.py", "style.css.jinja")
+        and path.name not in ("command.py", "commands.py", "options.py", "request.py", "style.css.jinja")
         if path not in commands
         for number, line in enumerate(path.read_text().splitlines(), 1)
         if option.search(line)

@@ -431,7 +431,7 @@ def test_what_needs_all_derivatives_at_once_is_refused_before_anything_is_fitted
     how: dict[str, object], allowing: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, data = campaign("irb120", 60, 0.05e-3, 3)
-    for module in ("calibration.calibrate", "engine.diagnose.base_changes"):
+    for module in ("calibration.calibrating", "engine.diagnose.base_changes"):
         monkeypatch.setattr(f"truearm.{module}.identify", lambda *_, **__: pytest.fail("something was fitted"))
     allowing("derivatives=12000")
     told = refused(lambda: truearm.calibrate("irb120", data, train="all", **how))  # type: ignore[arg-type]

@@ -69,7 +69,6 @@ def test_ways_of_a_stated_cell_keep_clear_and_that_is_told(cube: Path, tmp_path:
         ("keep_out: {table: {z: [-100, 100]}}\n", {}, "constraints", "holds the base of the robot"),
         ("box: {of: flange, z: [400, 900]}\n", {}, "cube", "box of the constraints"),
         (ASIDE, {"clearance": 0.4}, "cube", "keep clear"),
-        (ASIDE, {"clearance": -0.01}, "clearance", "got '-10 mm'"),
     ],
 )
 def test_a_cube_that_is_not_clear_is_refused(

@@ -13,7 +13,7 @@ from tests.studio.conftest import Serving
 from tests.studio.talking import eventually
 from viser._messages import GuiPlotlyMessage
 
-from truearm.calibration.calibrate import FitStep
+from truearm.calibration.calibrating import FitStep
 from truearm.studio.fit_course import fit_course
 from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.window import Window

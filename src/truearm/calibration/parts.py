@@ -266,7 +266,6 @@ class ResultKeptError(InputError):
     """
 
     def __init__(self, calibration: Calibration, standing: str, folder: Path) -> None:
-        self.calibration = calibration
         new = said_of(calibration.summary(), calibration.faults)
         super().__init__(
             "a sound result is in this folder, and the new one is not sound. Nothing was written",
@@ -275,6 +274,7 @@ class ResultKeptError(InputError):
             came=Words(f"{new}; in the folder: {standing}"),
             cure="Choose another `out`, or replace the sound result with `replace`.",
         )
+        self.result = calibration
 
 
 def sound_result(folder: Path) -> str | None:

@@ -282,7 +282,7 @@ class Calibration(Record):
         return rows
 
     @property
-    def files(self) -> tuple[str, ...]:
+    def written(self) -> tuple[str, ...]:
         """Names of the files that are written: those of every calibration, and of the zones that are kept."""
         kept = [] if self.zones is None else [robot_file_of(verdict.box.name) for verdict in self.zones.kept]
         return (*RESULT_FILES, *([ZONES_FILE] if kept else []), *kept)
@@ -333,7 +333,7 @@ class Calibration(Record):
         from truearm.engine.robot.urdf import calibrated_urdf
         from truearm.engine.robot.urdf_writing import urdf_text
 
-        folder = output_folder(folder, self.files, self.inputs, ours=True)
+        folder = output_folder(folder, self.written, self.inputs, ours=True)
         standing = sound_result(folder) if self.faults and not replace else None
         if standing is not None:
             raise ResultKeptError(self, standing, folder)

@@ -34,6 +34,8 @@ from truearm.engine.fit.rounds import Redundant
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
 
+#: How many zones are to be cut, or boxes with their overlap [m].
+WantedZones = int | tuple[tuple[Box, ...], float]
 #: The file that names the zones and their robots.
 ZONES_FILE: Final = "zones.yaml"
 
@@ -146,7 +148,7 @@ def _digest(robot: Robot) -> str:
 _OVERLAP: Final = 0.05
 
 
-def zones_argument(value: object, *, held_out: bool) -> int | tuple[tuple[Box, ...], float] | None:
+def zones_argument(value: object, *, held_out: bool) -> WantedZones | None:
     """Return how many zones are to be cut, or the boxes of a file with their overlap [m]; None for None.
 
     Args:
@@ -176,7 +178,7 @@ def zone_file_names(wanted: int | tuple[tuple[Box, ...], float] | None) -> tuple
 
 
 def choose_zones(
-    wanted: int | tuple[tuple[Box, ...], float],
+    wanted: WantedZones,
     nominal: Robot,
     whole: Fit,
     parts: tuple[Dataset, Dataset],

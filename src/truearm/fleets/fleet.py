@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, NoReturn
 
-from truearm.calibration.calibrate import ACCEPTED, calibrate
+from truearm.calibration.calibrate import calibrate
+from truearm.calibration.calibrating import ACCEPTED
 from truearm.calibration.result import RESULT_FILES
 from truearm.engine.base.errors import InputError, Words, counted, kind_of, refusals_of, with_parameters
 from truearm.engine.base.files import noted_reads, path_argument

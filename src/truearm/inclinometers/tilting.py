@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.calibration.calibrate import Train, calibrate
+from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
 from truearm.engine.base.errors import InputError, Notice, counted, has_error, name_parameter, refusals_of, wrong_kind
 from truearm.engine.base.files import path_argument, read_bytes
@@ -34,6 +34,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.engine.command.groups import Train
 from truearm.engine.command.split import train_count
 from truearm.engine.data.checks import check_joints
 from truearm.engine.data.dataset import Dataset

@@ -13,7 +13,6 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from truearm.calibration.calibrate import Train
 from truearm.engine.base.arrays import finite_number
 from truearm.engine.base.errors import InputError, Notice, counted, has_error, listed, refusals_of
 from truearm.engine.base.limits import refuse_beyond
@@ -35,6 +34,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.engine.command.groups import Train
 from truearm.engine.command.split import check_split, check_trained_before, train_count
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, errors_of

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Final
 
-from truearm.calibration.calibrate import FitStep
+from truearm.calibration.calibrating import FitStep
 from truearm.engine.document.drawing import AFTER, BEFORE, axis, figure, logarithmic_axis
 
 #: Axes go beyond the values by this factor.

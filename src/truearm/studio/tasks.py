@@ -57,10 +57,10 @@ def calibrate(
         try:
             found = job(robot, data, out=out, replace=replace, command=command, progress=progress, **given)
         except ResultKeptError as kept:
-            found = kept.calibration
+            found = kept.result
             refused = InputError(kept.what, where=out, came=kept.came, cure=_KEPT)
             return Outcome(tuple(found.lines()), found.warnings, finished=False, refused=refused)
-    return Outcome(tuple(found.lines()), found.warnings, found.files, found.finished)
+    return Outcome(tuple(found.lines()), found.warnings, found.written, found.finished)
 
 
 def calibrate_command(robot: str, data: str, options: dict[str, Any]) -> str:

@@ -22,7 +22,7 @@ def plan_tests(folder: Path, robot: str, out: str, progress: Progress, **options
     Args:
         options: Of the job, by its names of parameters; None where nothing is said.
     """
-    from truearm.iso9283.plan.plan import iso9283_plan
+    from truearm.iso9283.jobs import iso9283_plan
 
     os.chdir(folder)
     progress("finding poses and paths")
@@ -30,24 +30,24 @@ def plan_tests(folder: Path, robot: str, out: str, progress: Progress, **options
     command = _command("plan", [robot], {**given, **_in_mm(given, "velocity", "tip")})
     with confined_reads(folder):
         made = iso9283_plan(robot, out=out, command=command, **given)
-    return Outcome(tuple(made.lines()), made.warnings, tuple(made.files()))
+    return Outcome(tuple(made.lines()), made.warnings, tuple(made.written))
 
 
 def simulate_tests(folder: Path, robot: str, plan: str, out: str, progress: Progress, **options: Any) -> Outcome:
     """Simulate the tests of a plan: :func:`truearm.iso9283_simulate`."""
-    from truearm.iso9283.simulate.simulate import iso9283_simulate
+    from truearm.iso9283.jobs import iso9283_simulate
 
     os.chdir(folder)
     given = _given(options)
     command = _command("simulate", [robot], {"plan": plan, **given})
     with confined_reads(folder):
         made = iso9283_simulate(robot, plan, out=out, command=command, progress=progress, **given)
-    return Outcome(tuple(made.lines()), (), made.files())
+    return Outcome(tuple(made.lines()), (), tuple(made.written))
 
 
 def evaluate_tests(folder: Path, plan: str, out: str, progress: Progress, **options: Any) -> Outcome:
     """Evaluate what was measured: :func:`truearm.iso9283_evaluate`; the table is in what it wrote."""
-    from truearm.iso9283.evaluate.evaluate import iso9283_evaluate
+    from truearm.iso9283.jobs import iso9283_evaluate
 
     os.chdir(folder)
     given = _given(options)

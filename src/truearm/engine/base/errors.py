@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from html import escape
 from itertools import islice
 from numbers import Rational
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 # Text from files and command lines as it may be shown: nothing in it steers a terminal or hides what stands there.
 
@@ -100,6 +100,7 @@ class InputError(ValueError):
     ) -> None:
         self.what, self.parameter, self.where = what, parameter, where
         self.came, self.allowed, self.cure = came, allowed, cure
+        self.result: Any = None  # of the job, where it is refused only to write it
         super().__init__(self.message(str))
 
     def message(self, spelled: Callable[[str], str]) -> str:

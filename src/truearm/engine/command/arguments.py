@@ -471,12 +471,13 @@ def paths_argument(paths: object, parameter: str, what: str) -> list[Path]:
 
 def python_call(job: str, /, *given: object, **keywords: object) -> str:
     """Return the call of a job in Python, objects by the kind they are; keywords that are None are left out."""
-    words = [_written(value) for value in given]
-    words += [f"{name}={_written(value)}" for name, value in keywords.items() if value is not None]
+    words = [written_in_python(value) for value in given]
+    words += [f"{name}={written_in_python(value)}" for name, value in keywords.items() if value is not None]
     return f"truearm.{job}({', '.join(words)})"
 
 
-def _written(value: object) -> str:
+def written_in_python(value: object) -> str:
+    """Return a value as Python writes it, an object by the kind it is."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, Path):
@@ -484,7 +485,7 @@ def _written(value: object) -> str:
     if isinstance(value, Payload | Wrench):
         return repr(value.text)
     if isinstance(value, list | tuple):
-        words = ", ".join(_written(entry) for entry in value)
+        words = ", ".join(written_in_python(entry) for entry in value)
         return f"[{words}]"
     if isinstance(value, dict):
         return repr(value)

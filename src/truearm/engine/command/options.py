@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import shlex
+import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
+from dataclasses import replace
 from functools import wraps
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +19,7 @@ import typer
 from typer.core import TyperArgument, TyperCommand
 
 from truearm.engine.base.errors import InputError, printable, with_parameters, with_short_words
+from truearm.engine.command.request import Option, Request, flag_of
 
 if TYPE_CHECKING:
     from truearm.engine.base.errors import Notice
@@ -209,6 +213,99 @@ def print_record(record: Record) -> None:
 def print_line(line: str, *, err: bool = False) -> None:
     """Print one line, whatever names of files and targets are in it."""
     typer.echo(with_short_words(printable(line)), err=err)
+
+
+# The command of a request: its options are made from their declarations.
+
+
+def add(group: Commands, *requests: type[Request]) -> None:
+    """Add the commands of requests to a group, each by its last word."""
+    for request in requests:
+        group.command(request.command_words().split()[-1])(command_of(request))
+
+
+def command_of(request: type[Request]) -> Callable[..., None]:
+    """Return the command of a request as Typer takes it: a function with an argument for each option."""
+    declared = dict(request.options())
+
+    def run(**typed: Any) -> None:
+        as_json = typed.pop("json")
+        given = {name: declared[name].kind.read(value, name) for name, value in typed.items() if value is not None}
+        with progress() if "progress" in declared else nullcontext() as say, _shown_if_kept(as_json=as_json):
+            asked = request(**given)
+            own = {"command": asked.as_command(), "progress": say}
+            result = replace(asked, **{name: value for name, value in own.items() if name in declared}).run()
+        _show(result, as_json=as_json)
+        if not as_json and result.written:
+            print_line(f"Written to {given['out']}: {', '.join(result.written)}")
+        if not result.finished:
+            raise typer.Exit(3)
+
+    asked = [_parameter(name, one, request.default(name), declared) for name, one in declared.items() if one.in_command]
+    json_option = inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Json)
+    every = [*sorted(asked, key=lambda one: one.default is not inspect.Parameter.empty), json_option]
+    run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
+    run.__annotations__ = {one.name: one.annotation for one in every}
+    run.__doc__ = spelled_by(inspect.cleandoc(request.__doc__ or ""), declared)
+    run.__name__ = request.job
+    return run
+
+
+def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, Option]) -> inspect.Parameter:
+    """Return an option as an argument of a function that Typer reads."""
+    kind, flag = declared.kind, flag_of(name, declared)
+    metavar = declared.metavar or kind.metavar
+    text = spelled_by(declared.help, others).replace("[", "\\[")
+    if typing.get_origin(kind.typed) is list:
+        text = f"{text.removesuffix('.')}; repeatable."
+    if kind.at_edges and kind.at_edges.upper() not in metavar:
+        text = f"{text.removesuffix('.')} \\[{kind.at_edges}]."
+    typed = kind.typed
+    if declared.is_argument:
+        typed = str if typed is Path else typed
+        how = typer.Argument(metavar=metavar, help=text)
+    else:
+        told = isinstance(declared.shown, str) or (declared.shown and default not in (None, ()))
+        shown = declared.shown if told and not declared.needed else False
+        only: dict[str, Any] = {} if typed is bool else {"metavar": metavar, "show_default": shown}
+        how = typer.Option(flag, help=text, **only)
+    given: Any
+    if declared.needed:
+        given = inspect.Parameter.empty
+    elif default in (None, ()):
+        typed, given = typed | None, None
+    else:
+        (given,) = (default,) if typed is bool else kind.typed_again(default)
+        given = typed(given) if typed in (int, float) else given
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=given, annotation=Annotated[typed, how])
+
+
+def spelled_by(text: str, declared: Mapping[str, Option]) -> str:
+    """Return a text with the words of the command instead of parameters in backticks."""
+
+    def one(name: str, value: str | None) -> str:
+        flag = flag_of(name, declared[name]) if name in declared else f"--{name.replace('_', '-')}"
+        return flag if value is None else f"{flag} {value}"
+
+    return with_parameters(text, one)
+
+
+@contextmanager
+def _shown_if_kept(*, as_json: bool) -> Iterator[None]:
+    """Show a result also where it is not written, because a better one stays."""
+    try:
+        yield
+    except InputError as refusal:
+        if refusal.result is not None:
+            _show(refusal.result, as_json=as_json)
+        raise
+
+
+def _show(result: Any, *, as_json: bool) -> None:
+    if as_json:
+        print_json(result.summary())
+    else:
+        print_record(result)
 
 
 # Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), and notes.

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice, as_html, counted, short_text, worst_first
+from truearm.engine.base.errors import Notice, as_html, counted, has_error, short_text, worst_first
 from truearm.engine.base.units import Marked, parts_of, with_mark
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.robot.chain import Array
@@ -37,6 +37,16 @@ class Record(ABC):
         A record that holds neither has a field ``simulated_from`` instead.
         """
         return parts_of(getattr(self, one.name) for one in fields(self))  # type: ignore[arg-type]
+
+    @property
+    def written(self) -> Sequence[str]:
+        """Names of the files that hold it, in the folder that was asked for."""
+        return ()
+
+    @property
+    def finished(self) -> bool:
+        """Whether it can be used as it is: no notice is an error."""
+        return not has_error(getattr(self, "warnings", ()))
 
     @abstractmethod
     def summary(self) -> dict[str, Any]:

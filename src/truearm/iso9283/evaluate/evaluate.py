@@ -7,20 +7,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, get_args
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 from truearm.engine.base.errors import InputError, Notice, counted, refusals_of
-from truearm.engine.base.files import noted_reads, path_argument
+from truearm.engine.base.files import noted_reads
 from truearm.engine.base.manifest import written_differently
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.command.arguments import (
-    command_argument,
-    deviation_argument,
     files_of,
     folder_beside,
-    numbers_argument,
-    progress_argument,
-    python_call,
 )
 from truearm.engine.document.records import Record, notice_lines, notice_summaries
 from truearm.engine.motion.cube import Cube
@@ -45,6 +40,9 @@ from truearm.iso9283.evaluate.table import (
 from truearm.iso9283.evaluate.told import said_of_drift, said_of_pushes, said_of_rounding, said_of_streams
 from truearm.iso9283.plan.criteria import PerformancePlan
 from truearm.iso9283.plan.plan_file import read_plan
+
+if TYPE_CHECKING:
+    from truearm.iso9283.jobs import EvaluateTests
 
 RESULT: Final = "iso9283.json"
 REPORT: Final = "report.html"
@@ -155,6 +153,11 @@ class Iso9283Evaluation(Record):
         known = f", known to {tie.sigma * 1e3:.3f} mm and {math.degrees(tie.sigma_rot):.4f} deg" if tie.sigma else ""
         return f"The instrument was tied to the robot's base by {how}{known}."
 
+    @property
+    def written(self) -> tuple[str, ...]:
+        """Names of the files."""
+        return EVALUATION_FILES
+
     def contents(self) -> dict[str, str]:
         """Return the texts of all files by their names."""
         from truearm.iso9283.evaluate.report import iso9283_report
@@ -197,61 +200,13 @@ def value_summary(value: Value) -> dict[str, Any]:
     }
 
 
-def iso9283_evaluate(
-    plan: str | Path,
-    *,
-    poses: str | Path | None = None,
-    paths: str | Path | None = None,
-    settling: str | Path | None = None,
-    forces: str | Path | None = None,
-    alignment: str | Path | None = None,
-    noise: float = 0.01e-3,
-    noise_rot: float = 1e-4,
-    compare: str | Path | None = None,
-    out: str | Path | None = None,
-    command: str | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-) -> Iso9283Evaluation:
-    """Evaluate the tests of a plan by ISO 9283, each value with a 95 % interval or the range of its cycles.
-
-    Parameters
-    ----------
-    plan
-        ``plan.yaml`` of :func:`truearm.iso9283_plan`, with ``robot.yaml`` beside it.
-    poses, paths, settling, forces
-        Files of what was measured, in the instrument's frame; None for what was not.
-    alignment
-        How the instrument was tied to the robot's base, a file (schema ``truearm-alignment/1``); None for the best fit
-        of the attained poses to the commanded ones, which hides what pose accuracy measures.
-    noise, noise_rot
-        Standard deviation of the instrument: of each coordinate [m], of each angle [rad].
-    compare
-        ``iso9283.json`` of another evaluation, set beside this one.
-    out
-        Folder for ``iso9283.json`` and ``report.html``; None writes nothing.
-    command
-        How to run it again, for the report; None writes the call in Python.
-    progress
-        Called with a few words at each step.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be used or does not fit the plan; the message names the row.
-    """
-    progress_argument(progress)
-    given = {"poses": poses, "paths": paths, "settling": settling, "forces": forces}
-    files = {name: None if file is None else path_argument(file, name) for name, file in given.items()}
-    plan_path = path_argument(plan, "plan")
-    tie_path = None if alignment is None else path_argument(alignment, "alignment")
-    other = None if compare is None else path_argument(compare, "compare")
-    sigma = deviation_argument(noise, "noise")
-    (sigma_rot,) = numbers_argument([noise_rot], "noise_rot", 1, "a standard deviation above 0 [rad]")
+def evaluation(asked: EvaluateTests) -> Iso9283Evaluation:
+    """Evaluate the tests of a plan, and write values and report."""
+    plan_path = Path(asked.plan)
+    files = {name: _path(getattr(asked, name)) for name in _READERS}
+    tie_path, other = _path(asked.alignment), _path(asked.compare)
     inputs = files_of(plan_path, *files.values(), tie_path, other)
-    folder = None if out is None else folder_beside(EVALUATION_FILES, RESULT, out, *inputs)
-    call = command_argument(command) or python_call(
-        "iso9283_evaluate", plan, **given, alignment=alignment, noise=noise, noise_rot=noise_rot, compare=compare
-    )
+    folder = None if asked.out is None else folder_beside(EVALUATION_FILES, RESULT, asked.out, *inputs)
     with noted_reads() as noted:
         with refusals_of("plan"):
             planned = read_plan(plan_path)
@@ -263,20 +218,20 @@ def iso9283_evaluate(
         for name, file in files.items():
             if file is None:
                 continue
-            progress(f"reading {file.name}")
+            asked.progress(f"reading {file.name}")
             with refusals_of(name):
                 read[name] = _READERS[name](file)
         if tie is not None and read:
             _refuse_far_files(tie, planned.cube, read, str(tie_path))
-        instrument = Instrument(sigma, sigma_rot)
-        found = evaluated(planned, Measurements(**read), tie, instrument, progress)
+        instrument = Instrument(asked.noise, asked.noise_rot)
+        found = evaluated(planned, Measurements(**read), tie, instrument, asked.progress)
         warnings = (
             *_warnings(planned, found, read, instrument),
             *_of_plan(plan_path),
             *said_of_pushes(planned, found.pushes, instrument),
             *said_of_drift(planned, found.drift),
         )
-        made = Iso9283Evaluation(planned, found, instrument, None, call, warnings, inputs)
+        made = Iso9283Evaluation(planned, found, instrument, None, asked.again, warnings, inputs)
         if other is not None:
             with refusals_of("compare"):
                 made = replace(made, comparison=compared(made.summary(), other))
@@ -284,9 +239,13 @@ def iso9283_evaluate(
     named = {"plan": plan_path, **files, "alignment": tie_path, "compare": other}
     made = replace(made, read=_read_files(named, noted))
     if folder is not None:
-        progress("writing the report")
+        asked.progress("writing the report")
         made.save(folder)
     return made
+
+
+def _path(given: str | Path | None) -> Path | None:
+    return None if given is None else Path(given)
 
 
 def _read_files(named: Mapping[str, Path | None], noted: Mapping[Path, Sequence[str]]) -> dict[str, ReadFile]:

@@ -111,8 +111,9 @@ class Iso9283Plan(Record):
                 found[SLOW_RUN] = self.programs.record
         return found
 
-    def files(self) -> list[str]:
-        """Return the names of all files; all programs as the folder that they are in."""
+    @property
+    def written(self) -> list[str]:
+        """Names of all files; all programs as the folder that they are in."""
         return list(dict.fromkeys(name.partition("/")[0] for name in self.contents()))
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:

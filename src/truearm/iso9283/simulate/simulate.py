@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from truearm.engine.base.arrays import finite_number
 from truearm.engine.base.errors import InputError, Notice, counted, refusals_of, wrong_kind
 from truearm.engine.base.files import path_argument
-from truearm.engine.base.units import Marked, from_si, sized_si
+from truearm.engine.base.units import Marked, from_si
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.command.arguments import (
-    command_argument,
     files_of,
     folder_for,
-    progress_argument,
-    python_call,
     robot_argument,
-    whole_argument,
 )
 from truearm.engine.document.records import Record, notice_lines, notice_summaries
 from truearm.engine.programs.fake_targets import fake_targets, nominal_robot
@@ -39,6 +33,9 @@ from truearm.iso9283.plan.criteria import PerformancePlan
 from truearm.iso9283.plan.records import forces_text, poses_text, samples_text
 from truearm.iso9283.simulate.cell import ROBOTS, Corrected, SimulatedCampaign, Tracker, TrueRobot, simulated_campaign
 from truearm.iso9283.simulate.moving_arm import drawn_compliance
+
+if TYPE_CHECKING:
+    from truearm.iso9283.jobs import SimulateTests
 
 #: What a campaign may write.
 FILES: Final = ("poses.csv", "paths.csv", "settling.csv", "forces.csv", "alignment.yaml")
@@ -150,8 +147,6 @@ class Iso9283Simulation(Record):
         write_files(place, {**texts, "alignment.yaml": self.tie.text()}, self.command)
 
 
-#: Readings in a second that an instrument can take.
-_RATES: Final = (10.0, 2000.0)
 #: How well features of a base are found by a tracker [m], [rad].
 _TIE: Final = (0.02e-3, math.radians(0.002))
 #: Configurations at which a tool is located on a calibrated robot.
@@ -167,63 +162,10 @@ _NO_BETTER: Final = 0.5
 _SAME_ARM: Final = 1e-6
 
 
-def iso9283_simulate(
-    robot: Robot | str | Path,
-    plan: PerformancePlan | str | Path,
-    *,
-    truth: Robot | str | Path = "random",
-    noise: float = 1e-5,
-    noise_rot: float = math.radians(0.005),
-    rate: float = 500.0,
-    seed: int = 0,
-    corrected: Robot | str | Path | None = None,
-    out: str | Path | None = None,
-    command: str | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-) -> Iso9283Simulation:
-    """Run the tests of a plan on a twin that moves, and read it with a simulated instrument.
-
-    The controller believes in the nominal robot. The twin adds what a test of performance sees beside wrong geometry:
-    joints that follow as damped springs, come to rest a little elsewhere each time and have some play, links that grow
-    while the arm warms up, and an arm that gives way to its load and to pushes; where the truth knows of no compliance,
-    joints give way to pushes alone, by what is drawn. Readings are in the instrument's frame;
-    how that is tied to the robot's base is written beside them, with an error drawn from its stated uncertainty.
-
-    Parameters
-    ----------
-    robot
-        The nominal robot, or what :func:`truearm.load_robot` takes.
-    plan
-        The plan, or its file ``plan.yaml``.
-    truth
-        As for :func:`truearm.simulate`, where the same seed draws the same robot. Robots that are exchanged are drawn
-        in the same way; where the truth is not drawn, by the priors of geometry and joint zeros about it.
-    noise, noise_rot
-        Standard deviation of each coordinate [m] and each angle [rad] that is read.
-    rate
-        Readings in a second along paths, and on the way to a pose [Hz], 10 to 2000.
-    seed
-        Of all that is drawn.
-    corrected
-        A calibrated robot, or its file: commands are corrected with it. It is calibrated in the instrument's frame, as
-        one from data of :func:`truearm.simulate`; where the tool is on its flange is found from 30 readings.
-    out
-        Folder for ``poses.csv``, ``paths.csv``, ``settling.csv``, ``forces.csv``, as far as a test needs them, and
-        ``alignment.yaml``; None writes nothing.
-    command
-        How to run it again, for the manifest of the folder; None for the call in Python.
-    progress
-        Called with a few words at each test.
-
-    Raises
-    ------
-    InputError
-        For a plan or a truth of another robot, poses or paths that cannot be commanded, a rate out of range, too many
-        samples, or a robot for the correction that is not calibrated or stands elsewhere.
-    """
-    progress_argument(progress)
-    tracker = _tracker(noise, noise_rot, rate)
-    rng = np.random.default_rng(whole_argument(seed, "seed"))
+def simulated(asked: SimulateTests) -> Iso9283Simulation:
+    """Run the tests of a plan on a twin, and write what is read."""
+    plan, truth, corrected = asked.plan, asked.truth, asked.corrected
+    rng = np.random.default_rng(asked.seed)
     if not isinstance(truth, Robot | str | Path):
         raise wrong_kind(
             "a truth belongs here", truth, "truth", "nominal, random, gear-errors, a truth's name, or a robot"
@@ -231,29 +173,18 @@ def iso9283_simulate(
     for name, given in (("plan", plan), ("truth", truth), ("corrected", corrected)):
         if isinstance(given, str | Path):
             path_argument(given, name)
-    folder = None if out is None else folder_for(FILES, out, robot, plan, truth, corrected, ours=True)
-    call = command_argument(command) or python_call(
-        "iso9283_simulate",
-        robot,
-        plan,
-        truth=truth,
-        noise=noise,
-        noise_rot=noise_rot,
-        rate=rate,
-        seed=seed,
-        corrected=corrected,
-        out=out,
-    )
-    progress("reading the plan")
+    inputs = (asked.robot, plan, truth, corrected)
+    folder = None if asked.out is None else folder_for(FILES, asked.out, *inputs, ours=True)
+    asked.progress("reading the plan")
     planned = _plan(plan)
-    nominal = robot_argument(robot)
+    nominal = robot_argument(asked.robot)
     _check_same_arm(nominal, planned.robot)
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth if isinstance(truth, Robot | str) else path_argument(truth, "truth"), rng)
         _check_kinds(planned.robot, twin.robot)
     drawn = truth == "nominal" or _is_drawn(truth)
     base, tip = _frames_of(planned, twin, drawn=drawn)
-    tie = _stated(base, rng)
+    tie, tracker = _stated(base, rng), Tracker(asked.noise, asked.noise_rot, asked.rate)
     correct, warnings = None, list[Notice]()
     if corrected is not None:
         with refusals_of("corrected"):
@@ -263,11 +194,11 @@ def iso9283_simulate(
     lever = float(np.linalg.norm(planned.cube.centre))
     weight = STANDARD_GRAVITY * (planned.rated_load or 1.0)
     # Drawn by itself, so that the seed draws the rest as it does without it.
-    compliance = drawn_compliance(planned.robot, weight, lever, np.random.default_rng([seed, _PUSHED]))
+    compliance = drawn_compliance(planned.robot, weight, lever, np.random.default_rng([asked.seed, _PUSHED]))
     robots = [TrueRobot(twin, tip, compliance)]
     if planned.test("E") is not None:
         robots += [TrueRobot(_another(nominal, twin, truth, rng), tip) for _ in range(ROBOTS - 1)]
-    campaign = simulated_campaign(planned, robots, base, tracker, rng, corrected=correct, progress=progress)
+    campaign = simulated_campaign(planned, robots, base, tracker, rng, corrected=correct, progress=asked.progress)
     found = Iso9283Simulation(
         nominal.name,
         truth.name if isinstance(truth, Robot) else str(truth),
@@ -277,31 +208,14 @@ def iso9283_simulate(
         tracker,
         tuple(test.id for test in planned.tests),
         folder,
-        call,
-        files_of(robot, plan, truth, corrected),
+        asked.again,
+        files_of(*inputs),
         tuple(warnings),
     )
     if folder is not None:
-        progress("writing")
+        asked.progress("writing")
         found.save(folder)
     return found
-
-
-def _tracker(noise: object, noise_rot: object, rate: object) -> Tracker:
-    sigma, sigma_rot = (
-        sized_si(number, unit, parameter=name, deviation=True) if number else 0.0
-        for number, unit, name in (
-            (finite_number(noise, "noise", lowest=0.0), "m", "noise"),
-            (finite_number(noise_rot, "noise_rot", lowest=0.0), "rad", "noise_rot"),
-        )
-    )
-    often = finite_number(rate, "rate")
-    low, high = _RATES
-    if not low <= often <= high:
-        raise InputError(
-            "the number is out of range", parameter="rate", came=f"{often:g} Hz", allowed=f"{low:g} to {high:g} Hz"
-        )
-    return Tracker(sigma, sigma_rot, often)
 
 
 def _plan(plan: object) -> PerformancePlan:

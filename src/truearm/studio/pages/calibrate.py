@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any, ClassVar, Final
 
-from truearm.calibration.calibrate import FitStep
+from truearm.calibration.calibrating import FitStep
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.files import exists, read_text
 from truearm.engine.choosing.selection import AUTO

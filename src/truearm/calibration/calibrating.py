@@ -1,0 +1,483 @@
+"""From measurements to a calibrated robot: read, split, identify, judge, write."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Self, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration.holding import held_argument
+from truearm.calibration.result import RESULT_FILES, Calibration
+from truearm.calibration.zones import WantedZones, choose_zones, zone_file_names, zones_argument
+from truearm.engine.base.errors import InputError, Notice, listed, refusals_of
+from truearm.engine.base.files import path_argument, read_bytes
+from truearm.engine.base.version import __version__
+from truearm.engine.choosing.candidates import (
+    compared_with,
+    refuse_balancers_that_are_not_there,
+    without_unseen_balancers,
+)
+from truearm.engine.choosing.chosen_fit import check_choice, check_part, identify_chosen
+from truearm.engine.choosing.selection import AUTO, Selection, select
+from truearm.engine.command.arguments import (
+    files_of,
+    folder_for,
+    readings_argument,
+    refuse_swapped,
+    robot_argument,
+)
+from truearm.engine.command.reading import Excluded, check_excluded, count_excluded, in_parts, without_excluded
+from truearm.engine.command.split import (
+    check_copies,
+    check_split,
+    check_trained_before,
+    left_out,
+    nothing_held_out,
+    train_count,
+    without_words,
+)
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of, without_table_motion
+from truearm.engine.data.thinning import readings_digest
+from truearm.engine.diagnose.base_changes import checked_parts, with_one_base
+from truearm.engine.diagnose.data_check import notices_of
+from truearm.engine.diagnose.gain import check_gain
+from truearm.engine.diagnose.held_places import check_held
+from truearm.engine.diagnose.judgement import DOUBTED, PULLED, judge
+from truearm.engine.diagnose.simulated_calibrations import (
+    SimulatedCalibrations,
+    check_linear,
+    refuse_too_many,
+    simulated_calibrations,
+)
+from truearm.engine.fit.bounds import Bounds, read_bounds
+from truearm.engine.fit.fit import Fit, Status, identify, place
+from truearm.engine.fit.held import Held
+from truearm.engine.fit.likelihood import WhitenedProblem
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.models import FRAMES, Model, named_model
+from truearm.engine.fit.models import MODELS as EVERY_MODEL
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.rounds import Redundant
+from truearm.engine.fit.solver import watching
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import urdf_source
+from truearm.engine.robot.proof import Proof
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.seal import is_intact
+
+if TYPE_CHECKING:
+    from truearm.calibration.calibrate import Calibrate
+
+#: What is identified along with a base that moved, and simulated, where the model is chosen.
+GEOMETRIC: Final = named_model("geometric")
+#: That much time may go into the errors that are told of a fit [s], and that share of the fit's own.
+_TIME: Final = 0.5
+_SHARE: Final = 0.05
+
+
+class FitStep(str):
+    """A step of a fit in words."""
+
+    number: int  #: Of the step, from 1, over all rounds.
+    cost: float  #: The sum of squares that is made small; each round weighs the readings anew.
+    error: float  #: Mean error on the configurations that judge [m].
+
+    @classmethod
+    def of(cls, number: int, cost: float, error: float, judges: str) -> Self:
+        """Return the words of a step."""
+        made = cls(f"step {number}: cost {cost:.4g}, {judges} error {error * 1e3:.3f} mm")
+        made.number, made.cost, made.error = number, cost, error
+        return made
+
+
+@contextmanager
+def followed(progress: Callable[[str], None], judging: Dataset, *, held_out: bool) -> Iterator[None]:
+    """Tell of the steps of the fits in this block, as far as that costs next to nothing.
+
+    Args:
+        judging: What the fit is judged on.
+        held_out: Whether the fit does not see it.
+    """
+    number, spent, start = 0, 0.0, time.process_time()
+
+    def told(problem: object, vector: Array, cost: float) -> None:
+        nonlocal number, spent
+        number += 1
+        began = time.process_time()
+        if spent > _TIME + _SHARE * (began - start):
+            return
+        inner = problem.plain if isinstance(problem, WhitenedProblem) else problem
+        if not isinstance(inner, Problem):
+            return
+        values = dict(zip(inner.free.names, vector.tolist(), strict=True))
+        try:
+            with np.errstate(all="ignore"):
+                errors = errors_of(inner.robot.with_values(values), judging)
+        except InputError:  # a step on the way may be no robot
+            return
+        found = errors.position or errors.length
+        if found is not None:
+            progress(FitStep.of(number, cost, found.mean, "held-out" if held_out else "training"))
+        spent += time.process_time() - began
+
+    with watching(told):
+        yield
+
+
+#: Fewer trials than this give no interval of 95 %.
+_LEAST: Final = 100
+#: Length of the bar that shows how much is done.
+_BAR: Final = 20
+
+
+def simulate_calibrations(
+    fit: Fit,
+    training: Dataset,
+    held_out: Dataset | None,
+    trials: int,
+    *,
+    priors: bool,
+    seed: int,
+    progress: Callable[[str], None],
+) -> tuple[SimulatedCalibrations | None, list[Notice]]:
+    """Return simulated calibrations, and what they say against the linear intervals.
+
+    None are made of a fit that leaves open what predictions depend on: where base and targets are is not drawn.
+    """
+    if fit.status not in (Status.CONVERGED, Status.AT_BOUND):
+        return None, [
+            Notice(
+                "not-simulated",
+                f"No calibration was simulated, because this one ended with {fit.status.value}: intervals say nothing "
+                "of what the data do not determine.",
+                "note",
+            )
+        ]
+
+    def done(count: int) -> None:
+        full = _BAR * count // trials
+        progress(f"simulating calibrations [{'#' * full}{'.' * (_BAR - full)}] {count} of {trials}")
+
+    judged = training if held_out is None else held_out
+    found = simulated_calibrations(fit, training, judged, trials, priors=priors, seed=seed, progress=done)
+    return found, check_linear(fit, found)
+
+
+#: The step at which everything that was given has been read and found usable.
+ACCEPTED: Final = "checking the data"
+#: Every model that can be asked for by name; None chooses.
+MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *EVERY_MODEL)} | {AUTO: None}
+
+
+class _How(TypedDict):
+    """How parameters are identified, whatever is held."""
+
+    loss: Loss
+    redundancy: Redundant
+    bounds: Bounds | None
+    bounds_file: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """What was given, as it was read."""
+
+    robot: Robot  #: The nominal one, with its loads.
+    urdf: bytes | None  #: The user's own, if that is where the robot came from.
+    model: Model | None  #: None chooses.
+    as_read: Dataset  #: All readings.
+    readings: Dataset  #: Those that count.
+    sha256: str | None  #: Of their file.
+    excluded: tuple[Excluded, ...]
+    held: Held
+    how: _How
+    zones: WantedZones | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """The readings in two parts, without what moved meanwhile."""
+
+    readings: Dataset
+    training: NDArray[np.intp]  #: training, held_out: indices of configurations.
+    held_out: NDArray[np.intp]
+    first: Dataset  #: What is trained on.
+    second: Dataset | None  #: What judges; None if nothing is held out.
+    excluded: tuple[Excluded, ...]  #: With the part that each belongs to.
+    noticed: tuple[Notice, ...]  #: What is to be known about the data.
+    moved: tuple[Notice, ...]  #: What is to be known about the base that moved.
+
+    @property
+    def judges(self) -> Dataset:
+        """What judges: the training part where nothing is held out."""
+        return self.first if self.second is None else self.second
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What was identified."""
+
+    robot: Robot  #: The nominal one, with the effects of the chosen model.
+    placed: Robot  #: The nominal one, base and targets found as the fit finds them.
+    model: Model
+    fit: Fit
+    selection: Selection | None  #: How the model was chosen; None if it was named.
+    contradicted: tuple[Notice, ...]  #: What speaks against what was held.
+    notices: tuple[Notice, ...]  #: What is to be known about effects that were held, and about the choice.
+
+
+def calibrated(asked: Calibrate) -> Calibration:
+    """Read, split, fit, judge, write."""
+    files = (asked.robot, asked.data, asked.bounds, asked.zones, asked.frames, asked.exclude)
+    zones = zones_argument(asked.zones, held_out=asked.train != "all")
+    refuse_swapped(asked.robot, asked.data, "calibrate")
+    inputs = files_of(*files)
+    if asked.out is not None:
+        folder_for((*RESULT_FILES, *zone_file_names(zones)), asked.out, *files, ours=True)
+    given = _read(asked, zones)
+    with refusals_of("data"):
+        parts = _split(asked, given)
+        found = _identified(asked, given, parts)
+    calibration = replace(_judged(asked, given, parts, found), inputs=inputs)
+    if asked.out is not None:
+        calibration.save(asked.out, asked.progress, replace=asked.replace)
+    return calibration
+
+
+def _read(asked: Calibrate, zones: WantedZones | None) -> _Read:
+    """Read robot, data and what else was given."""
+    asked.progress("reading the robot")
+    source = urdf_source(asked.robot) if isinstance(asked.robot, str | Path) else None
+    urdf = None if source is None else read_bytes(source[0])
+    robot, model = asked.loads.on(robot_argument(asked.robot)), MODELS[asked.model]
+    if model is not None and asked.effects:
+        with refusals_of("effects"):
+            refuse_balancers_that_are_not_there(robot, asked.effects)
+            model = model.also(asked.effects)
+            model.free(model.prepared(robot))
+    asked.progress("reading the data")
+    as_read = readings_argument(robot, asked.data)
+    sha256 = None
+    if isinstance(asked.data, str | Path):
+        sha256 = hashlib.sha256(read_bytes(path_argument(asked.data, "data"))).hexdigest()
+    readings, excluded = without_excluded(as_read, asked.exclude)
+    readings = left_out(readings, asked.without)
+    held = held_argument(asked.hold, asked.frames, robot, readings)
+    bounds, bounds_file = asked.bounds, "bounds"
+    if bounds is not None and not isinstance(bounds, Bounds):
+        bounds_file = str(bounds)
+        with refusals_of("bounds"):
+            bounds = read_bounds(path_argument(bounds, "bounds"))
+    how = _How(loss=asked.loss, redundancy=asked.redundancy, bounds=bounds, bounds_file=bounds_file)
+    return _Read(robot, urdf, model, as_read, readings, sha256, tuple(excluded), held, how, zones)
+
+
+def _split(asked: Calibrate, given: _Read) -> _Parts:
+    """Check the data, and part them into what is trained on and what judges."""
+    readings = given.readings
+    count = train_count(asked.train, readings.configurations, readings.source)
+    order = np.random.default_rng(asked.seed).permutation(readings.configurations)
+    training, held_out = order[:count], order[count:]
+    excluded = in_parts(given.excluded, readings, held_out)
+    if not readings.has_reading.any():
+        raise InputError(
+            "there is no reading", parameter="data", where=readings.source, cure="Fill in x, y and z, or distance."
+        )
+    if readings.fixture is None and not readings.has_position.any():
+        raise InputError(
+            "there is no position reading", parameter="data", where=readings.source, cure="Fill in x, y and z."
+        )
+    check_split(readings.of_configurations(training), readings.of_configurations(held_out))
+    if asked.base_changes:
+        checked_parts(readings, training, asked.base_changes)
+    asked.progress(ACCEPTED)
+    steady = without_table_motion(readings)
+    moved: Sequence[Notice] = ()
+    if asked.base_changes:
+        asked.progress("finding how the base moved")
+        steady, moved = with_one_base(
+            given.robot, steady, training, asked.base_changes, given.model or GEOMETRIC, asked.loss, given.held
+        )
+    noticed = notices_of(readings, given.robot, steady=steady, excluded=count_excluded(excluded))
+    first = steady.of_configurations(training)
+    second = steady.of_configurations(held_out) if len(held_out) else None
+    return _Parts(steady, training, held_out, first, second, tuple(excluded), tuple(noticed), tuple(moved))
+
+
+def _identified(asked: Calibrate, given: _Read, parts: _Parts) -> _Found:
+    """Identify the robot from the training part."""
+    asked.progress("placing the nominal robot")
+    robot, first = given.robot, parts.first
+    placed = place(robot, first, asked.loss, given.held)
+    if asked.monte_carlo is not None:
+        refuse_too_many(placed, first, given.model or GEOMETRIC)
+    selection, compared, notices = None, first, list[Notice]()
+    if given.model is None:
+        compared = compared_with(robot, first)
+        selection = select(robot, compared, **given.how, held=given.held, seed=asked.seed, progress=asked.progress)
+        with followed(asked.progress, parts.judges, held_out=parts.second is not None):
+            selection, fit = identify_chosen(
+                robot,
+                first,
+                selection,
+                **given.how,
+                held=given.held,
+                bootstrap=asked.bootstrap,
+                seed=asked.seed,
+                progress=asked.progress,
+            )
+        robot, model = selection.prepared(robot), selection.model
+        notices += [*check_choice(selection), *check_part(compared, first)]
+    else:
+        model, notices = without_unseen_balancers(given.model, first)
+        asked.progress(f"identifying the {model.name} model on {len(parts.training)} configurations")
+        with followed(asked.progress, parts.judges, held_out=parts.second is not None):
+            fit = identify(
+                robot,
+                first,
+                model,
+                **given.how,
+                held=given.held,
+                bootstrap=asked.bootstrap,
+                seed=asked.seed,
+                progress=asked.progress,
+            )
+    contradicted = check_held(robot, fit, first, **given.how)
+    return _Found(robot, placed, model, fit, selection, tuple(contradicted), tuple(notices))
+
+
+def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Calibration:
+    """Judge what was identified by the part that it has not seen."""
+    asked.progress("judging it")
+    fit, first, second = found.fit, parts.first, parts.second
+    validation = None if second is None else errors_of(fit.robot, second)
+    train_errors = errors_of(fit.robot, first)
+    of_split = (
+        *found.contradicted,
+        *_beside_nominal(found.placed, fit, first, second, parts.noticed, given.held),
+        *check_excluded(
+            parts.excluded,
+            fit.robot,
+            None if asked.base_changes else left_out(given.as_read, asked.without),
+            parts.held_out,
+            validation,
+        ),
+        *check_copies(parts.readings, parts.training, parts.held_out),
+        *check_trained_before(
+            found.robot,
+            given.as_read,
+            given.sha256,
+            (len(parts.training), parts.readings.configurations, asked.seed),
+            without_words(asked.without),
+        ),
+        *parts.moved,
+        *found.notices,
+    )
+    judged = judge(
+        fit,
+        parts.readings,
+        first,
+        validation or train_errors,
+        parts.noticed,
+        of_split,
+        asked.loss,
+        held_out=second is not None,
+    )
+    simulated, told = None, list[Notice]()
+    if asked.monte_carlo is not None:
+        simulated, told = simulate_calibrations(
+            fit,
+            first,
+            second,
+            asked.monte_carlo,
+            priors=asked.redundancy == "prior",
+            seed=asked.seed,
+            progress=asked.progress,
+        )
+    zones = None
+    if given.zones is not None and second is not None:
+        asked.progress("identifying zones")
+        how = given.how
+        zones = choose_zones(
+            given.zones,
+            found.robot,
+            fit,
+            (first, second),
+            loss=asked.loss,
+            redundancy=asked.redundancy,
+            bounds=how["bounds"],
+        )
+    return Calibration(
+        fit=fit,
+        nominal=errors_of(found.placed, parts.judges),
+        train=train_errors,
+        validation=validation,
+        expected=judged.expected,
+        warnings=(*judged.warnings, *told),
+        next=judged.next,
+        data=parts.readings,
+        training=parts.training,
+        held_out=parts.held_out,
+        command=asked.again,
+        history=_history(asked, given, parts, found),
+        urdf=given.urdf,
+        selection=found.selection,
+        known_before=_known_before(found.robot),
+        without=tuple(asked.without),
+        excluded=parts.excluded,
+        notes=dict(asked.notes or {}),
+        monte_carlo=simulated,
+        zones=zones,
+    )
+
+
+def _history(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> str:
+    """Return what was done, in one line with the hash of the data."""
+    by_file = "" if given.sha256 is None else f"sha256 {given.sha256[:12]}, "
+    digest = f" ({by_file}readings {readings_digest(given.as_read)[:12]})"
+    freed = " + ".join([found.model.name, *(name for name in asked.effects if name in found.model.effects)])
+    return (
+        f"calibrated by truearm {__version__}: model {freed},"
+        f" {len(parts.training)} of {parts.readings.configurations} configurations of"
+        f" {Path(parts.readings.source).name}{digest}, seed {asked.seed}, loss {asked.loss},"
+        f"{without_words(asked.without)}"
+        f"{f' {sum(one.readings for one in parts.excluded)} readings excluded,' if parts.excluded else ''}"
+        f" redundancy {asked.redundancy}{f', {listed(asked.hold)} held' if asked.hold else ''}"
+        f"{f', bootstrap {asked.bootstrap}' if asked.bootstrap else ''}"
+        f"{f', another base from {listed(asked.base_changes)} on' if asked.base_changes else ''}"
+    )
+
+
+def _beside_nominal(
+    placed: Robot, fit: Fit, training: Dataset, held_out: Dataset | None, noticed: Sequence[Notice], held: Held
+) -> list[Notice]:
+    """Say what the held-out part tells of the calibrated robot beside the nominal one.
+
+    Where single readings are doubted, they pull base and targets of the nominal robot too, unless the loss is robust.
+
+    Args:
+        placed: The nominal robot, base and targets found as the fit finds them.
+        noticed: What was said of the data.
+    """
+    if held_out is None:
+        return [nothing_held_out()]
+    if fit.model is FRAMES:  # the robot is the nominal one
+        return []
+    doubted = fit.loss in PULLED and any(notice.code in DOUBTED for notice in noticed)
+    nominal = place(fit.start, training, "cauchy", held) if doubted else placed
+    return check_gain(errors_of(nominal, held_out), errors_of(fit.robot, held_out), held_out, doubted=doubted)
+
+
+def _known_before(robot: Robot) -> Proof | None:
+    """Return what is known of a robot already; of one whose values were changed since, only what speaks against it."""
+    if robot.proof is None or is_intact(robot):
+        return robot.proof
+    return replace(robot.proof, names=(), deviations=(), factor=())

@@ -1,0 +1,182 @@
+"""Groups of options that several jobs have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from truearm.engine.command.kinds import (
+    Again,
+    Choice,
+    File,
+    Given,
+    Gravity,
+    NotesKind,
+    Number,
+    NumberOr,
+    Numbers,
+    PayloadKind,
+    Text,
+    Told,
+    Whole,
+)
+from truearm.engine.command.request import Request, option, required
+
+if TYPE_CHECKING:
+    from truearm.engine.data.dataset import Dataset
+    from truearm.engine.motion.largest_cube import Direction
+    from truearm.engine.robot.parts import Payload
+    from truearm.engine.robot.robot import Robot
+
+Train = int | Literal["all"] | None
+
+
+def _silent(words: str) -> None:
+    """Tell nobody."""
+
+
+class OfRobot(Request):
+    """Which robot."""
+
+    robot: Robot | str | Path = required(Given("ROBOT"), "A library id, a robot file or a URDF.", kw_only=False)
+
+
+class OfData(OfRobot):
+    """Which robot, and what was measured on it."""
+
+    data: Dataset | str | Path = required(Given("DATA.csv"), "Measurements in the canonical CSV.", kw_only=False)
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What a robot carries, and which way is down; None as its file says."""
+
+    payload: Payload | None  #: On the flange.
+    gravity: tuple[float, float, float] | None  #: Free fall in the base frame [m/s^2].
+
+    def on(self, robot: Robot) -> Robot:
+        """Return a robot that carries them."""
+        return robot.with_payload(self.payload, self.gravity)
+
+
+class Loaded(Request):
+    """What the robot carried, and how it is mounted."""
+
+    payload: Payload | str | None = option(
+        PayloadKind("MASS,X,Y,Z"),
+        'What the flange carries, with its centre of gravity in the flange frame: "2.7kg,50mm,25mm,100mm".',
+        default=None,
+        shown="as the robot file says",
+    )
+    gravity: Sequence[float] | None = option(
+        Gravity("X,Y,Z"),
+        "Free fall in the robot's base frame, 0,0,9.81 for a robot that hangs.",
+        default=None,
+        shown="as the robot file says",
+    )
+
+    @property
+    def loads(self) -> Loads:
+        """What was given, checked."""
+        payload: Any = self.payload
+        gravity: Any = self.gravity
+        return Loads(payload, gravity)
+
+
+class AtTip(Request):
+    """What goes to poses."""
+
+    target: str | None = option(Text("NAME"), "What goes to the poses.", default=None, shown="the flange, or `tip`")
+    tip: Sequence[float] | None = option(
+        Numbers("X,Y,Z", "mm", 3), "What goes to the poses, in the flange frame.", default=None, shown="the flange"
+    )
+
+
+class InCube(Request):
+    """Which cube poses are in."""
+
+    plane: str = option(
+        Choice("CORNERS", ("C1-C2-C7-C8", "C2-C3-C8-C5", "C3-C4-C5-C6", "C4-C1-C6-C7")),
+        "Diagonal plane of the cube.",
+        default="C1-C2-C7-C8",
+    )
+    ahead: Direction = option(
+        Choice(known=("+x", "-x", "+y", "-y")), "Where the largest cube is searched.", default="+x"
+    )
+    nearest: float = option(Number("mm"), "How far ahead the largest cube begins.", default=0.0)
+    floor: float = option(Number("mm"), "How high the largest cube begins.", default=0.0)
+
+
+class Instrument(Request):
+    """How well an instrument reads poses."""
+
+    noise: float = option(
+        Number("mm", low=0.0, deviation=True), "Of the instrument: standard deviation of a coordinate.", default=1e-5
+    )
+    noise_rot: float = option(
+        Number("deg", low=0.0, deviation=True),
+        "Of the instrument: standard deviation of an angle.",
+        default=math.radians(0.005),
+    )
+
+
+class Drawn(Request):
+    """Where random numbers begin."""
+
+    seed: int = option(Whole("S"), "Of all that is drawn.", default=0)
+
+
+class Split(Drawn):
+    """What is trained on, and what judges."""
+
+    train: Train = option(
+        NumberOr("N|all"),
+        "Configurations to train on; the rest judges.",
+        default=None,
+        shown="70 %",
+        more="They are the first of ``numpy.random.default_rng(seed).permutation(n)``; ``all`` holds nothing out.",
+    )
+
+
+class Noted(Request):
+    """What a person notes."""
+
+    notes: Mapping[str, str] | None = option(
+        NotesKind("KEY=VALUE"),
+        "What the result shall say beside the figures: date, serial, operator, instrument, ...",
+        default=None,
+        word="note",
+        shown=False,
+    )
+
+
+class Repeatable(Request):
+    """What says how it was asked for, in its results."""
+
+    command: str | None = option(
+        Again(), "How to run it again, as results say it", default=None, word="", shown="this call", repeated=False
+    )
+
+    @property
+    def again(self) -> str:
+        """How to run it again."""
+        return self.command or self.as_python()
+
+
+class Long(Request):
+    """What takes so long that somebody may want to be told how far it is."""
+
+    progress: Callable[[str], None] = option(
+        Told(), "Called with a few words at each step", default=_silent, word="", repeated=False
+    )
+
+
+class IntoFolder(Request):
+    """What writes files into a folder."""
+
+    out: str | Path | None = option(
+        File("DIR"), "Folder for the results.", default=None, shown="none are written", needed=True, repeated=False
+    )

@@ -1,0 +1,218 @@
+"""What a job is asked for: one frozen object, whose options are declared once.
+
+The declaration of an option makes its check, the option of the command, its help, and its entry in the docstring. So
+Python, command, browser and fleets ask in the same way, and a default cannot differ between them. A group of options
+that several jobs have is a class that their requests inherit. Modules with requests import nothing heavy.
+"""
+
+from __future__ import annotations
+
+import inspect
+import shlex
+import sys
+import textwrap
+from collections.abc import Callable, Iterator
+from dataclasses import Field, dataclass, field, fields
+from typing import Any, ClassVar, Final, ParamSpec, Protocol, TypeVar, dataclass_transform
+
+from truearm.engine.command.kinds import Kind
+
+#: What a default is that is compared with what was given.
+_PLAIN: Final = (bool, int, float, str, tuple)
+
+R = TypeVar("R", covariant=True)
+P = ParamSpec("P")
+
+
+@dataclass(frozen=True)
+class Option:
+    """The declaration of an option, beside its name, type and default."""
+
+    kind: Kind  #: What it holds.
+    help: str  #: What it is for; other options are named in backticks, by their names in Python.
+    metavar: str | None  #: What stands for its value in the help; None for that of the kind.
+    word: str | None  #: Of the command line; None for the name, empty for what the command does not have.
+    shown: str | bool  #: The default in words, or whether it is shown as it is.
+    more: str  #: What only the docstring says.
+    needed: bool  #: Whether the command needs it.
+    is_argument: bool  #: Whether it is an argument of the command, and no option.
+    repeated: bool  #: Whether it belongs to how a result was made, so that it is said again with the command.
+
+    @property
+    def in_command(self) -> bool:
+        """Whether the command line has it."""
+        return self.word != ""
+
+
+def option(
+    kind: Kind,
+    help: str,
+    metavar: str | None = None,
+    *,
+    default: Any,
+    word: str | None = None,
+    shown: str | bool = True,
+    more: str = "",
+    needed: bool = False,
+    repeated: bool = True,
+) -> Any:
+    """Declare an option with a default; arguments as in :class:`Option`."""
+    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=False, repeated=repeated)
+    return field(default=default, kw_only=True, metadata={"option": made})
+
+
+def required(
+    kind: Kind, help: str, metavar: str | None = None, *, kw_only: bool, word: str | None = None, more: str = ""
+) -> Any:
+    """Declare what a job needs: the command has it as an argument, or as an option if it has a word.
+
+    Args:
+        kw_only: Whether Python takes it by its name alone.
+    """
+    made = Option(kind, help, metavar, word, shown=False, more=more, needed=True, is_argument=not word, repeated=True)
+    return field(kw_only=kw_only, metadata={"option": made})
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option, required))
+class Request:
+    """What a job is asked for; the method ``run`` of a subclass does it, and its docstring is that of the job."""
+
+    #: Name of the job in Python; empty for a group of options.
+    job: ClassVar[str] = ""
+    #: Words of the command; None for the name of the job.
+    words: ClassVar[str | None] = None
+    #: What the docstring says under Raises.
+    refuses: ClassVar[str] = "For anything that cannot be used, with a message that says what to do."
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __init_subclass__(cls, **how: Any) -> None:
+        super().__init_subclass__(**how)
+        dataclass(frozen=True, eq=False, repr=False)(cls)
+
+    def __post_init__(self) -> None:
+        for name, declared in self.options():
+            object.__setattr__(self, name, declared.kind.checked(getattr(self, name), name, self.default(name)))
+        self.check()
+
+    def check(self) -> None:
+        """Refuse what does not go together."""
+
+    def run(self) -> Any:
+        """Do what is asked for."""
+        raise NotImplementedError
+
+    @classmethod
+    def options(cls) -> Iterator[tuple[str, Option]]:
+        """Yield the options by their names: what Python takes by position, those of the class, those of its groups."""
+        every = {one.name: one for one in fields(cls)}
+        first = [name for name, one in every.items() if not one.kw_only]
+        own = [name for owner in cls.__mro__ for name in vars(owner).get("__annotations__", ()) if name in every]
+        for name in dict.fromkeys([*first, *own]):
+            yield name, every[name].metadata["option"]
+
+    @classmethod
+    def default(cls, name: str) -> Any:
+        """Return the default of an option."""
+        return cls.__dataclass_fields__[name].default
+
+    @classmethod
+    def command_words(cls) -> str:
+        """Return the words of the command."""
+        return cls.words or cls.job.replace("_", "-")
+
+    def given(self) -> Iterator[tuple[str, Option, Any]]:
+        """Yield the options that have another value than their default."""
+        for name, declared in self.options():
+            value, default = getattr(self, name), self.default(name)
+            if declared.repeated and value is not default and not (isinstance(default, _PLAIN) and value == default):
+                yield name, declared, value
+
+    def as_python(self) -> str:
+        """Return the call in Python."""
+        from truearm.engine.command.arguments import written_in_python
+
+        words = []
+        for name, _, value in self.given():
+            said = written_in_python(value)
+            words.append(said if not self.__dataclass_fields__[name].kw_only else f"{name}={said}")
+        return f"truearm.{self.job}({', '.join(words)})"
+
+    def as_command(self) -> str:
+        """Return the command as it can be typed again: what was given, and a place for where results go."""
+        arguments, words = list[str](), list[str]()
+        for name, declared, value in self.given():
+            flag = flag_of(name, declared)
+            if declared.is_argument:
+                arguments += declared.kind.typed_again(value)
+            elif value is True:
+                words.append(flag)
+            else:
+                for text in declared.kind.typed_again(value):
+                    words += [flag, text]
+        out = dict(self.options()).get("out")
+        words += [] if out is None else [flag_of("out", out), metavar_of(out)]
+        return shlex.join(["truearm", *self.command_words().split(), *arguments, *words])
+
+    def __repr__(self) -> str:
+        return self.as_python()
+
+
+def metavar_of(declared: Option) -> str:
+    """Return what stands for a value in the help."""
+    return declared.metavar or declared.kind.metavar
+
+
+def flag_of(name: str, declared: Option) -> str:
+    """Return how the command line calls an option, or an argument by its metavar."""
+    return metavar_of(declared) if declared.is_argument else f"--{(declared.word or name).replace('_', '-')}"
+
+
+class Runs(Protocol[R]):
+    """A request that does what is asked for."""
+
+    def run(self) -> R:
+        """Do it."""
+
+
+def job(request: Callable[P, Runs[R]]) -> Callable[P, R]:
+    """Return the function that makes a request and runs it."""
+    made: Any = request
+
+    def run(*given: P.args, **named: P.kwargs) -> R:
+        return request(*given, **named).run()
+
+    frame = sys._getframe(1)
+    run.__name__ = run.__qualname__ = made.job
+    run.__module__ = frame.f_globals["__name__"]
+    taken = inspect.signature(made).parameters
+    ordered = [taken[name] for name, _ in made.options()]
+    signature = inspect.Signature(ordered, return_annotation=made.run.__annotations__["return"])
+    run.__signature__ = signature  # type: ignore[attr-defined]
+    run.__annotations__ = {one.name: one.annotation for one in signature.parameters.values()}
+    run.__annotations__["return"] = signature.return_annotation
+    run.__doc__ = docstring(made)
+    run.request = made  # type: ignore[attr-defined]
+    return run
+
+
+def docstring(request: type[Request]) -> str:
+    """Return the docstring of a job, in the style of NumPy."""
+    parts = [inspect.cleandoc(request.__doc__ or ""), "", "Parameters", "----------"]
+    for name, declared in request.options():
+        parts += [name, _indented(_entry(declared, request.default(name)))]
+    return "\n".join([*parts, "", "Raises", "------", "InputError", _indented(request.refuses)])
+
+
+def _indented(text: str) -> str:
+    return textwrap.fill(text, 116, initial_indent="    ", subsequent_indent="    ")
+
+
+def _entry(declared: Option, default: Any) -> str:
+    """Return what the docstring says of an option."""
+    unit = f" [{declared.kind.unit}]" if declared.kind.unit else ""
+    text = f"{declared.help.rstrip('.')}{unit}."
+    if declared.kind.allowed:
+        text += f" {declared.kind.allowed}."
+    if default is None and isinstance(declared.shown, str):
+        text += f" None: {declared.shown}."
+    return f"{text} {declared.more}".strip()

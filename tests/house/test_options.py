@@ -1,0 +1,94 @@
+"""Every option by its declaration: what it refuses, how it is typed, and that no option is declared twice."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from dataclasses import fields
+from typing import Any
+
+import pytest
+
+import truearm
+from truearm import JOBS
+from truearm.engine.base.errors import InputError
+from truearm.engine.base.units import from_si, to_si
+from truearm.engine.command.kinds import Choice, Number, Whole
+from truearm.engine.command.request import Option, Request, flag_of
+
+REQUESTS: dict[str, type[Request]] = {
+    job: getattr(truearm, job).request for job in JOBS if hasattr(getattr(truearm, job), "request")
+}
+OPTIONS = [(job, name) for job, request in REQUESTS.items() for name, _ in request.options()]
+
+
+def declared(job: str, name: str) -> Option:
+    return dict(REQUESTS[job].options())[name]
+
+
+def beyond(kind: Number | Whole) -> list[float]:
+    """Return numbers at the edges that are just not allowed."""
+    if isinstance(kind, Whole):
+        return [kind.low - 1, *([] if kind.high is None else [kind.high + 1])]
+    low = [kind.low - 1e-6 * max(1.0, abs(kind.low))] if math.isfinite(kind.low) else []
+    return [*low, *([kind.low] if kind.above else []), *([kind.high * 1.001] if math.isfinite(kind.high) else [])]
+
+
+def in_si(kind: Number | Whole, number: float) -> float:
+    return to_si(number, kind.at_edges.partition("/")[0]) if kind.is_converted else number
+
+
+@pytest.mark.parametrize(("job", "name"), OPTIONS)
+def test_what_is_out_of_range_is_refused_with_what_is_allowed(job: str, name: str) -> None:
+    kind = declared(job, name).kind
+    if isinstance(kind, Number | Whole):
+        for number in beyond(kind):
+            with pytest.raises(InputError) as refusal:
+                kind.check(in_si(kind, number) if isinstance(kind, Number) else int(number), name)
+            assert refusal.value.parameter == name
+            assert refusal.value.allowed
+            if isinstance(kind, Number) and number:
+                assert f"{number:g}" in str(refusal.value.came)
+    elif isinstance(kind, Choice):
+        with pytest.raises(InputError) as refusal:
+            kind.check("nothing-of-this-name", name)
+        assert refusal.value.parameter == name
+        assert refusal.value.allowed
+    assert kind.metavar or declared(job, name).word == "" or kind.typed is bool
+
+
+@pytest.mark.parametrize(("job", "name"), OPTIONS)
+def test_a_default_is_typed_and_read_again(job: str, name: str) -> None:
+    one, default = declared(job, name), REQUESTS[job].default(name)
+    if default in (None, ()) or callable(default) or not one.in_command or one.kind.typed is bool or one.needed:
+        assert one.help.endswith(".") or not one.in_command
+        return
+    (text,) = one.kind.typed_again(default)
+    read: Any = one.kind.read(one.kind.typed(text), name)
+    again = one.kind.check(read, name)
+    assert again == (pytest.approx(default, rel=1e-15) if isinstance(default, float) else type(again)(default))
+
+
+def test_an_option_is_declared_once() -> None:
+    """Requests inherit it from a group; a name that means two things is two names."""
+    owners: dict[str, set[str]] = defaultdict(set)
+    words: dict[str, set[str]] = defaultdict(set)
+    for request in REQUESTS.values():
+        for name, one in request.options():
+            owner = next(c for c in request.__mro__ if name in vars(c).get("__annotations__", ()))
+            owners[name].add(owner.__qualname__)
+            words[flag_of(name, one)].add(name)
+        assert {one.name for one in fields(request)} == {name for name, _ in request.options()}
+    assert {name: found for name, found in owners.items() if len(found) > 1 and name not in TWICE} == {}
+    assert {flag: found for flag, found in words.items() if len(found) > 1} == {}
+
+
+#: Names that mean several things, still.
+TWICE = ("plan",)
+
+
+def test_units_are_those_at_the_edges() -> None:
+    assert Number("mm").read(5.0, "x") == 0.005
+    assert Number("mm").typed_again(0.005) == ["5"]
+    assert from_si(Number("deg").read(90.0, "x"), "deg") == 90.0
+    assert Number("%").read(50.0, "x") == 50.0

@@ -90,7 +90,7 @@ class PlanTests(OfRobot, InCube, AtTip, IntoFolder, Repeatable):
         _Criteria("ID,..|all", repeated=False), "Which criteria, as ap,rp,at.", default=("all",)
     )
     cube: str | Path = option(
-        File("auto|FILE"), "The largest one, or a file with one (schema ``truearm-cube/1``).", default="auto"
+        File("auto|FILE"), "The largest one, or a file with one (schema truearm-cube/1).", default="auto"
     )
     load: float | None = option(
         Number("kg", low=0.0, above=True), "Rated load.", default=None, shown="that of the robot file"
@@ -202,7 +202,7 @@ class EvaluateTests(Instrument, IntoFolder, Repeatable, Long):
     words = "iso9283 evaluate"
     refuses = "If a file cannot be used or does not fit the plan; the message names the row."
     plan: str | Path = required(
-        File("PLAN.yaml"), "Of 'truearm iso9283 plan', with ``robot.yaml`` beside it.", kw_only=False
+        File("PLAN.yaml"), "Of 'truearm iso9283 plan', with robot.yaml beside it.", kw_only=False
     )
     poses: str | Path | None = option(File("CSV"), "Attained poses.", default=None, shown=False)
     paths: str | Path | None = option(File("CSV"), "Samples along paths.", default=None, shown=False)
@@ -210,7 +210,7 @@ class EvaluateTests(Instrument, IntoFolder, Repeatable, Long):
     forces: str | Path | None = option(File("CSV"), "The tip under forces.", default=None, shown=False)
     alignment: str | Path | None = option(
         File("FILE"),
-        "How the instrument was tied to the base (schema ``truearm-alignment/1``).",
+        "How the instrument was tied to the base (schema truearm-alignment/1).",
         default=None,
         shown="best fit, with a warning",
     )

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Final
 
 from truearm.engine.base.errors import InputError, Words, wrong_kind
@@ -66,8 +65,6 @@ class Given(Kind):
 
 class File(Given):
     """A file or folder."""
-
-    typed = Path
 
     def check(self, value: Any, name: str) -> Any:
         """Refuse what is no path."""

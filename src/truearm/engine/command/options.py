@@ -262,11 +262,11 @@ def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, O
         text = f"{text.removesuffix('.')} \\[{kind.at_edges}]."
     typed = kind.typed
     if declared.is_argument:
-        typed = str if typed is Path else typed
         how = typer.Argument(metavar=metavar, help=text)
     else:
         told = isinstance(declared.shown, str) or (declared.shown and default not in (None, ()))
-        shown = declared.shown if told and not declared.needed else False
+        shown: Any = declared.shown if told and not declared.needed else False
+        shown = spelled_by(shown, others) if isinstance(shown, str) else shown
         only: dict[str, Any] = {} if typed is bool else {"metavar": metavar, "show_default": shown}
         how = typer.Option(flag, help=text, **only)
     given: Any

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.command.groups import IntoFolder, Loaded, Long, Noted, OfData, Repeatable, Split
+from truearm.engine.command.groups import Excluding, IntoFolder, Loaded, Long, Noted, OfData, Repeatable, Split
 from truearm.engine.command.kinds import Choice, File, Flag, Given, Names, NumberOr, Whole
 from truearm.engine.command.request import job, option
 
@@ -30,7 +30,7 @@ def _effects() -> Collection[str]:
     return [effect.name for effect in EFFECTS]
 
 
-class Calibrate(OfData, Split, Loaded, Noted, IntoFolder, Repeatable, Long):
+class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable, Long):
     """Identify the real robot from measurements and judge it on configurations it has not seen.
 
     Writes calibrated.yaml, result.json, report.html and calibrated.urdf into a folder. The parameter values of the
@@ -100,13 +100,6 @@ class Calibrate(OfData, Split, Loaded, Noted, IntoFolder, Repeatable, Long):
         "Configurations to leave out.",
         default=(),
         more="Neither part of the split knows them.",
-    )
-    exclude: str | Path | None = option(
-        File("FILE"),
-        "Readings to exclude: configuration, target and reason.",
-        default=None,
-        shown=False,
-        more="They count as missing, and the split stays.",
     )
     monte_carlo: int | None = option(
         Whole(low=100, counts=True),

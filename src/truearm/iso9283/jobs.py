@@ -8,12 +8,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truearm.engine.base.errors import InputError, Words
-from truearm.engine.command.groups import AtTip, Drawn, InCube, Instrument, IntoFolder, Long, OfRobot, Repeatable
-from truearm.engine.command.kinds import Choice, File, Given, Names, Number, Numbers
+from truearm.engine.command.groups import (
+    AtTip,
+    Drawn,
+    InCell,
+    InCube,
+    Instrument,
+    IntoFolder,
+    Long,
+    OfRobot,
+    Programmed,
+    Repeatable,
+)
+from truearm.engine.command.kinds import File, Given, Names, Number, Numbers
 from truearm.engine.command.request import job, option, required
 
 if TYPE_CHECKING:
-    from truearm.engine.motion.constraints import Constraints
     from truearm.engine.robot.robot import Robot
     from truearm.iso9283.evaluate.evaluate import Iso9283Evaluation
     from truearm.iso9283.plan.criteria import PerformancePlan
@@ -67,16 +77,11 @@ class _Percent(Numbers):
         return percent
 
 
-def _languages() -> list[str]:
-    from truearm.engine.programs import PROGRAM_LANGUAGES
-
-    return [*PROGRAM_LANGUAGES]
-
-
-class PlanTests(OfRobot, InCube, AtTip, IntoFolder, Repeatable):
+class PlanTests(OfRobot, InCube, AtTip, InCell, Programmed, IntoFolder, Repeatable):
     """Plan the tests: poses and paths in the cube, cycles, velocities, loads, and a sheet for the operator.
 
-    The robot is the nominal one, as its controller knows it. Writes plan.yaml, robot.yaml and sheet.html.
+    The robot is the nominal one, as its controller knows it. Writes plan.yaml, robot.yaml and sheet.html. Ways keep
+    clear of what stands in the cell where that or a clearance is stated, or the plan is refused.
     """
 
     job = "iso9283_plan"
@@ -112,26 +117,6 @@ class PlanTests(OfRobot, InCube, AtTip, IntoFolder, Repeatable):
         Number("mm", low=0.0, above=True), "Within which the tip is said to stand.", default=0.1e-3
     )
     hours: float = option(Number("h", low=0.0, above=True), "How long the drift is watched.", default=8.0)
-    constraints: Constraints | str | Path | None = option(
-        Given("FILE"),
-        "What stands in the cell, as for 'truearm plan': ways keep clear.",
-        default=None,
-        shown=False,
-        more="With these or a clearance the plan is refused where they do not; the largest cube is one in which they "
-        "do.",
-    )
-    clearance: float | None = option(
-        Number("mm", low=0.0), "Room that ways keep to floor, boxes, links.", default=None, shown="not kept, or 50 mm"
-    )
-    program: str | None = option(
-        Choice("rapid|krl|fanuc|urscript|inform|val3", _languages),
-        "Write measuring programs in this language.",
-        default=None,
-        shown=False,
-    )
-    dwell: float = option(
-        Number("s", low=0.0, high=300.0, above=True), "How long they stand where it is measured.", default=2.0
-    )
     slow_run: str | Path | None = option(
         File("FILE"), "slow-run.yaml, completed: writes the faster ones.", default=None, shown=False
     )

@@ -22,20 +22,30 @@ from truearm.engine.command.kinds import (
     Text,
     Told,
     Whole,
+    WrenchKind,
 )
 from truearm.engine.command.request import Request, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
+    from truearm.engine.motion.constraints import Constraints
     from truearm.engine.motion.largest_cube import Direction
+    from truearm.engine.robot.controller import JointsOf
     from truearm.engine.robot.parts import Payload
     from truearm.engine.robot.robot import Robot
+    from truearm.engine.robot.wrench import Wrench, WrenchFrame
 
 Train = int | Literal["all"] | None
 
 
 def _silent(words: str) -> None:
     """Tell nobody."""
+
+
+def _languages() -> list[str]:
+    from truearm.engine.programs import PROGRAM_LANGUAGES
+
+    return [*PROGRAM_LANGUAGES]
 
 
 class OfRobot(Request):
@@ -171,6 +181,105 @@ class Long(Request):
 
     progress: Callable[[str], None] = option(
         Told(), "Called with a few words at each step", default=_silent, word="", repeated=False
+    )
+
+
+class Excluding(Request):
+    """Which readings do not count."""
+
+    exclude: str | Path | None = option(
+        File("FILE"),
+        "Readings to exclude: configuration, target and reason.",
+        default=None,
+        shown=False,
+        more="They count as missing, and the split stays.",
+    )
+
+
+class Forced(Request):
+    """What acts on the tool besides weight."""
+
+    wrench: Wrench | Sequence[float] | str | None = option(
+        WrenchKind("FX,FY,FZ,MX,MY,MZ"),
+        "What acts on the tool besides weight: a force [N] at its point and a moment [N m], or with units: "
+        '"0N,0N,80N,0Nm,0Nm,1.5Nm".',
+        default=None,
+        shown="nothing",
+    )
+    wrench_frame: WrenchFrame | None = option(
+        Choice(known=("base", "tool", "world", "controller")),
+        "Whose axes `wrench` is given in.",
+        default=None,
+        shown="base",
+    )
+
+
+class ForcedAt(Forced):
+    """What acts on one of several targets."""
+
+    wrench_at: str | None = option(
+        Text("NAME"), "The target on which `wrench` acts, or flange.", default=None, shown="the only target"
+    )
+
+
+class JointsGiven(Request):
+    """Whose joint positions are given."""
+
+    joints_are: JointsOf | None = option(
+        Choice(known=("controller", "model")),
+        "Whose joint positions they are: as the robot's controller shows them, or its model's.",
+        default=None,
+        shown="the model's",
+    )
+
+
+class JointsWritten(Request):
+    """Whose joint positions are written."""
+
+    joints: JointsOf | None = option(
+        Choice(known=("controller", "model")),
+        "Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
+        default=None,
+        shown="the controller's where the robot file says that they differ",
+    )
+
+
+class Programmed(Request):
+    """A program that drives what is planned."""
+
+    program: str | None = option(
+        Choice("rapid|krl|fanuc|urscript|inform|val3", _languages),
+        "Write a program in this language.",
+        default=None,
+        shown=False,
+    )
+    dwell: float | None = option(
+        Number("s", low=0.0, high=300.0, above=True),
+        "How long it stands where it is measured.",
+        default=None,
+        shown="2",
+    )
+
+
+class InCell(Request):
+    """What stands in the cell."""
+
+    constraints: Constraints | str | Path | None = option(
+        Given("FILE"), "What a configuration must keep: boxes, limits of joints, a floor.", default=None, shown=False
+    )
+    clearance: float | None = option(
+        Number("mm", low=0.0),
+        "Room that the arm keeps to floor, boxes and its own links, on the ways too.",
+        default=None,
+        shown="50 mm",
+    )
+
+
+class IntoFile(Request):
+    """What writes a file."""
+
+    out: str | Path | None = option(
+        File("FILE"), "File to write.", default=None, shown="none is written", needed=True, repeated=False
     )
 
 

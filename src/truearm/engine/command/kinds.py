@@ -368,6 +368,44 @@ class NotesKind(Given):
         return [f"{name}={said}" for name, said in value.items()]
 
 
+class WrenchKind(Given):
+    """What acts on a tool: an object, a text, or six numbers; the job reads it with the frame of its axes."""
+
+    def typed_again(self, value: Any) -> list[str]:
+        """Return its text."""
+        if isinstance(value, str):
+            return [value]
+        return [value.text] if hasattr(value, "text") else Numbers().typed_again(value)
+
+
+class NamedFiles(Given):
+    """Files by name."""
+
+    typed = list[str]
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse what are no paths by name."""
+        from truearm.engine.command.arguments import files_argument
+
+        return files_argument(value, name)
+
+    def read(self, typed: Any, name: str) -> Any:
+        """Return the files of texts such as ``base=points.txt``."""
+        named: dict[str, str] = {}
+        for text in typed:
+            key, given, file = text.partition("=")
+            if not key or not given or not file:
+                raise InputError("a name and a file belong here", parameter=name, came=text, allowed="NAME=FILE")
+            if key in named:
+                raise InputError("this name is given twice", parameter=name, came=key)
+            named[key] = file
+        return named
+
+    def typed_again(self, value: Mapping[str, Any]) -> list[str]:
+        """Return them as they are typed."""
+        return [f"{name}={file}" for name, file in value.items()]
+
+
 class Told(Given):
     """A function that is called with a few words at each step; it is no part of what is asked for."""
 

@@ -82,7 +82,9 @@ def planned(asked: PlanTests) -> Iso9283Plan:
     programs = None
     if asked.program is not None:
         language = PROGRAM_LANGUAGES[asked.program]
-        programs = written_programs(plan, language, asked.dwell, record, warnings, cell_unknown=cell is None)
+        programs = written_programs(
+            plan, language, 2.0 if asked.dwell is None else asked.dwell, record, warnings, cell_unknown=cell is None
+        )
     found = Iso9283Plan(plan, asked.again, tuple(warnings), files_of(*given), programs, kept)
     return found if folder is None else _written(found, folder, record, given)
 

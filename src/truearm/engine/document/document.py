@@ -33,6 +33,7 @@ class Cell:
     sort: float | str | None = None  #: What rows are sorted by; None for the text.
     code: bool = False  #: Whether it is a name, of a parameter for example.
     link: str | None = None
+    look: str = ""  #: A class of the style sheet.
 
 
 @dataclass(frozen=True)

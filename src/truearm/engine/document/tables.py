@@ -201,6 +201,23 @@ def parameter_rows(fit: Fit) -> tuple[ParameterRow, ...]:
     return tuple(rows)
 
 
+def parameter_lines(fit: Fit) -> list[str]:
+    """Return the parameters in columns: name, nominal, value, deviation, unit, and what the value is worth."""
+    worth = {"identified": "", "at-bound": "at a bound", "uninformed": "not told by the data"}
+    rows = [("parameter", "nominal", "value", "deviation", "unit", "")]
+    for row in parameter_rows(fit):
+        nominal = from_si(fit.robot.parameters[row.name].nominal, row.unit)
+        said = worth.get(row.fit_status, row.fit_status.replace("-", " "))
+        rows.append((row.name, row.fixed(nominal), row.known(row.estimate), row.deviation_text, row.unit, said))
+    wide = [max(len(row[k]) for row in rows) for k in range(5)]
+    return [
+        "  ".join(
+            [row[0].ljust(wide[0]), *(row[k].rjust(wide[k]) for k in (1, 2, 3)), row[4].ljust(wide[4]), row[5]]
+        ).rstrip()
+        for row in rows
+    ]
+
+
 @dataclass(frozen=True)
 class Pair:
     """Two parameters and their correlation."""

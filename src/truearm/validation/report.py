@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -25,6 +26,7 @@ from truearm.validation.region import orientation_summary
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
+    from truearm.engine.diagnose.next_step import NextStep
     from truearm.engine.robot.chain import Array
     from truearm.validation.region import OrientationErrors, RegionDistances, Span
     from truearm.validation.validate import Validation
@@ -53,7 +55,9 @@ def validation_html(found: Validation) -> str:
                 "found without it."
             )
         ]
-    facts = [(name.capitalize(), said) for name, said in found.notes.items()]
+    facts: list[tuple[str, str | Sequence[NextStep]]] = [(key.capitalize(), said) for key, said in found.notes.items()]
+    if found.next:
+        facts.append(("Next", found.next))
     drawn = validation_figures(found)
     over_time = (
         "Mean over the readings of each configuration. A trend or a step is a sign that something moved or warmed up "
@@ -62,7 +66,7 @@ def validation_html(found: Validation) -> str:
     return Document(
         f"Validation of {title} – {source}",
         [
-            *([Facts(facts, found.next)] if facts or found.next else []),
+            *([Facts(facts)] if facts else []),
             Section("", [*warned(found.warnings), errors, *refit], "result"),
             _over_distance(found, drawn),
             *_orientations(found, drawn),

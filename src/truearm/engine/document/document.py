@@ -34,6 +34,8 @@ class Cell:
     code: bool = False  #: Whether it is a name, of a parameter for example.
     link: str | None = None
     look: str = ""  #: A class of the style sheet.
+    share: str | None = None  #: Percent that a bar before the text shows.
+    chip: str = ""  #: The colour of a small square before it: ``before`` or ``after``.
 
 
 @dataclass(frozen=True)
@@ -78,11 +80,22 @@ class Lead:
 
 @dataclass(frozen=True)
 class Facts:
-    """Terms and what is said of them; and what to do next."""
+    """Terms and what is said of them: words, or what to do next; empty is filled in by hand on paper."""
 
-    entries: Sequence[tuple[str, str]]
-    steps: Sequence[NextStep] = ()
+    entries: Sequence[tuple[str, str | Sequence[NextStep]]]
+    name: str = ""
     kind: ClassVar = "facts"
+
+
+@dataclass(frozen=True)
+class Points:
+    """A list under a small heading."""
+
+    title: str
+    words: str
+    entries: Sequence[str]
+    name: str = ""
+    kind: ClassVar = "points"
 
 
 @dataclass(frozen=True)
@@ -119,6 +132,15 @@ class Warned:
 
 
 @dataclass(frozen=True)
+class Alert:
+    """What the reader must not miss, and is no notice of the result."""
+
+    strong: str
+    words: str
+    kind: ClassVar = "alert"
+
+
+@dataclass(frozen=True)
 class Section:
     """A part of a page under a heading."""
 
@@ -133,7 +155,7 @@ class Section:
         return any(isinstance(block, Picture) for block in self.blocks)
 
 
-Block = Words | Table | Picture | Lead | Facts | Folded | Warned | Section
+Block = Words | Table | Picture | Lead | Facts | Points | Folded | Warned | Alert | Section
 
 
 @dataclass(frozen=True)
@@ -146,6 +168,7 @@ class Document:
     headline: str = ""  #: Over the page; empty for the title.
     subtitle: str = ""
     history: Sequence[str] = ()  #: What was done before.
+    cover: Sequence[Block] = ()  #: What is printed on the first page, with a place to sign it.
 
     def html(self, of: object) -> str:
         """Return the page, one HTML file.
@@ -187,4 +210,4 @@ def tabled(title: str, heading: tuple[str, ...], rows: Sequence[Sequence[str]], 
 
 def pictures_of(document: Document) -> dict[str, Figure]:
     """Return the pictures of a page by the names of their places."""
-    return {one.name: one.figure for one in _pictures(document.blocks)}
+    return {one.name: one.figure for one in _pictures((*document.cover, *document.blocks))}

@@ -23,7 +23,7 @@ from truearm.drawn_circle.command import circle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
 from truearm.engine.command.options import CommandError, Commands, add, by_device
-from truearm.fleets.command import fleet
+from truearm.fleets.fleet import CalibrateFleet
 from truearm.hexapod.command import app as hexapod
 from truearm.importing.command import guess, matrices, robodk, sockets, table
 from truearm.inclinometers.command import plan_pairs, simulate_readings, tilting
@@ -107,7 +107,7 @@ app.command()(export)
 app.command()(export_robodk)
 app.command("new-robot")(new_robot)
 app.command(help=study_help())(study)
-app.command()(fleet)
+add(app, CalibrateFleet)
 app.command()(example)
 app.command()(demo)
 app.command()(studio)

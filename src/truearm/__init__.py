@@ -65,9 +65,9 @@ if TYPE_CHECKING:
     from truearm.simulation.influence import influence as influence
     from truearm.simulation.simulate import devices as devices
     from truearm.simulation.simulate import simulate as simulate
-    from truearm.starting.demo import demo as demo
-    from truearm.starting.example import example as example
-    from truearm.starting.example import new_robot as new_robot
+    from truearm.starting.jobs import demo as demo
+    from truearm.starting.jobs import example as example
+    from truearm.starting.jobs import new_robot as new_robot
     from truearm.starting.study import study as study
     from truearm.validation.distances import distances as distances
     from truearm.validation.lines import lines as lines
@@ -126,9 +126,9 @@ JOBS: Final = {
     "export_robodk": "truearm.robot_files.convert",
     "study": "truearm.starting.study",
     "fleet": "truearm.fleets.fleet",
-    "new_robot": "truearm.starting.example",
-    "example": "truearm.starting.example",
-    "demo": "truearm.starting.demo",
+    "new_robot": "truearm.starting.jobs",
+    "example": "truearm.starting.jobs",
+    "demo": "truearm.starting.jobs",
 }
 _CLASSES: Final = {
     "Calibration": "truearm.calibration.result",

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from truearm.compensation.path import path as path
     from truearm.drawn_circle.import_circle import import_circle as import_circle
     from truearm.engine.base.errors import InputError as InputError
-    from truearm.engine.command.reading import load_data as load_data
-    from truearm.engine.command.reading import load_robot as load_robot
+    from truearm.engine.command.loading import load_data as load_data
+    from truearm.engine.command.loading import load_robot as load_robot
     from truearm.engine.data.dataset import Dataset as Dataset
     from truearm.engine.robot.parameters import Parameter as Parameter
     from truearm.engine.robot.parts import Payload as Payload
@@ -79,9 +79,9 @@ if TYPE_CHECKING:
 #: plain keywords, refuses what it cannot use with an :class:`InputError` that names the parameter, and returns a frozen
 #: record.
 JOBS: Final = {
-    "load_robot": "truearm.engine.command.reading",
+    "load_robot": "truearm.engine.command.loading",
     "show": "truearm.robot_files.show",
-    "load_data": "truearm.engine.command.reading",
+    "load_data": "truearm.engine.command.loading",
     "import_table": "truearm.importing.files",
     "import_guess": "truearm.importing.guess",
     "import_matrices": "truearm.importing.files",

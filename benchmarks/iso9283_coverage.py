@@ -31,7 +31,7 @@ from truearm.iso9283.criteria.intervals import (
     spread_interval,
 )
 from truearm.iso9283.criteria.rows import Cycles, Instrument
-from truearm.iso9283.plan.criteria import PlannedTest
+from truearm.iso9283.planning.criteria import PlannedTest
 
 CYCLES = 30
 MANY = 300_000

@@ -38,8 +38,8 @@ from tests.moving_tip import (
 from truearm.iso9283.criteria.corners import corner_values, weaving_values
 from truearm.iso9283.criteria.paths import path_values
 from truearm.iso9283.criteria.velocity import velocity_values
-from truearm.iso9283.evaluate.samples import read_path_samples
-from truearm.iso9283.plan.criteria import Way
+from truearm.iso9283.evaluating.samples import read_path_samples
+from truearm.iso9283.planning.criteria import Way
 
 PATHS = ("line", "rectangle", "large-circle", "small-circle")
 RATES = (25.0, 50.0, 100.0, 250.0, 1000.0)

@@ -11,8 +11,8 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.transform import rotation_from_vector
 from truearm.iso9283.criteria.rows import Instrument, Value
-from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest, Way
-from truearm.iso9283.plan.records import Names, Samples
+from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest, Way
+from truearm.iso9283.planning.records import Names, Samples
 
 EXACT = Instrument(0.0, 0.0)
 TRACKER = Instrument(0.02e-3)

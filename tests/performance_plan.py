@@ -12,7 +12,7 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.kinematics import inverse
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.transform import rotation_from_vector
-from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest
+from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest
 
 #: z of the tip down.
 DOWN = np.diag([1.0, -1.0, -1.0])

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from truearm.engine.base.version import __version__
 
 if TYPE_CHECKING:
+    from truearm import iso9283 as iso9283
     from truearm.axis_circles.axes import axes as axes
     from truearm.bags.import_ros import import_ros as import_ros
     from truearm.board.import_hand_eye import import_hand_eye as import_hand_eye
@@ -138,10 +139,14 @@ _CLASSES: Final = {
     "Payload": "truearm.engine.robot.parts",
     "Robot": "truearm.engine.robot.robot",
 }
+#: Features whose jobs have names of their own there.
+_FEATURES: Final = ("iso9283",)
 __all__ = ["__version__", *_CLASSES, *JOBS]
 
 
 def __getattr__(name: str) -> Any:
+    if name in _FEATURES:
+        return import_module(f"truearm.{name}")
     home = JOBS.get(name) or _CLASSES.get(name)
     if home is None:
         raise AttributeError(f"module 'truearm' has no attribute {name!r}")

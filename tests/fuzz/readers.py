@@ -38,9 +38,9 @@ from truearm.importing.files import Apart, read_matrices, read_sockets
 from truearm.importing.guess import guess_mapping
 from truearm.inclinometers.reading import inclinations_text, read_inclinations
 from truearm.iso9283.criteria.alignment import read_alignment
-from truearm.iso9283.evaluate.reading import read_attained_poses, read_pushes
-from truearm.iso9283.evaluate.samples import read_path_samples, read_settling_samples
-from truearm.iso9283.plan.plan_file import plan_text, read_cube, read_plan
+from truearm.iso9283.evaluating.reading import read_attained_poses, read_pushes
+from truearm.iso9283.evaluating.samples import read_path_samples, read_settling_samples
+from truearm.iso9283.planning.plan_file import plan_text, read_cube, read_plan
 from truearm.measuring.campaign import Campaign
 from truearm.measuring.reading_log import ReadingLog, read_about
 from truearm.measuring.session import Quality, Session

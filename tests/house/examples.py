@@ -27,8 +27,8 @@ from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import measure
 from truearm.hexapod.reachable import with_cups
-from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
-from truearm.iso9283.simulate.simulate import FILES as SIMULATED_FILES
+from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text
+from truearm.iso9283.simulating.simulate import FILES as SIMULATED_FILES
 
 Arguments = dict[str, Any]
 

@@ -26,10 +26,10 @@ from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.fleets.recorded import RECORD
 from truearm.fleets.result import FLEET_FILES
 from truearm.inclinometers.tilting import GEOMETRY, TILTING_FILES
-from truearm.iso9283.evaluate.evaluate import EVALUATION_FILES
-from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
-from truearm.iso9283.plan.result import PLAN_FILES
-from truearm.iso9283.simulate.simulate import FILES as SIMULATED_FILES
+from truearm.iso9283.evaluating.evaluate import EVALUATION_FILES
+from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text
+from truearm.iso9283.planning.result import PLAN_FILES
+from truearm.iso9283.simulating.simulate import FILES as SIMULATED_FILES
 from truearm.measuring.begun import BEGUN
 from truearm.measuring.reading_log import LOG
 from truearm.measuring.result import DATA, PAGE

@@ -9,7 +9,7 @@ import pytest
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.transform import rotation_from_vector, rotation_vector
-from truearm.iso9283.simulate.moving_arm import Commands, Pace, along_circle, along_lines, joint_move
+from truearm.iso9283.simulating.moving_arm import Commands, Pace, along_circle, along_lines, joint_move
 
 STEP = 1e-3
 CORNER = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.2, 0.0]])

@@ -10,8 +10,8 @@ from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.alignment import Alignment
 from truearm.iso9283.criteria.rows import Cycles, Instrument
 from truearm.iso9283.criteria.wild_rows import alike_cycles, unusual_rows
-from truearm.iso9283.evaluate.evaluation import Evaluation
-from truearm.iso9283.evaluate.table import row_notices
+from truearm.iso9283.evaluating.evaluation import Evaluation
+from truearm.iso9283.evaluating.table import row_notices
 
 
 def group(points: Array, pose: str = "P1", test: str = "AP") -> Cycles:

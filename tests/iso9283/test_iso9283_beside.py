@@ -15,10 +15,10 @@ from tests.performance_plan import small_plan
 import truearm
 from truearm.engine.document.document import Picture, Section, Words
 from truearm.engine.robot.robot_file.writing import robot_text
-from truearm.iso9283.evaluate.evaluate import RESULT, Iso9283Evaluation
-from truearm.iso9283.evaluate.figures import pose_pictures
-from truearm.iso9283.evaluate.report import path_pictures
-from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
+from truearm.iso9283.evaluating.evaluate import RESULT, Iso9283Evaluation
+from truearm.iso9283.evaluating.figures import pose_pictures
+from truearm.iso9283.evaluating.report import path_pictures
+from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text
 
 Arguments = dict[str, Any]
 

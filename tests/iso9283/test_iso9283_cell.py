@@ -12,11 +12,11 @@ import truearm
 from truearm.engine.base.errors import InputError
 from truearm.engine.motion.constraints import Constraints, read_constraints
 from truearm.engine.motion.cube import Cube
-from truearm.iso9283.plan import choosing as planning
-from truearm.iso9283.plan.choosing import performance_plan
-from truearm.iso9283.plan.criteria import TESTS
-from truearm.iso9283.plan.programs import StatedCell, stated_cell
-from truearm.iso9283.plan.result import Iso9283Plan
+from truearm.iso9283.planning import choosing as planning
+from truearm.iso9283.planning.choosing import performance_plan
+from truearm.iso9283.planning.criteria import TESTS
+from truearm.iso9283.planning.programs import StatedCell, stated_cell
+from truearm.iso9283.planning.result import Iso9283Plan
 
 CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 CELL = "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"

@@ -25,10 +25,10 @@ from truearm.engine.robot.transform import quaternion_from_rotation, rotation_fr
 from truearm.engine.twin.truths import truth_twin
 from truearm.iso9283.criteria.poses import missing_places
 from truearm.iso9283.criteria.rows import Conditions, Value
-from truearm.iso9283.evaluate.evaluate import Iso9283Evaluation
-from truearm.iso9283.evaluate.table import cycle_notices, worst_places
-from truearm.iso9283.plan.criteria import TEST_OF
-from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
+from truearm.iso9283.evaluating.evaluate import Iso9283Evaluation
+from truearm.iso9283.evaluating.table import cycle_notices, worst_places
+from truearm.iso9283.planning.criteria import TEST_OF
+from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text
 
 FILES = ("poses", "paths", "settling", "forces")
 Arguments = dict[str, Any]

@@ -10,7 +10,7 @@ from truearm.iso9283.criteria.corners import corner_values, weaving_values
 from truearm.iso9283.criteria.rows import Instrument
 from truearm.iso9283.criteria.settling import settling_values
 from truearm.iso9283.criteria.streams import largest_top, top_of
-from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.planning.records import Samples
 
 PLAN = plan_of()
 

@@ -19,8 +19,8 @@ import truearm
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.writing import write_files
 from truearm.engine.robot.robot_file.writing import robot_text
-from truearm.iso9283.evaluate.evaluate import RESULT, Iso9283Evaluation
-from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
+from truearm.iso9283.evaluating.evaluate import RESULT, Iso9283Evaluation
+from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text
 
 Arguments = dict[str, Any]
 Row = dict[str, str]

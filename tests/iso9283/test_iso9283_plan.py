@@ -15,10 +15,10 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.motion.cube import Cube
 from truearm.engine.motion.joint_motion import Tip
 from truearm.engine.robot.robot_file.writing import robot_text
-from truearm.iso9283.plan.choosing import performance_plan
-from truearm.iso9283.plan.criteria import CRITERIA, TEST_OF, TESTS
-from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text, read_cube, read_plan
-from truearm.iso9283.plan.result import Iso9283Plan
+from truearm.iso9283.planning.choosing import performance_plan
+from truearm.iso9283.planning.criteria import CRITERIA, TEST_OF, TESTS
+from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text, read_cube, read_plan
+from truearm.iso9283.planning.result import Iso9283Plan
 
 CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 
@@ -213,7 +213,7 @@ def test_a_plan_file_that_cannot_be_used_is_refused(
 def test_the_largest_cube_is_that_of_the_robot_whichever_tests_are_planned(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = truearm.load_robot("irb120")
     found = Cube([0.3036, 0.0, 0.3036], 0.4239)  # AP alone would be planned in it
-    monkeypatch.setattr("truearm.iso9283.plan.choosing.largest_cube", lambda *_, **__: found)
+    monkeypatch.setattr("truearm.iso9283.planning.choosing.largest_cube", lambda *_, **__: found)
     sides = {
         tests: performance_plan(robot, tests=tests, rated_load=3.0, rated_velocity=1.0).cube.side
         for tests in (("AP",), ("AT", "vAP"))

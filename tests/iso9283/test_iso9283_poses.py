@@ -21,9 +21,9 @@ from truearm.iso9283.criteria.drift import groups_of
 from truearm.iso9283.criteria.intervals import norm_interval, repeatability
 from truearm.iso9283.criteria.poses import PoseCloud, evaluate
 from truearm.iso9283.criteria.rows import Instrument, Value, best_fit_of, cycles_of
-from truearm.iso9283.evaluate.doubts import other_cube
-from truearm.iso9283.plan.criteria import PerformancePlan, PlannedPose, PlannedTest
-from truearm.iso9283.plan.records import AttainedPoses, Names, Pushes
+from truearm.iso9283.evaluating.doubts import other_cube
+from truearm.iso9283.planning.criteria import PerformancePlan, PlannedPose, PlannedTest
+from truearm.iso9283.planning.records import AttainedPoses, Names, Pushes
 
 CUBE = Cube((0.5, 0.0, 0.5), 0.4)
 POINTS = CUBE.plane("C1-C2-C7-C8").measuring_points

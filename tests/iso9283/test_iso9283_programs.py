@@ -13,8 +13,8 @@ import pytest
 import truearm
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.robot.controller import Controller
-from truearm.iso9283.plan.result import Iso9283Plan
-from truearm.iso9283.plan.routes import SLOW_RUN
+from truearm.iso9283.planning.result import Iso9283Plan
+from truearm.iso9283.planning.routes import SLOW_RUN
 
 CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 
@@ -171,7 +171,7 @@ def test_the_sheet_has_the_order_of_the_poses_and_the_tip(cube: Path) -> None:
     assert "The flange itself is measured" in planned(cube).contents()["sheet.html"]
     assert "in the order in which programs drive them" not in planned(cube).contents()["sheet.html"]
     noted = planned(cube, velocity=None).contents()["sheet.html"]
-    assert '<p class="notice note"><strong>Note (rated-velocity-assumed)' in noted
+    assert '<p class="notice note" data-code="rated-velocity-assumed">' in noted
 
 
 def test_a_folder_never_holds_programs_of_two_plans(cube: Path, tmp_path: Path) -> None:

@@ -18,13 +18,13 @@ from truearm.iso9283.criteria.runs import refuse_wild, wild_steps
 from truearm.iso9283.criteria.settling import settling_values
 from truearm.iso9283.criteria.streams import clock_of
 from truearm.iso9283.criteria.velocity import velocity_values
-from truearm.iso9283.evaluate.doubts import unusual_samples
-from truearm.iso9283.evaluate.evaluation import Evaluation
-from truearm.iso9283.evaluate.reading import read_attained_poses
-from truearm.iso9283.evaluate.samples import read_settling_samples
-from truearm.iso9283.evaluate.told import said_of_rounding, said_of_streams
-from truearm.iso9283.plan.criteria import Way
-from truearm.iso9283.plan.records import Samples, resolution_of
+from truearm.iso9283.evaluating.doubts import unusual_samples
+from truearm.iso9283.evaluating.evaluation import Evaluation
+from truearm.iso9283.evaluating.reading import read_attained_poses
+from truearm.iso9283.evaluating.samples import read_settling_samples
+from truearm.iso9283.evaluating.told import said_of_rounding, said_of_streams
+from truearm.iso9283.planning.criteria import Way
+from truearm.iso9283.planning.records import Samples, resolution_of
 
 PLAN = plan_of()
 FAST = plan_of(velocity=1.0)

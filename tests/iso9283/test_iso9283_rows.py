@@ -25,9 +25,9 @@ from truearm.engine.robot.transform import (
 from truearm.iso9283.criteria.alignment import Alignment
 from truearm.iso9283.criteria.rows import Instrument, cycles_of, refuse_copied_poses
 from truearm.iso9283.criteria.wild_rows import UnusualRows, unusual_rows
-from truearm.iso9283.evaluate.evaluation import Evaluation, Measurements, evaluated
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import AttainedPoses, Names
+from truearm.iso9283.evaluating.evaluation import Evaluation, Measurements, evaluated
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import AttainedPoses, Names
 
 Rows = NDArray[np.intp]
 TIE = Alignment("base-features", Transform(), 1e-5, 1e-5)

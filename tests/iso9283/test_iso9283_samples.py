@@ -32,8 +32,8 @@ from truearm.iso9283.criteria.runs import in_base
 from truearm.iso9283.criteria.settling import settling_values
 from truearm.iso9283.criteria.streams import _apart
 from truearm.iso9283.criteria.velocity import velocity_values
-from truearm.iso9283.plan.criteria import PerformancePlan, Way
-from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.planning.criteria import PerformancePlan, Way
+from truearm.iso9283.planning.records import Samples
 
 PLAN = plan_of()
 V = PLAN.rated_velocity

@@ -16,7 +16,7 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rotation_vector
 from truearm.engine.twin.truths import truth_twin
-from truearm.iso9283.simulate.simulate import Iso9283Simulation
+from truearm.iso9283.simulating.simulate import Iso9283Simulation
 
 TRUTH = "tracker-triangular"
 

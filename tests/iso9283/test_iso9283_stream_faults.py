@@ -31,13 +31,13 @@ from truearm.iso9283.criteria.rows import Instrument, copied_blocks
 from truearm.iso9283.criteria.runs import runs_of
 from truearm.iso9283.criteria.settling import settling_values
 from truearm.iso9283.criteria.velocity import velocity_values
-from truearm.iso9283.evaluate.doubts import unusual_samples
-from truearm.iso9283.evaluate.evaluate import value_summary
-from truearm.iso9283.evaluate.evaluation import Evaluation
-from truearm.iso9283.evaluate.table import copied_notices
-from truearm.iso9283.evaluate.told import said_of_streams
-from truearm.iso9283.plan.criteria import Way
-from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.evaluating.doubts import unusual_samples
+from truearm.iso9283.evaluating.evaluate import value_summary
+from truearm.iso9283.evaluating.evaluation import Evaluation
+from truearm.iso9283.evaluating.table import copied_notices
+from truearm.iso9283.evaluating.told import said_of_streams
+from truearm.iso9283.planning.criteria import Way
+from truearm.iso9283.planning.records import Samples
 
 PLAN = plan_of()
 V = PLAN.rated_velocity

@@ -11,7 +11,7 @@ from tests.house.examples import performance_files
 
 import truearm
 from truearm.engine.base.errors import InputError
-from truearm.iso9283.plan.plan_file import read_cube
+from truearm.iso9283.planning.plan_file import read_cube
 
 Arguments = dict[str, Any]
 

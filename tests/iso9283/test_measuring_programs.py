@@ -22,9 +22,9 @@ from truearm.engine.programs.urscript.new import FASTEST
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.transform import rotation_from_vector, rotation_vector
-from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, Way
-from truearm.iso9283.plan.programs import measuring_programs
-from truearm.iso9283.plan.routes import Routes
+from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, Way
+from truearm.iso9283.planning.programs import measuring_programs
+from truearm.iso9283.planning.routes import Routes
 
 PLAN = small_plan(cycles=dict.fromkeys(TESTS, 2), velocities=(1.0, 0.1))
 TIP = 0.1

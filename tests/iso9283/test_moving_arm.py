@@ -13,7 +13,7 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.transform import IDENTITY, Transform, homogeneous
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin
-from truearm.iso9283.simulate.moving_arm import DRIVES, WARMING, MovingArm, drawn_compliance, last_moves
+from truearm.iso9283.simulating.moving_arm import DRIVES, WARMING, MovingArm, drawn_compliance, last_moves
 
 ROBOT = load_robot("irb120")
 TIP = Transform((0.05, 0.02, 0.1))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from truearm.engine.base.errors import InputError
-from truearm.iso9283.evaluate.reading import read_attained_poses, read_pushes
+from truearm.iso9283.evaluating.reading import read_attained_poses, read_pushes
 
 HEADER = "criterion,pose,cycle,velocity [%],load [%],x [mm],y [mm],z [mm]"
 TURNED = HEADER + ",qw,qx,qy,qz"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from truearm.engine.base.errors import InputError
-from truearm.iso9283.evaluate.samples import TESTS_OF, read_path_samples, read_settling_samples
-from truearm.iso9283.plan.criteria import TESTS
+from truearm.iso9283.evaluating.samples import TESTS_OF, read_path_samples, read_settling_samples
+from truearm.iso9283.planning.criteria import TESTS
 
 HEADER = "criterion,path,cycle,time [s],x [mm],y [mm],z [mm]"
 SETTLING = "criterion,pose,cycle,time [s],x [mm],y [mm],z [mm]"
@@ -88,7 +88,7 @@ def test_rows_are_the_same_whatever_the_size_of_the_blocks(
 ) -> None:
     rows = [f"AT,line,{1 + k // 50},{k % 50},{k},{k * 0.5},3" for k in range(200)]
     whole = read_path_samples(written(*rows))
-    monkeypatch.setattr("truearm.iso9283.evaluate.samples._BLOCK", 100)
+    monkeypatch.setattr("truearm.iso9283.evaluating.samples._BLOCK", 100)
     parts = read_path_samples(written(*rows))
     assert np.array_equal(whole.position, parts.position)
     assert np.array_equal(whole.cycle, parts.cycle)

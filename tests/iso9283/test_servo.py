@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from truearm.engine.base.errors import InputError
-from truearm.iso9283.simulate.moving_arm import Servo
+from truearm.iso9283.simulating.moving_arm import Servo
 
 STEP = 2e-3
 

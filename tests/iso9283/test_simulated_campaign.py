@@ -14,10 +14,10 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import IDENTITY, rotation_vector
 from truearm.engine.twin.truths import truth_twin
-from truearm.iso9283.plan.criteria import TURNS, PerformancePlan
-from truearm.iso9283.plan.records import Samples
-from truearm.iso9283.simulate.cell import SimulatedCampaign, Tracker, TrueRobot, simulated_campaign
-from truearm.iso9283.simulate.moving_arm import DRIVES, WARMING, ZONE, Drives, Servo
+from truearm.iso9283.planning.criteria import TURNS, PerformancePlan
+from truearm.iso9283.planning.records import Samples
+from truearm.iso9283.simulating.cell import SimulatedCampaign, Tracker, TrueRobot, simulated_campaign
+from truearm.iso9283.simulating.moving_arm import DRIVES, WARMING, ZONE, Drives, Servo
 
 #: Of poses several, which are quick; of streams, which are not, two of one test and one of all others.
 CYCLES = {"AP": 3, "vAP": 2, "AD": 2, "dAP": 4, "E": 2}

@@ -32,7 +32,7 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
 from truearm.engine.twin.truths import truth_twin
-from truearm.iso9283.simulate.moving_arm import DRIVES, MovingArm, joint_move, last_moves
+from truearm.iso9283.simulating.moving_arm import DRIVES, MovingArm, joint_move, last_moves
 from truearm.planning.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
 
 ROBOTS = {

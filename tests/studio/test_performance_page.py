@@ -14,10 +14,10 @@ from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, notices
 
 from truearm.engine.robot.robot_file.writing import robot_text
-from truearm.iso9283.evaluate.comparison import read_result
-from truearm.iso9283.evaluate.table import conditions_summary, values_of, worst_places
+from truearm.iso9283.evaluating.comparison import read_result
+from truearm.iso9283.evaluating.table import conditions_summary, values_of, worst_places
 from truearm.iso9283.jobs import iso9283_evaluate, iso9283_simulate
-from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text, read_plan
+from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text, read_plan
 from truearm.studio.cube_in_space import cube_in_space
 from truearm.studio.pages.choices import NONE
 from truearm.studio.pages.jog import JogPage

@@ -25,10 +25,10 @@ from truearm.engine.command.request import job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.robot.robot import Robot
-    from truearm.iso9283.evaluate.evaluate import Iso9283Evaluation
-    from truearm.iso9283.plan.criteria import PerformancePlan
-    from truearm.iso9283.plan.result import Iso9283Plan
-    from truearm.iso9283.simulate.simulate import Iso9283Simulation
+    from truearm.iso9283.evaluating.evaluate import Iso9283Evaluation
+    from truearm.iso9283.planning.criteria import PerformancePlan
+    from truearm.iso9283.planning.result import Iso9283Plan
+    from truearm.iso9283.simulating.simulate import Iso9283Simulation
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class _Criteria(Names):
     def check(self, value: Any, name: str) -> Any:
         """Return the ids as they are, each once."""
         from truearm.engine.command.arguments import choices_argument
-        from truearm.iso9283.plan.criteria import CRITERIA
+        from truearm.iso9283.planning.criteria import CRITERIA
 
         known = ("all", *CRITERIA)
         by_small = {criterion.lower(): criterion for criterion in known}
@@ -132,7 +132,7 @@ class PlanTests(OfRobot, InCube, AtTip, InCell, Programmed, IntoFolder, Repeatab
 
     def run(self) -> Iso9283Plan:
         """Plan."""
-        from truearm.iso9283.plan.plan import planned
+        from truearm.iso9283.planning.plan import planned
 
         return planned(self)
 
@@ -175,7 +175,7 @@ class SimulateTests(OfRobot, Instrument, Drawn, IntoFolder, Repeatable, Long):
 
     def run(self) -> Iso9283Simulation:
         """Simulate."""
-        from truearm.iso9283.simulate.simulate import simulated
+        from truearm.iso9283.simulating.simulate import simulated
 
         return simulated(self)
 
@@ -211,7 +211,7 @@ class EvaluateTests(Instrument, IntoFolder, Repeatable, Long):
 
     def run(self) -> Iso9283Evaluation:
         """Evaluate."""
-        from truearm.iso9283.evaluate.evaluate import evaluation
+        from truearm.iso9283.evaluating.evaluate import evaluation
 
         return evaluation(self)
 

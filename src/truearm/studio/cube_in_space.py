@@ -11,9 +11,9 @@ import numpy as np
 from truearm.engine.motion.cube import Cube
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.rows import Conditions
-from truearm.iso9283.evaluate.comparison import PlanOfResult, ResultFile, plan_summary
-from truearm.iso9283.evaluate.table import conditions_of, velocity_words
-from truearm.iso9283.plan.criteria import PerformancePlan, Way
+from truearm.iso9283.evaluating.comparison import PlanOfResult, ResultFile, plan_summary
+from truearm.iso9283.evaluating.table import conditions_of, velocity_words
+from truearm.iso9283.planning.criteria import PerformancePlan, Way
 
 #: Corners of the cube that an edge joins, as C1 to C8 are numbered.
 _EDGES: Final = np.array(

@@ -12,9 +12,9 @@ from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.files import read_bytes
 from truearm.engine.base.manifest import hash_of
 from truearm.engine.robot.robot import Robot, fitted_from
-from truearm.iso9283.evaluate.comparison import ReadFile, ResultFile
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.plan_file import read_plan
+from truearm.iso9283.evaluating.comparison import ReadFile, ResultFile
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.plan_file import read_plan
 from truearm.studio.cube_in_space import is_of_plan
 from truearm.studio.project import Project, stamp_of
 

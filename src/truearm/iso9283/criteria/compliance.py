@@ -14,8 +14,8 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.alignment import Alignment
 from truearm.iso9283.criteria.rows import AXES, Conditions, Instrument, Value, valued
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import Pushes
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import Pushes
 
 # Public descriptions of ISO 9283:1998: the tip is pushed and pulled along each base axis in steps of a tenth of the
 # rated load, and the displacement is given per force. Here it is the slope of a straight line through the steps of each

@@ -13,8 +13,8 @@ from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.rows import COARSE, Instrument, Value
 from truearm.iso9283.criteria.runs import Run, runs_of
 from truearm.iso9283.criteria.streams import Cycle, largest_top, local_lines, spans_of
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import Samples
 
 # Cornering deviations CR and CO, and the length of path after which the tip has settled.
 #

@@ -24,7 +24,7 @@ from truearm.iso9283.criteria.intervals import (
     repeatability_scatter,
 )
 from truearm.iso9283.criteria.rows import ANGLES, Conditions, Cycles, Instrument, Value, valued
-from truearm.iso9283.plan.criteria import PlannedTest
+from truearm.iso9283.planning.criteria import PlannedTest
 
 #: A pause of so many times the usual time between two cycles begins a new group.
 _PAUSE: Final = 5.0

@@ -19,8 +19,8 @@ from truearm.iso9283.criteria.intervals import LEAST_CYCLES
 from truearm.iso9283.criteria.rows import COARSE, Component, Instrument, Value
 from truearm.iso9283.criteria.runs import Run, runs_of
 from truearm.iso9283.criteria.streams import Cycle, local_lines
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import Samples
 
 #: Stations along a path.
 STATIONS = 50

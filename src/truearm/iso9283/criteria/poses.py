@@ -44,8 +44,8 @@ from truearm.iso9283.criteria.rows import (
     valued,
 )
 from truearm.iso9283.criteria.wild_rows import UnusualRows, WildRow, unusual_rows, without
-from truearm.iso9283.plan.criteria import TEST_OF, TESTS, PerformancePlan, PlannedTest
-from truearm.iso9283.plan.records import AttainedPoses
+from truearm.iso9283.planning.criteria import TEST_OF, TESTS, PerformancePlan, PlannedTest
+from truearm.iso9283.planning.records import AttainedPoses
 
 #: Robots that are exchanged.
 ROBOTS: Final = 5

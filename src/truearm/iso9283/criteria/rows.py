@@ -15,8 +15,8 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_vector
 from truearm.iso9283.criteria.alignment import Alignment, best_fit
 from truearm.iso9283.criteria.intervals import Interval
-from truearm.iso9283.plan.criteria import TEST_OF, TESTS, PerformancePlan
-from truearm.iso9283.plan.records import AttainedPoses, Names, Samples
+from truearm.iso9283.planning.criteria import TEST_OF, TESTS, PerformancePlan
+from truearm.iso9283.planning.records import AttainedPoses, Names, Samples
 
 #: ``too-few-cycles``: fewer than planned, the value stands nevertheless. ``instrument-too-coarse``: what the instrument
 #: does not know is more than a quarter of the value.
@@ -39,7 +39,7 @@ class Conditions:
 class Value:
     """A value of a criterion."""
 
-    id: str  #: One of :data:`truearm.iso9283.plan.criteria.CRITERIA`.
+    id: str  #: One of :data:`truearm.iso9283.planning.criteria.CRITERIA`.
     component: Component  #: What of it.
     where: str  #: The pose, the two poses, the path or the corner: ``P1``, ``P2-P4``, ``line``, ``rectangle E2``.
     value: float  #: In SI units (a share for a ratio); NaN where it was not measured.

@@ -21,8 +21,8 @@ from truearm.iso9283.criteria.streams import (
     found_in,
     refuse_other_times,
 )
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import Samples
 
 # Samples that no robot can have passed: a beam that was broken, a reflection, a row that was written wrongly.
 

@@ -18,8 +18,8 @@ from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.rows import COARSE, Conditions, Instrument, Status, Value
 from truearm.iso9283.criteria.runs import LEAST_SAMPLES, Part, in_base, parts_of, refuse_wild, wild_steps
 from truearm.iso9283.criteria.streams import TOP, Clock, clock_of, local_lines, noise_of, spans_of, top_of
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import Samples
 
 #: The final pose is the mean of this last share of the samples.
 _FINAL = 0.1

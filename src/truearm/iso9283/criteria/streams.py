@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
-from truearm.iso9283.plan.criteria import PlannedPath, Way
+from truearm.iso9283.planning.criteria import PlannedPath, Way
 
 # Times of samples that were written with few decimals: what is not known of them, and an even clock through them.
 #

@@ -17,8 +17,8 @@ from truearm.iso9283.criteria.intervals import LEAST_CYCLES
 from truearm.iso9283.criteria.rows import COARSE, Instrument, Value
 from truearm.iso9283.criteria.runs import Run, runs_of
 from truearm.iso9283.criteria.streams import Cycle, FoundStream, local_lines
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import Samples
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import Samples
 
 #: The part of the path over which velocity is judged.
 _MIDDLE = (0.25, 0.75)

@@ -8,9 +8,9 @@ import numpy as np
 
 from truearm.engine.base.files import exists
 from truearm.engine.robot.chain import Array
-from truearm.iso9283.evaluate.comparison import read_result
-from truearm.iso9283.evaluate.evaluate import RESULT
-from truearm.iso9283.plan.plan_file import read_plan
+from truearm.iso9283.evaluating.comparison import read_result
+from truearm.iso9283.evaluating.evaluate import RESULT
+from truearm.iso9283.planning.plan_file import read_plan
 from truearm.studio import words
 from truearm.studio.arrows import FACTORS, coloured, error_arrows
 from truearm.studio.cube_in_space import CubeInSpace, cube_in_space, is_of_plan

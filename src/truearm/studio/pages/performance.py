@@ -12,9 +12,9 @@ from truearm.engine.base.files import exists
 from truearm.engine.base.units import as_number
 from truearm.engine.twin.truths import truth_names
 from truearm.iso9283.criteria.rows import Value
-from truearm.iso9283.evaluate.comparison import ResultFile, read_result
-from truearm.iso9283.evaluate.evaluate import EVALUATION_FILES, REPORT, RESULT
-from truearm.iso9283.evaluate.table import (
+from truearm.iso9283.evaluating.comparison import ResultFile, read_result
+from truearm.iso9283.evaluating.evaluate import EVALUATION_FILES, REPORT, RESULT
+from truearm.iso9283.evaluating.table import (
     HEADING,
     UNITS,
     beside_words,
@@ -24,8 +24,8 @@ from truearm.iso9283.evaluate.table import (
     worst_places,
 )
 from truearm.iso9283.jobs import PlanTests
-from truearm.iso9283.plan.plan_file import PLAN
-from truearm.iso9283.simulate.simulate import FILES
+from truearm.iso9283.planning.plan_file import PLAN
+from truearm.iso9283.simulating.simulate import FILES
 from truearm.studio import words
 from truearm.studio.evaluated_with import evaluated_with, other_evaluations, stamps_of
 from truearm.studio.pages.choices import NONE, chosen, offer

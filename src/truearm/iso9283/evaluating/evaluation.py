@@ -21,9 +21,9 @@ from truearm.iso9283.criteria.rows import Conditions, Instrument, Quantity, Valu
 from truearm.iso9283.criteria.settling import SettlingCurve, settling_values
 from truearm.iso9283.criteria.velocity import VelocityCurves, velocity_values
 from truearm.iso9283.criteria.wild_rows import UnusualRows
-from truearm.iso9283.evaluate.doubts import refuse_other_push_place, refuse_other_rests
-from truearm.iso9283.plan.criteria import CRITERIA, TESTS, PerformancePlan, PlannedTest
-from truearm.iso9283.plan.records import AttainedPoses, Pushes, Samples
+from truearm.iso9283.evaluating.doubts import refuse_other_push_place, refuse_other_rests
+from truearm.iso9283.planning.criteria import CRITERIA, TESTS, PerformancePlan, PlannedTest
+from truearm.iso9283.planning.records import AttainedPoses, Pushes, Samples
 
 #: What kind of number each criterion is; a length if it is not here.
 _QUANTITIES: dict[str, Quantity] = {
@@ -57,7 +57,7 @@ class Measurements:
 class Evaluation:
     """The values of all criteria, and what they come from."""
 
-    values: tuple[Value, ...]  #: In the order of :data:`truearm.iso9283.plan.criteria.CRITERIA`.
+    values: tuple[Value, ...]  #: In the order of :data:`truearm.iso9283.planning.criteria.CRITERIA`.
     alignment: Alignment  #: How the instrument was tied to the robot's base.
     #: clouds, drift, deviations, corners, velocities, weaves, settling, pushes: for pictures.
     clouds: tuple[PoseCloud, ...] = ()

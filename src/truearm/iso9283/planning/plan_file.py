@@ -41,7 +41,7 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.entries import STRICT, Name, NotNegative, Number, Positive, Quaternion, Triple
 from truearm.engine.robot.robot_file.reading import read_robot
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion
-from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest
+from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest
 
 SCHEMA: Final = "truearm-iso9283/1"
 PLAN: Final = "plan.yaml"

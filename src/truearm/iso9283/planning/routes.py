@@ -22,7 +22,7 @@ from truearm.engine.robot.inverse.kinematics import inverse
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.entries import STRICT
 from truearm.engine.robot.transform import rotation_vector
-from truearm.iso9283.plan.criteria import TURNS, PlannedPath, PlannedPose, Way, weave_corners
+from truearm.iso9283.planning.criteria import TURNS, PlannedPath, PlannedPose, Way, weave_corners
 
 # Ways of the tip in tests by ISO 9283 as moves of the robot, with the joint positions at their ends.
 #

@@ -22,11 +22,11 @@ from truearm.engine.motion.cube import Cube
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.iso9283.criteria.rows import Component, Conditions, Instrument, Value, copied_blocks
-from truearm.iso9283.evaluate.comparison import Comparison, ReadFile, compared, plan_summary
-from truearm.iso9283.evaluate.evaluation import Evaluation, Measurements, evaluated
-from truearm.iso9283.evaluate.reading import read_attained_poses, read_pushes
-from truearm.iso9283.evaluate.samples import read_path_samples, read_settling_samples
-from truearm.iso9283.evaluate.table import (
+from truearm.iso9283.evaluating.comparison import Comparison, ReadFile, compared, plan_summary
+from truearm.iso9283.evaluating.evaluation import Evaluation, Measurements, evaluated
+from truearm.iso9283.evaluating.reading import read_attained_poses, read_pushes
+from truearm.iso9283.evaluating.samples import read_path_samples, read_settling_samples
+from truearm.iso9283.evaluating.table import (
     HEADING,
     UNITS,
     conditions_summary,
@@ -37,9 +37,9 @@ from truearm.iso9283.evaluate.table import (
     row_notices,
     worst_places,
 )
-from truearm.iso9283.evaluate.told import said_of_drift, said_of_pushes, said_of_rounding, said_of_streams
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.plan_file import read_plan
+from truearm.iso9283.evaluating.told import said_of_drift, said_of_pushes, said_of_rounding, said_of_streams
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.plan_file import read_plan
 
 if TYPE_CHECKING:
     from truearm.iso9283.jobs import EvaluateTests
@@ -160,7 +160,7 @@ class Iso9283Evaluation(Record):
 
     def contents(self) -> dict[str, str]:
         """Return the texts of all files by their names."""
-        from truearm.iso9283.evaluate.report import iso9283_report
+        from truearm.iso9283.evaluating.report import iso9283_report
 
         return {RESULT: json.dumps(self.summary(), indent=1) + "\n", REPORT: iso9283_report(self)}
 

@@ -18,9 +18,9 @@ from truearm.iso9283.criteria.paths import wild_cycle
 from truearm.iso9283.criteria.rows import Instrument
 from truearm.iso9283.criteria.runs import Run
 from truearm.iso9283.criteria.streams import Clock, pace_along
-from truearm.iso9283.evaluate.doubts import unusual_samples
-from truearm.iso9283.evaluate.evaluation import Evaluation
-from truearm.iso9283.plan.criteria import PerformancePlan
+from truearm.iso9283.evaluating.doubts import unusual_samples
+from truearm.iso9283.evaluating.evaluation import Evaluation
+from truearm.iso9283.planning.criteria import PerformancePlan
 
 #: From the first group to the last drift is watched for at least and at most this share of the planned time.
 _SHORTEST: Final = 0.9

@@ -34,9 +34,9 @@ from truearm.iso9283.criteria.drift import DriftCourse
 from truearm.iso9283.criteria.poses import PoseCloud
 from truearm.iso9283.criteria.rows import Conditions
 from truearm.iso9283.criteria.settling import SettlingCurve
-from truearm.iso9283.evaluate.comparison import Comparison, key_of
-from truearm.iso9283.evaluate.table import conditions_summary
-from truearm.iso9283.plan.criteria import PerformancePlan
+from truearm.iso9283.evaluating.comparison import Comparison, key_of
+from truearm.iso9283.evaluating.table import conditions_summary
+from truearm.iso9283.planning.criteria import PerformancePlan
 
 #: Arrows of errors are as long as this share of the cube's side.
 _ARROW: Final = 0.15

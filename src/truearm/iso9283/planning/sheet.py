@@ -10,11 +10,11 @@ from truearm.engine.document.document import Document, Section, answer, pictured
 from truearm.engine.document.planning_figures import pose_cube
 from truearm.engine.motion.largest_cube import PosePlan
 from truearm.engine.robot.transform import quaternion_from_rotation
-from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, Way, visited
+from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, Way, visited
 
 if TYPE_CHECKING:
     from truearm.engine.document.drawing import Figure
-    from truearm.iso9283.plan.result import Iso9283Plan
+    from truearm.iso9283.planning.result import Iso9283Plan
 
 #: What the standard asks to be noted with the results, and what a reader of them needs.
 _NOTED = (

@@ -46,7 +46,7 @@ class Names:
 class AttainedPoses:
     """Rows of ``poses.csv``: one attained pose each, in the instrument's frame."""
 
-    criterion: Names  #: Id of the test: a key of :data:`truearm.iso9283.plan.criteria.TESTS`.
+    criterion: Names  #: Id of the test: a key of :data:`truearm.iso9283.planning.criteria.TESTS`.
     #: robot, pose, approach: names; the robot's is empty where one robot was measured, the approach's where there is
     #: one alone.
     robot: Names

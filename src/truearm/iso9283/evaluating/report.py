@@ -30,10 +30,10 @@ from truearm.iso9283.criteria.paths import PathDeviations
 from truearm.iso9283.criteria.runs import Run
 from truearm.iso9283.criteria.streams import FoundStream
 from truearm.iso9283.criteria.velocity import VelocityCurves
-from truearm.iso9283.evaluate.comparison import Comparison, Course, key_of
-from truearm.iso9283.evaluate.evaluation import Evaluation
-from truearm.iso9283.evaluate.figures import pose_pictures, thinned
-from truearm.iso9283.evaluate.table import (
+from truearm.iso9283.evaluating.comparison import Comparison, Course, key_of
+from truearm.iso9283.evaluating.evaluation import Evaluation
+from truearm.iso9283.evaluating.figures import pose_pictures, thinned
+from truearm.iso9283.evaluating.table import (
     HEADING,
     UNITS,
     beside_words,
@@ -43,11 +43,11 @@ from truearm.iso9283.evaluate.table import (
     test_name,
     worst_places,
 )
-from truearm.iso9283.plan.criteria import TESTS
+from truearm.iso9283.planning.criteria import TESTS
 
 if TYPE_CHECKING:
     from truearm.iso9283.criteria.rows import Component, Value
-    from truearm.iso9283.evaluate.evaluate import Iso9283Evaluation
+    from truearm.iso9283.evaluating.evaluate import Iso9283Evaluation
 
 
 #: A corner is drawn so many times the largest of its deviations about it.

@@ -15,7 +15,7 @@ from truearm.engine.data.readers.rows import unit_quaternions
 from truearm.engine.data.readers.sheets import Columns, named_columns, read_named
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import rotation_from_quaternion
-from truearm.iso9283.plan.records import AttainedPoses, Names, Pushes, resolution_of
+from truearm.iso9283.planning.records import AttainedPoses, Names, Pushes, resolution_of
 
 #: Of drift, whose groups have the same cycles again.
 DRIFT: Final = "dAP"

@@ -130,7 +130,7 @@ class PlannedPath:
 class PlannedTest:
     """One test: where, how often and under what."""
 
-    id: str  #: A key of :data:`truearm.iso9283.plan.criteria.TESTS`.
+    id: str  #: A key of :data:`truearm.iso9283.planning.criteria.TESTS`.
     places: tuple[str, ...]  #: Names of poses or paths.
     cycles: int  #: How often each.
     velocities: tuple[float, ...] = (1.0,)  #: Shares of the rated velocity, 0 to 1.

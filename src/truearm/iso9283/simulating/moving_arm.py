@@ -20,7 +20,7 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, quaternion_from_rotation, rotation_from_vector, rotation_vector
 from truearm.engine.twin.twin import REFERENCE_TEMPERATURE, Twin
 from truearm.engine.twin.twin_joint import PERFECT
-from truearm.iso9283.plan.criteria import TURNS, PlannedPath, weave_corners
+from truearm.iso9283.planning.criteria import TURNS, PlannedPath, weave_corners
 
 #: What a joint of the arm turns by under the moment of the rated load at the tip, in the middle of all robots [rad].
 #: Joint 2 of an IRB 120 turns by 0.0005, joint 3 by 0.002 (Nubiola, Table 2.7); larger arms are stiffer for their load.

@@ -11,9 +11,9 @@ from truearm.engine.base.errors import Notice, counted, millimetres
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.document.records import Record, notice_lines, notice_summaries
 from truearm.engine.robot.robot_file.writing import robot_text
-from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, PlannedTest
-from truearm.iso9283.plan.plan_file import PLAN, ROBOT, plan_text
-from truearm.iso9283.plan.routes import SLOW_RUN
+from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, PlannedTest
+from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text
+from truearm.iso9283.planning.routes import SLOW_RUN
 
 #: What the operator takes along.
 SHEET: Final = "sheet.html"
@@ -102,7 +102,7 @@ class Iso9283Plan(Record):
 
     def contents(self) -> dict[str, str]:
         """Return the texts of all files by their names."""
-        from truearm.iso9283.plan.sheet import iso9283_sheet
+        from truearm.iso9283.planning.sheet import iso9283_sheet
 
         found = {PLAN: plan_text(self.plan), ROBOT: robot_text(self.plan.robot), SHEET: iso9283_sheet(self)}
         if self.programs is not None:

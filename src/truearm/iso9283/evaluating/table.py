@@ -11,10 +11,10 @@ from truearm.engine.base.errors import Notice, counted
 from truearm.iso9283.criteria.compliance import WildPush
 from truearm.iso9283.criteria.rows import Conditions, CopiedBlock, Cycles, Quantity, Value
 from truearm.iso9283.criteria.wild_rows import Kind, TwoPlaces, WildRow
-from truearm.iso9283.evaluate.comparison import Entry, ResultFile
-from truearm.iso9283.evaluate.doubts import other_cube
-from truearm.iso9283.evaluate.evaluation import Evaluation
-from truearm.iso9283.plan.criteria import CRITERIA, TEST_OF, TESTS, PerformancePlan
+from truearm.iso9283.evaluating.comparison import Entry, ResultFile
+from truearm.iso9283.evaluating.doubts import other_cube
+from truearm.iso9283.evaluating.evaluation import Evaluation
+from truearm.iso9283.planning.criteria import CRITERIA, TEST_OF, TESTS, PerformancePlan
 
 #: Unit of each kind of number at the edges, and how many of it one SI unit is.
 UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {

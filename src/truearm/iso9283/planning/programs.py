@@ -48,10 +48,10 @@ from truearm.engine.robot.inverse.branches import branch_rule
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import homogeneous
-from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, PlannedPose, PlannedTest, visited
-from truearm.iso9283.plan.plan_file import plan_text
-from truearm.iso9283.plan.result import WrittenPrograms
-from truearm.iso9283.plan.routes import SLOW_RUN, Route, Routes, check_slow_run, slow_run_text
+from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, PlannedPose, PlannedTest, visited
+from truearm.iso9283.planning.plan_file import plan_text
+from truearm.iso9283.planning.result import WrittenPrograms
+from truearm.iso9283.planning.routes import SLOW_RUN, Route, Routes, check_slow_run, slow_run_text
 
 # A program begins and ends in P1, slowly. Before each measured pose the robot stops, and stands for the dwell.
 

@@ -16,7 +16,7 @@ from truearm.engine.base.errors import InputError, Words, shortened
 from truearm.engine.base.files import read_text
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.rows import Component, Status
-from truearm.iso9283.plan.criteria import TEST_OF, TESTS, PerformancePlan
+from truearm.iso9283.planning.criteria import TEST_OF, TESTS, PerformancePlan
 
 #: Places are the same within this length [mm], and turns within this entry of their matrices.
 _SAME_LENGTH: Final = 1e-2

@@ -14,8 +14,8 @@ from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.poses import PoseCloud
 from truearm.iso9283.criteria.runs import scatter_of
 from truearm.iso9283.criteria.settling import SettlingCurve
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import Pushes
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import Pushes
 
 #: A tip may rest beside its command by this share of the cube's side, and in small cubes by this length [m].
 _BESIDE: Final = 0.1

@@ -29,10 +29,10 @@ from truearm.engine.robot.wrench import STANDARD_GRAVITY
 from truearm.engine.twin.gear_errors import DRAWN
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin
-from truearm.iso9283.plan.criteria import PerformancePlan
-from truearm.iso9283.plan.records import forces_text, poses_text, samples_text
-from truearm.iso9283.simulate.cell import ROBOTS, Corrected, SimulatedCampaign, Tracker, TrueRobot, simulated_campaign
-from truearm.iso9283.simulate.moving_arm import drawn_compliance
+from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.records import forces_text, poses_text, samples_text
+from truearm.iso9283.simulating.cell import ROBOTS, Corrected, SimulatedCampaign, Tracker, TrueRobot, simulated_campaign
+from truearm.iso9283.simulating.moving_arm import drawn_compliance
 
 if TYPE_CHECKING:
     from truearm.iso9283.jobs import SimulateTests
@@ -222,7 +222,7 @@ def _plan(plan: object) -> PerformancePlan:
     if isinstance(plan, PerformancePlan):
         return plan
     if isinstance(plan, str | Path):
-        from truearm.iso9283.plan.plan_file import read_plan
+        from truearm.iso9283.planning.plan_file import read_plan
 
         path = path_argument(plan, "plan")
         with refusals_of("plan"):

@@ -21,9 +21,9 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.transform import Transform, homogeneous, rotation_from_quaternion, rotation_from_vector
 from truearm.engine.robot.wrench import STANDARD_GRAVITY
 from truearm.engine.twin.twin import Twin
-from truearm.iso9283.plan.criteria import PerformancePlan, PlannedTest
-from truearm.iso9283.plan.records import AttainedPoses, Names, Pushes, Samples
-from truearm.iso9283.simulate.moving_arm import (
+from truearm.iso9283.planning.criteria import PerformancePlan, PlannedTest
+from truearm.iso9283.planning.records import AttainedPoses, Names, Pushes, Samples
+from truearm.iso9283.simulating.moving_arm import (
     DRIVES,
     WARMING,
     Drives,
@@ -180,7 +180,7 @@ class TrueRobot:
 
     twin: Twin  #: Its truth, where it stands in the instrument's frame.
     tip: Transform  #: Where the tip is on its flange.
-    compliance: tuple[float, ...] = ()  #: As :class:`truearm.iso9283.simulate.moving_arm.MovingArm` has it.
+    compliance: tuple[float, ...] = ()  #: As :class:`truearm.iso9283.simulating.moving_arm.MovingArm` has it.
 
 
 class Cell:
@@ -188,7 +188,7 @@ class Cell:
 
     Args:
         plan, robots, base, tracker, rng, corrected, drives, warming: As for
-            :func:`truearm.iso9283.simulate.cell.simulated_campaign`.
+            :func:`truearm.iso9283.simulating.cell.simulated_campaign`.
     """
 
     def __init__(

@@ -27,8 +27,8 @@ from truearm.engine.data.readers.canonical import refuse_other_separators
 from truearm.engine.data.readers.rows import unit_quaternions
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import rotation_from_quaternion
-from truearm.iso9283.evaluate.reading import refuse_out_of_order
-from truearm.iso9283.plan.records import Names, Samples, resolution_of
+from truearm.iso9283.evaluating.reading import refuse_out_of_order
+from truearm.iso9283.planning.records import Names, Samples, resolution_of
 
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
@@ -43,7 +43,7 @@ _LARGEST: Final = 1e6
 
 Place = Literal["path", "pose"]
 #: Tests of which each file has rows, by what it has in place of a path: ids of
-#: :data:`truearm.iso9283.plan.criteria.TESTS`.
+#: :data:`truearm.iso9283.planning.criteria.TESTS`.
 TESTS_OF: Final[dict[Place, tuple[str, ...]]] = {
     "path": ("AT", "AT-reorientation", "CR", "AV", "WS"),
     "pose": ("t", "posing-time"),

@@ -20,11 +20,11 @@ from truearm.engine.motion.touring import cell_notices
 from truearm.engine.programs import PROGRAM_LANGUAGES
 from truearm.engine.robot.library.wider_limits import wider_limits_notices
 from truearm.engine.robot.robot import Robot
-from truearm.iso9283.plan.choosing import performance_plan
-from truearm.iso9283.plan.criteria import TEST_OF, TESTS
-from truearm.iso9283.plan.plan_file import PLAN, read_cube
-from truearm.iso9283.plan.programs import refuse_losing_slow_run, refuse_stale, stated_cell, written_programs
-from truearm.iso9283.plan.result import PLAN_FILES, Iso9283Plan
+from truearm.iso9283.planning.choosing import performance_plan
+from truearm.iso9283.planning.criteria import TEST_OF, TESTS
+from truearm.iso9283.planning.plan_file import PLAN, read_cube
+from truearm.iso9283.planning.programs import refuse_losing_slow_run, refuse_stale, stated_cell, written_programs
+from truearm.iso9283.planning.result import PLAN_FILES, Iso9283Plan
 
 if TYPE_CHECKING:
     from truearm.iso9283.jobs import PlanTests

@@ -23,7 +23,7 @@ from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
 from truearm.engine.robot.inverse.kinematics import inverse
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rotation_from_vector
-from truearm.iso9283.plan.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest, Way
+from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, PlannedPath, PlannedPose, PlannedTest, Way
 
 #: Of the joints that the arm has at least, so that it keeps an orientation along a path.
 _LEAST_JOINTS: Final = 6
@@ -81,7 +81,7 @@ def performance_plan(
     Args:
         robot: The nominal arm.
         target: Name of the target that is measured; the flange if None.
-        tests: Keys of :data:`truearm.iso9283.plan.criteria.TESTS`.
+        tests: Keys of :data:`truearm.iso9283.planning.criteria.TESTS`.
         cube: In which the poses lie; None for the largest that the arm can be tested in, by all tests.
         plane: Which of its diagonal planes.
         rotation: Orientation of the tip at all poses, in the base frame, ``(3, 3)``; None for the one that allows most.

@@ -283,6 +283,14 @@ class IntoFile(Request):
     )
 
 
+class MayWrite(Request):
+    """What writes a file if one is named."""
+
+    out: str | Path | None = option(
+        File("FILE"), "File to write.", default=None, shown="none is written", repeated=False
+    )
+
+
 class IntoFolder(Request):
     """What writes files into a folder."""
 

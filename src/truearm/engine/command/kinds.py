@@ -74,6 +74,20 @@ class File(Given):
         return value
 
 
+class Files(Given):
+    """A file or several, which the job itself reads."""
+
+    typed = list[str]
+
+    def read(self, typed: Any, name: str) -> Any:
+        """Return the files, None for none."""
+        return typed or None
+
+    def typed_again(self, value: Any) -> list[str]:
+        """Return each of them."""
+        return [*map(str, value)] if isinstance(value, list | tuple) else [str(value)]
+
+
 class Flag(Given):
     """Yes or no; the command has its word alone."""
 

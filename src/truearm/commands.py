@@ -25,7 +25,7 @@ from truearm.engine.base.version import __version__
 from truearm.engine.command.options import CommandError, Commands, add, by_device
 from truearm.fleets.command import fleet
 from truearm.hexapod.command import app as hexapod
-from truearm.importing.command import guess, matrices, robodk, sockets, table
+from truearm.importing.jobs import GuessMapping, ImportMatrices, ImportRoboDK, ImportSockets, ImportTable
 from truearm.inclinometers.command import plan_pairs, simulate_readings, tilting
 from truearm.iso9283.command import app as iso9283
 from truearm.measuring.command import measure
@@ -69,12 +69,9 @@ importing = Commands(
     help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
     no_args_is_help=True,
 )
-importing.command()(matrices)
-importing.command()(table)
-importing.command()(guess)
-importing.command()(robodk)
+add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK)
 importing.command()(circle)
-importing.command()(sockets)
+add(importing, ImportSockets)
 importing.command("hand-eye")(hand_eye)
 importing.command("ur-kinematics")(ur_kinematics)
 importing.command()(ros)

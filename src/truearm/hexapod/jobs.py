@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.command.groups import Drawn, IntoFile, JointsWritten, MayWrite, OfRobot
+from truearm.engine.command.groups import AlsoIntoFile, Drawn, IntoFile, JointsWritten, OfRobot
 from truearm.engine.command.kinds import File, Files, Flag, Given, Names, Number, Numbers, Text, Whole
 from truearm.engine.command.request import Request, job, option, required
 
@@ -146,7 +146,7 @@ class PlanHexapod(OfRobot, _WithTool, JointsWritten, IntoFile):
         return planned(self)
 
 
-class SolveCups(_Ranged, MayWrite):
+class SolveCups(_Ranged, AlsoIntoFile):
     """Find the tool's cups from measured lengths, in the frame of the base fixture.
 
     Writes the cups of sheets as measurements, for 'truearm calibrate'.

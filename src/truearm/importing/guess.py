@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ruamel.yaml import YAML
 
@@ -47,6 +47,9 @@ from truearm.importing.meanings import (
     time_among,
     unit_of,
 )
+
+if TYPE_CHECKING:
+    from truearm.importing.jobs import GuessMapping
 
 _NUMBERED: Final = re.compile("(.*?)[0-9]{1,9}")
 
@@ -473,27 +476,12 @@ class GuessedMapping(Record):
         return text
 
 
-def import_guess(file: str | Path, *, out: str | Path | None = None) -> GuessedMapping:
-    """Look at a table and write the mapping file that it seems to need; nothing is imported.
-
-    Every guess is marked, and `import_table` refuses the mapping until somebody has written ``confirmed: yes`` into it.
-
-    Parameters
-    ----------
-    file
-        A CSV, another delimited text, or an Excel workbook.
-    out
-        Mapping file to write, which must not exist yet; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If the file does not look like a table of measurements.
-    """
-    table = path_argument(file, "file")
-    target = None if out is None else new_file(file_for(out, table))
+def guessed_mapping(asked: GuessMapping) -> GuessedMapping:
+    """Guess the mapping of a table, and write it into a file that does not exist yet."""
+    table = path_argument(asked.file, "file")
+    out = None if asked.out is None else new_file(file_for(asked.out, table))
     with refusals_of("file"):
         guessed = guess_mapping(table)
-    if target is not None:
-        write_text(target, guessed.text)
-    return GuessedMapping(guessed, target)
+    if out is not None:
+        write_text(out, guessed.text)
+    return GuessedMapping(guessed, out)

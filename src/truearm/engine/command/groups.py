@@ -283,8 +283,8 @@ class IntoFile(Request):
     )
 
 
-class MayWrite(Request):
-    """What writes a file if one is named."""
+class AlsoIntoFile(Request):
+    """What writes a file where one is asked for."""
 
     out: str | Path | None = option(
         File("FILE"), "File to write.", default=None, shown="none is written", repeated=False

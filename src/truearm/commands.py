@@ -19,7 +19,7 @@ from truearm.board.command import hand_eye
 from truearm.calibration.calibrate import Calibrate
 from truearm.checking.command import check
 from truearm.compensation.command import compensate, path
-from truearm.drawn_circle.command import circle
+from truearm.drawn_circle.import_circle import ImportCircle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
 from truearm.engine.command.options import CommandError, Commands, add, by_device
@@ -69,9 +69,7 @@ importing = Commands(
     help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
     no_args_is_help=True,
 )
-add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK)
-importing.command()(circle)
-add(importing, ImportSockets)
+add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK, ImportCircle, ImportSockets)
 importing.command("hand-eye")(hand_eye)
 importing.command("ur-kinematics")(ur_kinematics)
 importing.command()(ros)

@@ -92,8 +92,8 @@ class ImportTable(_OfTable, JointsGiven, IntoFile):
 class GuessMapping(_OfTable, IntoFile):
     """Look at a table and write the mapping that it seems to need, for you to confirm. Nothing is imported.
 
-    Every guess is marked, and the mapping is refused until somebody has written confirmed: yes into it. A file that exists
-    is not overwritten.
+    Every guess is marked, and the mapping is refused until somebody has written confirmed: yes into it. A file
+    that exists is not overwritten.
     """
 
     job = "import_guess"

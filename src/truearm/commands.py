@@ -15,7 +15,7 @@ from typer.models import CommandInfo
 
 from truearm.axis_circles.command import axes
 from truearm.bags.command import ros
-from truearm.board.command import hand_eye
+from truearm.board.import_hand_eye import ImportHandEye
 from truearm.calibration.calibrate import Calibrate
 from truearm.checking.command import check
 from truearm.compensation.command import compensate, path
@@ -69,8 +69,7 @@ importing = Commands(
     help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
     no_args_is_help=True,
 )
-add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK, ImportCircle, ImportSockets)
-importing.command("hand-eye")(hand_eye)
+add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK, ImportCircle, ImportSockets, ImportHandEye)
 importing.command("ur-kinematics")(ur_kinematics)
 importing.command()(ros)
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from ruamel.yaml import YAML
 
-from truearm.board.import_hand_eye import read_hand_eye
+from truearm.board.readings import read_hand_eye
 from truearm.drawn_circle.pages import Page, read_drawn_circles
 from truearm.engine.base.errors import InputError
 from truearm.engine.choosing.zones import boxes_of, read_zones

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Final
 from truearm.engine.base.errors import InputError, Words, wrong_kind
 
 #: Units at the edges, and the one in Python of each that is another there.
-_IN_PYTHON: Final = {"mm": "m", "deg": "rad", "mm/s": "m/s"}
+_IN_PYTHON: Final = {"mm": "m", "deg": "rad", "mm/s": "m/s", "ppm": "1"}
 
 
 class Kind:

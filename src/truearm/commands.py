@@ -14,7 +14,7 @@ from typer.main import get_command_name
 from typer.models import CommandInfo
 
 from truearm.axis_circles.command import axes
-from truearm.bags.command import ros
+from truearm.bags.import_ros import ImportRos
 from truearm.board.import_hand_eye import ImportHandEye
 from truearm.calibration.calibrate import Calibrate
 from truearm.checking.command import check
@@ -71,7 +71,7 @@ importing = Commands(
 )
 add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK, ImportCircle, ImportSockets, ImportHandEye)
 importing.command("ur-kinematics")(ur_kinematics)
-importing.command()(ros)
+add(importing, ImportRos)
 
 app.command()(check)
 add(app, Calibrate)

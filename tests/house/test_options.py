@@ -85,7 +85,23 @@ def test_an_option_is_declared_once() -> None:
 
 
 #: Names and words of the command that mean several things, still.
-TWICE = ("ahead", "angle_unit", "base", "file", "joints", "out", "plan", "sigma", "target", "tool", "--target")
+TWICE = (
+    *(
+        "ahead",
+        "angle_unit",
+        "base",
+        "file",
+        "hold",
+        "joints",
+        "out",
+        "plan",
+        "references",
+        "sigma",
+        "target",
+        "targets",
+    ),
+    *("tool", "--joints", "--target"),
+)
 
 
 def test_units_are_those_at_the_edges() -> None:

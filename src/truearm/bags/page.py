@@ -11,7 +11,7 @@ from truearm.engine.document.drawing import HUES, Panel, line, panels, significa
 from truearm.engine.document.page import Drawing, Figures, picture_page
 
 if TYPE_CHECKING:
-    from truearm.bags.import_ros import ImportedBag
+    from truearm.bags.result import ImportedBag
     from truearm.bags.standstills import Recording
     from truearm.engine.document.drawing import Figure
     from truearm.engine.robot.chain import Array

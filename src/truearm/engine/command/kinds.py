@@ -396,6 +396,7 @@ class NamedFiles(Given):
     """Files by name."""
 
     typed = list[str]
+    what: ClassVar[str] = "file"
 
     def check(self, value: Any, name: str) -> Any:
         """Refuse what are no paths by name."""
@@ -409,7 +410,8 @@ class NamedFiles(Given):
         for text in typed:
             key, given, file = text.partition("=")
             if not key or not given or not file:
-                raise InputError("a name and a file belong here", parameter=name, came=text, allowed="NAME=FILE")
+                allowed = f"NAME={self.what.upper()}"
+                raise InputError(f"a name and a {self.what} belong here", parameter=name, came=text, allowed=allowed)
             if key in named:
                 raise InputError("this name is given twice", parameter=name, came=key)
             named[key] = file

@@ -13,7 +13,7 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from truearm.axis_circles.command import axes
+from truearm.axis_circles.axes import Axes
 from truearm.bags.import_ros import ImportRos
 from truearm.board.import_hand_eye import ImportHandEye
 from truearm.calibration.calibrate import Calibrate
@@ -84,7 +84,7 @@ app.command()(by_device(plan, {"inclinometers": plan_pairs}))
 app.command()(measure)
 app.command()(poses)
 app.command()(path)
-app.command()(axes)
+add(app, Axes)
 app.command()(tolerance)
 app.command()(lines)
 app.command()(influence)

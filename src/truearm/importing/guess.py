@@ -260,24 +260,7 @@ def _write_labels(
     time = time_among(left.columns)
     left.take([] if time is None else time.columns)
     label, target, pattern = _names(left, several)
-    if pattern is not None and label is not None:
-        text.add(
-            "names", "", "the names have parts between ::", f"names: {{column: {named(label)}, pattern: '{pattern}'}}"
-        )
-    elif label is not None:
-        because = "its name or its texts"
-        if label.is_numeric:
-            because += "; whole numbers tell the order of measurement"
-        if target is None and not several and label.distinct < len(label.texts):
-            because += "; rows with the same label count as repeated readings of one target"
-        text.add("configuration", "", because, f"configuration: {{column: {named(label)}}}")
-    else:
-        text.add(
-            "configuration",
-            "",
-            "no column looks like a label; rows then count as measured in their order",
-            "configuration: {each: row}",
-        )
+    _write_label(text, label, target, pattern, several=several)
     every = [column for three in positions.values() for column in three]
     if (visit := None if label is None else _visit(left, label, target)) is not None:
         text.add("visit", f"{{column: {named(visit)}}}", "its name; labels come again with another number")
@@ -329,6 +312,30 @@ def _write_labels(
         value = f"{{column: {named(temperature)}, unit: {quoted(unit)}}}"
         text.add("temperature", value, "its name")
     _write_order(text, label, time, pattern)
+
+
+def _write_label(
+    text: MappingText, label: Column | None, target: Column | None, pattern: str | None, *, several: bool
+) -> None:
+    """Write where the labels of configurations are."""
+    if pattern is not None and label is not None:
+        text.add(
+            "names", "", "the names have parts between ::", f"names: {{column: {named(label)}, pattern: '{pattern}'}}"
+        )
+    elif label is not None:
+        because = "its name or its texts"
+        if label.is_numeric:
+            because += "; whole numbers tell the order of measurement"
+        if target is None and not several and label.distinct < len(label.texts):
+            because += "; rows with the same label count as repeated readings of one target"
+        text.add("configuration", "", because, f"configuration: {{column: {named(label)}}}")
+    else:
+        text.add(
+            "configuration",
+            "",
+            "no column looks like a label; rows then count as measured in their order",
+            "configuration: {each: row}",
+        )
 
 
 def _write_orientation(

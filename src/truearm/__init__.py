@@ -42,11 +42,11 @@ if TYPE_CHECKING:
     from truearm.hexapod.jobs import hexapod_solve as hexapod_solve
     from truearm.hexapod.jobs import hexapod_uncertainty as hexapod_uncertainty
     from truearm.hexapod.jobs import hexapod_world_frame as hexapod_world_frame
-    from truearm.importing.files import import_matrices as import_matrices
-    from truearm.importing.files import import_robodk as import_robodk
-    from truearm.importing.files import import_sockets as import_sockets
-    from truearm.importing.files import import_table as import_table
-    from truearm.importing.guess import import_guess as import_guess
+    from truearm.importing.jobs import import_guess as import_guess
+    from truearm.importing.jobs import import_matrices as import_matrices
+    from truearm.importing.jobs import import_robodk as import_robodk
+    from truearm.importing.jobs import import_sockets as import_sockets
+    from truearm.importing.jobs import import_table as import_table
     from truearm.inclinometers.pairs import plan_inclinometers as plan_inclinometers
     from truearm.inclinometers.pairs import simulate_inclinometers as simulate_inclinometers
     from truearm.inclinometers.tilting import tilting as tilting
@@ -83,12 +83,12 @@ JOBS: Final = {
     "load_robot": "truearm.engine.command.loading",
     "show": "truearm.robot_files.show",
     "load_data": "truearm.engine.command.loading",
-    "import_table": "truearm.importing.files",
-    "import_guess": "truearm.importing.guess",
-    "import_matrices": "truearm.importing.files",
-    "import_robodk": "truearm.importing.files",
+    "import_table": "truearm.importing.jobs",
+    "import_guess": "truearm.importing.jobs",
+    "import_matrices": "truearm.importing.jobs",
+    "import_robodk": "truearm.importing.jobs",
     "import_circle": "truearm.drawn_circle.import_circle",
-    "import_sockets": "truearm.importing.files",
+    "import_sockets": "truearm.importing.jobs",
     "import_hand_eye": "truearm.board.import_hand_eye",
     "import_ros": "truearm.bags.import_ros",
     "import_ur_kinematics": "truearm.robot_files.import_ur_kinematics",

@@ -13,19 +13,19 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from truearm.axis_circles.command import axes
-from truearm.bags.command import ros
-from truearm.board.command import hand_eye
+from truearm.axis_circles.axes import Axes
+from truearm.bags.import_ros import ImportRos
+from truearm.board.import_hand_eye import ImportHandEye
 from truearm.calibration.calibrate import Calibrate
 from truearm.checking.command import check
 from truearm.compensation.command import compensate, path
-from truearm.drawn_circle.command import circle
+from truearm.drawn_circle.import_circle import ImportCircle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
 from truearm.engine.command.options import CommandError, Commands, add, by_device, command_of
 from truearm.fleets.fleet import CalibrateFleet
 from truearm.hexapod.command import app as hexapod
-from truearm.importing.command import guess, matrices, robodk, sockets, table
+from truearm.importing.jobs import GuessMapping, ImportMatrices, ImportRoboDK, ImportSockets, ImportTable
 from truearm.inclinometers.command import plan_pairs, simulate_readings, tilting
 from truearm.iso9283.command import app as iso9283
 from truearm.measuring.command import measure
@@ -71,15 +71,9 @@ importing = Commands(
     help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
     no_args_is_help=True,
 )
-importing.command()(matrices)
-importing.command()(table)
-importing.command()(guess)
-importing.command()(robodk)
-importing.command()(circle)
-importing.command()(sockets)
-importing.command("hand-eye")(hand_eye)
+add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK, ImportCircle, ImportSockets, ImportHandEye)
 importing.command("ur-kinematics")(ur_kinematics)
-importing.command()(ros)
+add(importing, ImportRos)
 
 app.command()(check)
 add(app, Calibrate)
@@ -92,7 +86,7 @@ app.command()(by_device(plan, {"inclinometers": plan_pairs}))
 app.command()(measure)
 app.command()(poses)
 app.command()(path)
-app.command()(axes)
+add(app, Axes)
 app.command()(tolerance)
 app.command()(lines)
 app.command()(influence)

@@ -10,8 +10,8 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.engine.robot.test_joint_errors import with_table_3
 
-from truearm.axis_circles.axes import AxisCalibration
 from truearm.axis_circles.fit import NORMAL_95, AxisAnalysis, AxisProblem, analyse, axis_circles, fit_axes
+from truearm.axis_circles.result import AxisCalibration
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of

@@ -16,7 +16,7 @@ from tests.house.examples import EXAMPLES
 
 import truearm
 from truearm import Dataset, InputError
-from truearm.axis_circles.axes import AxisCalibration
+from truearm.axis_circles.result import AxisCalibration
 from truearm.engine.base.manifest import MANIFEST
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.robot.transform import IDENTITY
@@ -120,8 +120,6 @@ lines: Callable[..., Any] = partial(truearm.lines, "kr5")
     [
         (lambda: truearm.axes(42, "a.csv"), "robot", "a robot belongs here"),  # type: ignore[arg-type]
         (lambda: axes("missing.csv"), "data", "there is no such file"),
-        (lambda: axes("missing.csv", frame="rebot"), "frame", "Did you mean robot?"),
-        (lambda: axes("missing.csv", out=3), "out", "a path belongs here"),
         (lambda: tolerance("deep"), "depth", "6 numbers belong here"),
         (lambda: tolerance(True), "depth", "a number belongs here"),
         (lambda: tolerance(0.0), "depth", "a hole needs a depth"),

@@ -26,7 +26,7 @@ from tests.hand_eye import (
 )
 
 import truearm
-from truearm.board.import_hand_eye import ImportedHandEye, read_hand_eye
+from truearm.board.readings import ImportedHandEye, read_hand_eye
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text, read_csv
 from truearm.engine.data.statistics import errors_of

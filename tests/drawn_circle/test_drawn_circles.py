@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from truearm.drawn_circle.import_circle import Page, read_drawn_circles
+from truearm.drawn_circle.pages import Page, read_drawn_circles
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import csv_text, read_csv
 

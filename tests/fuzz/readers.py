@@ -10,8 +10,8 @@ from typing import Any, Final
 import numpy as np
 from ruamel.yaml import YAML
 
-from truearm.board.import_hand_eye import read_hand_eye
-from truearm.drawn_circle.import_circle import Page, read_drawn_circles
+from truearm.board.readings import read_hand_eye
+from truearm.drawn_circle.pages import Page, read_drawn_circles
 from truearm.engine.base.errors import InputError
 from truearm.engine.choosing.zones import boxes_of, read_zones
 from truearm.engine.command.loading import load_robot

@@ -15,10 +15,10 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, rigid_motion
 from truearm.engine.twin.twin import Twin
-from truearm.hexapod.jobs import HexapodPlan
 from truearm.hexapod.places import plain_frame
 from truearm.hexapod.reachable import reachable_at_places, with_cups
 from truearm.hexapod.rehearsal import ToolChanger, ballbar, filled_sheet, locked_cups
+from truearm.hexapod.results import HexapodPlan
 from truearm.hexapod.sheet import PlannedRow
 
 PLACES = (Transform((0.2268, 0.0, 0.3)), Transform((0.05, 0.25, 0.3), (np.cos(0.2), 0.0, 0.0, np.sin(0.2))))

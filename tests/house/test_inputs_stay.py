@@ -15,7 +15,7 @@ from tests.performance_plan import small_plan
 
 import truearm
 from truearm import JOBS
-from truearm.axis_circles.axes import AXIS_FILES
+from truearm.axis_circles.result import AXIS_FILES
 from truearm.calibration.result import RESULT_FILES
 from truearm.compensation.path import MOTION
 from truearm.compensation.path import REPORT as PATH_REPORT

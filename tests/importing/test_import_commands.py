@@ -56,7 +56,7 @@ def test_hand_eye_that_cannot_be(truearm: Truearm, tmp_path: Path) -> None:
     )
     assert (named.code, "--board: a board is named" in named.err) == (2, True)
     scale = truearm("import", "hand-eye", file, "--on-flange", "camera", "--scale-sigma", "0", "--out", out)
-    assert (scale.code, "--scale-sigma: the standard deviation of a scale" in scale.err) == (2, True)
+    assert (scale.code, "--scale-sigma: the number is out of range" in scale.err) == (2, True)
 
 
 def test_a_guess_is_confirmed_and_imported(truearm: Truearm, tmp_path: Path) -> None:

@@ -73,7 +73,6 @@ def test_joint_positions_of_the_controller_stay_the_controllers(tmp_path: Path) 
         ("ball", "25", r"no unit that fits is given; got '25'; allowed: 25mm"),
         ("ball", 0.0, r"the ball has no size; got '0 mm'; allowed: above 0 mm"),
         ("ball", "-3mm", r"the ball has no size"),
-        ("sigma", 0.0, r"the number is too small to be plausible"),
     ],
 )
 def test_what_sockets_cannot_be_is_refused(tmp_path: Path, name: str, value: object, words: str) -> None:

@@ -14,7 +14,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import csv_text, read_csv
 from truearm.engine.data.readers.table import read_noting, read_table
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_vector
-from truearm.importing.files import import_table
+from truearm.importing.jobs import import_table
 
 ROWS = "pose,q1,q2,ball,X,Y,Z,a,b,c\np,1,2,t,1,2,3,{}\n"
 

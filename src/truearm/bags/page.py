@@ -11,7 +11,7 @@ from truearm.engine.document.document import Document, Section, answer, pictured
 from truearm.engine.document.drawing import HUES, Panel, line, panels, significant
 
 if TYPE_CHECKING:
-    from truearm.bags.import_ros import ImportedBag
+    from truearm.bags.result import ImportedBag
     from truearm.bags.standstills import Recording
     from truearm.engine.document.drawing import Figure
     from truearm.engine.robot.chain import Array

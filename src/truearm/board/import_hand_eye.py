@@ -1,294 +1,91 @@
-"""Measurements from a camera and a board, one of them on the flange: poses of the board in the camera, or pictures."""
+"""What an import of a camera and a board, one of them on the flange, is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from truearm.engine.base.errors import InputError, wrong_kind
+from truearm.engine.command.groups import IntoFile
+from truearm.engine.command.kinds import Choice, File, Given, Number
+from truearm.engine.command.request import job, option, required
 
-from truearm.board.pictures import Charuco, Lens, Views, of_deviations
-from truearm.engine.base.arrays import finite_number
-from truearm.engine.base.errors import InputError, counted, refusals_of, wrong_kind
-from truearm.engine.base.files import path_argument
-from truearm.engine.base.units import LENGTH_UNITS, SMALL_ANGLE_UNITS
-from truearm.engine.base.writing import write_text
-from truearm.engine.command.arguments import choice_argument, file_for, length_argument
-from truearm.engine.data.dataset import Dataset
-from truearm.engine.data.readers.canonical import csv_text
-from truearm.engine.data.readers.cells import Cells
-from truearm.engine.data.readers.rows import Configurations, in_order, unit_quaternions
-from truearm.engine.data.readers.sheets import (
-    Columns,
-    columns_beside_joints,
-    configurations_of,
-    read_named,
-    refuse_repeated,
-)
-from truearm.engine.document.records import Record
-from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion
-
-#: What is on the flange, and what the target is called then.
-ON_FLANGE: Final = {"camera": "camera", "board": "board"}
-OnFlange = Literal["camera", "board"]
-
-_POSITION: Final = ("x", "y", "z")
-_QUATERNION: Final = ("qw", "qx", "qy", "qz")
-_DEVIATIONS: Final = ("sigma", "sigma_rot")
-_OF_POSES: Final = (
-    {"configuration": "configuration"}
-    | {axis: f"{axis} [mm]" for axis in _POSITION}
-    | {part: part for part in _QUATERNION}
-    | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]"}
-)
-_OF_PICTURES: Final = {"configuration": "configuration", "picture": "picture"}
-_UNITS: Final = dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS) | {"sigma_rot": SMALL_ANGLE_UNITS}
+if TYPE_CHECKING:
+    from truearm.board.readings import ImportedHandEye, OnFlange
 
 
-@dataclass(frozen=True, eq=False)
-class HandEyeReadings:
-    """What a camera saw of a board, as readings of what is on the flange."""
+class _Board(Given):
+    """A ChArUco board, as a text."""
 
-    data: Dataset  #: Poses of the target ``camera`` in the board's frame, or of the target ``board`` in the camera's.
-    views: Views  #: The poses as they came, with the lens if pictures were read.
-    ahead: float  #: How far before the camera the target is [m]: a point of its axis; zero for a board on the flange.
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse a text that names no board."""
+        from truearm.board.pictures import Charuco
 
-
-def pictures_named(path: Path) -> tuple[Path, ...]:
-    """Return the pictures that a table names, none if it holds poses; their names count from its folder."""
-    cells = read_named(path)
-    if "picture" not in cells.names:
-        return ()
-    return tuple(path.parent / name for name in cells.texts(cells.names.index("picture")))
+        if not isinstance(value, str):
+            raise wrong_kind("a board belongs here", value, name, "a text: 14x10,25mm,18mm,5X5_250")
+        Charuco.of_text(value, name)
+        return value
 
 
-def read_hand_eye(
-    path: Path, on_flange: OnFlange, board: Charuco | None, ahead: float | None = None
-) -> HandEyeReadings:
-    """Read a table of poses of a board in a camera, or of pictures of it.
+class ImportHandEye(IntoFile):
+    """Poses of a board in a camera, one of them on the flange, or pictures that show it.
 
-    Args:
-        on_flange: What moves with the robot; the other one stands beside it.
-        board: What the pictures show; None for a table of poses.
-        ahead: How far before a camera on the flange the target is [m]; None for where the board was on average.
-
-    Raises:
-        InputError: If a column, a unit or a picture is missing, or a picture does not show the board.
+    They become poses of what is on the flange.
     """
-    cells = read_named(path)
-    if board is None:
-        columns = columns_beside_joints(cells, _OF_POSES, _UNITS, _DEVIATIONS)
-        found = configurations_of(cells, columns)
-        refuse_repeated(cells, found, "Each row is a pose of the board: give it a label of its own.")
-        views = _poses(cells, columns)
-    else:
-        from truearm.board.pictures import seen_in_pictures
 
-        columns = columns_beside_joints(cells, _OF_PICTURES, {})
-        found = configurations_of(cells, columns)
-        refuse_repeated(cells, found, "Each row is a picture of the board: give it a label of its own.")
-        views = seen_in_pictures([path.parent / name for name in cells.texts(columns["picture"][0])], board)
-    if on_flange != "camera":
-        ahead = 0.0
-    elif ahead is None:
-        ahead = views.point_ahead()
-    if on_flange == "camera":
-        places, turns, sigma, sigma_rot = views.camera_in_board(ahead)
-    else:
-        places, turns, sigma, sigma_rot = views.board_in_camera()
-    data = _dataset(str(path), found, ON_FLANGE[on_flange])
-    quaternion = quaternion_from_rotation(turns)
-    return HandEyeReadings(
-        replace(data, position=places, quaternion=quaternion, sigma=sigma, sigma_rot=sigma_rot), views, ahead
+    job = "import_hand_eye"
+    words = "import hand-eye"
+    refuses = "If a file cannot be used, or a picture does not show the board."
+    file: str | Path = required(
+        File("VIEWS.csv"),
+        "Joint positions, and poses or pictures of the board.",
+        kw_only=False,
+        more="With the columns ``configuration``, ``joint_1 [deg]`` .. or ``axis_1 [deg]`` .., and either the pose of "
+        "the board in the camera, ``x [mm]``, ``y [mm]``, ``z [mm]``, ``qw``, ``qx``, ``qy``, ``qz`` (and "
+        "``sigma [mm]``, ``sigma_rot [mrad]``), or ``picture``: files, named from the folder of the table.",
+    )
+    on_flange: OnFlange = required(
+        Choice(known=("camera", "board")),
+        "What moves with the robot; the other one stands beside it.",
+        kw_only=True,
+        word="on_flange",
+    )
+    board: str | None = option(
+        _Board("SQUARES,SIDE,MARKER,DICTIONARY"),
+        "The ChArUco board in the pictures: 14x10,25mm,18mm,5X5_250.",
+        default=None,
+        shown="the table holds poses",
+        more="Its squares, the sides of a square and of a marker, and the dictionary.",
+    )
+    scale_sigma: float | None = option(
+        Number("ppm", low=0.0, high=1e5, above=True),
+        "How well the size of the board is known, a deviation.",
+        default=None,
+        shown="taken as exact",
+        more="Of how much longer than named the lengths on the board are, or of the poses' own scale.",
+    )
+    ahead: float | None = option(
+        Number("mm", low=0.0),
+        "How far before the camera the target is; that of the first session for every later one.",
+        default=None,
+        shown="where the board was on average",
     )
 
-
-def _poses(cells: Cells, columns: Columns) -> Views:
-    there = [name for name in _DEVIATIONS if name in columns]
-    if len(there) == 1:
-        missing = next(name for name in _DEVIATIONS if name not in there)
-        raise InputError(
-            f"the column {missing} is missing",
-            where=f"{cells.source}, line {cells.header}",
-            came=there[0],
-            allowed="sigma and sigma_rot, or none of them",
-            cure=f"Add {_OF_POSES[missing]}, or leave {there[0]} out.",
-        )
-    position = np.column_stack([cells.numbers(*columns[axis]) for axis in _POSITION])
-    parts = np.column_stack([cells.numbers(*columns[part]) for part in _QUATERNION])
-    rotation = rotation_from_quaternion(unit_quaternions(parts, cells.source, cells.lines))
-    behind = np.flatnonzero(position[:, 2] <= 0.0)
-    if len(behind):
-        raise InputError(
-            "the board is behind the camera",
-            where=cells.place(int(behind[0]), columns["z"][0]),
-            came=cells.columns[columns["z"][0]][int(behind[0])],
-            allowed="above 0: z points from the camera to what it sees",
-            cure="Give poses of the board in the camera, T_camera_board, and not of the camera in the board.",
-        )
-    deviations = [cells.numbers(*columns[name], deviation=True) for name in there]
-    return of_deviations(rotation, position, *(deviations or (None, None)))
-
-
-def _dataset(source: str, found: Configurations, target: str) -> Dataset:
-    """Return the configurations, and a reading of one target at each, still empty."""
-    n = len(found.labels)
-    empty = Dataset(
-        source=source,
-        labels=found.labels,
-        joints=found.joints,
-        joint_kinds=found.kinds,
-        joints_are=found.joints_are,
-        targets=(target,),
-        configuration=np.arange(n),
-        target=np.zeros(n, dtype=np.intp),
-        position=np.full((n, 3), np.nan),
-        simulated=found.simulated,
-    )
-    return in_order(empty)
-
-
-def refuse_wrong_place(pictures: Sequence[Path], board: object) -> None:
-    """Refuse a board that is named where there are no pictures, and pictures of a board that is not."""
-    if pictures and board is None:
-        raise InputError(
-            "no board is named, and the table names pictures",
-            parameter="board",
-            allowed="its squares, their side, that of a marker, and the dictionary: 14x10,25mm,18mm,5X5_250",
-        )
-    if not pictures and board is not None:
-        raise InputError(
-            "a board is named, and the table names no pictures",
-            parameter="board",
-            came=board,
-            cure="Leave it out, or give a table with the column picture.",
-        )
-
-
-#: The lens as lines show it: what belongs together, and in which unit.
-_SHOWN: Final = ((("fx", "fy"), " px"), (("cx", "cy"), " px"), (("k1", "k2", "k3"), ""), (("p1", "p2"), ""))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ImportedHandEye(Record):
-    """A camera and a board, one of them on the flange, as poses of that one."""
-
-    data: Dataset  #: The measurements.
-    on_flange: str  #: ``camera`` or ``board``.
-    ahead: float  #: How far before the camera, on its axis, the target is [m]; zero for a board on the flange.
-    lens: Lens | None = None  #: Of the camera, where pictures were read.
-    out: Path | None = None  #: The canonical CSV file that holds the measurements; None if none was written.
-
-    @property
-    def sigma(self) -> float | None:
-        """Standard deviation of a coordinate of the target, root mean square [m]; None if it is not known."""
-        return None if self.data.sigma is None else float(np.sqrt(np.mean(self.data.sigma**2)))
-
-    @property
-    def sigma_rot(self) -> float | None:
-        """The same of a turn about an axis [rad]."""
-        return None if self.data.sigma_rot is None else float(np.sqrt(np.mean(self.data.sigma_rot**2)))
-
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        made: dict[str, Any] = {
-            "configurations": self.data.configurations,
-            "on_flange": self.on_flange,
-            "scale_sigma_ppm": None if self.data.scale_sigma is None else 1e6 * self.data.scale_sigma,
-            "ahead_mm": 1e3 * self.ahead,
-            "sigma_mm": None if self.sigma is None else 1e3 * self.sigma,
-            "sigma_rot_mrad": None if self.sigma_rot is None else 1e3 * self.sigma_rot,
-        }
-        if self.lens is not None:
-            made["lens"] = {
-                "values": dict(self.lens.values),
-                "deviations": dict(self.lens.deviations),
-                "noise_px": self.lens.noise,
-                "corners": list(self.lens.corners),
-            }
-        return made
-
-    def lines(self) -> list[str]:
-        """Return what was read."""
-        where = "" if self.out is None else f": {self.out}"
-        text = [f"{counted(self.data.configurations, 'configuration')}, target {self.data.targets[0]}{where}"]
-        if self.on_flange == "camera":
-            text.append(f"  the target is a point on the camera's axis, {1e3 * self.ahead:.1f} mm before it")
-        if self.sigma is not None and self.sigma_rot is not None:
-            text.append(f"  deviations {1e3 * self.sigma:.3f} mm a coordinate, {1e3 * self.sigma_rot:.3f} mrad an axis")
-        if self.data.scale_sigma is None:
-            text.append("  the board's size is taken as exact")
-        else:
-            text.append(f"  the board's size is known to {1e6 * self.data.scale_sigma:.3g} ppm")
-        if self.lens is not None:
-            text.append(f"  corners are off by {self.lens.noise:.2f} px, {min(self.lens.corners)} or more a picture")
-            for names, unit in _SHOWN:
-                digits = 1 if unit else 4
-                of = [f"{n} {self.lens.values[n]:.{digits}f} ({self.lens.deviations[n]:.{digits}f})" for n in names]
-                text.append(f"  lens: {', '.join(of)}{unit}")
-        return text
-
-
-def import_hand_eye(
-    file: str | Path,
-    *,
-    on_flange: OnFlange,
-    board: str | None = None,
-    scale_sigma: float | None = None,
-    ahead: float | None = None,
-    out: str | Path | None = None,
-) -> ImportedHandEye:
-    """Read where a camera saw a board, from poses or from pictures, as poses of what is on the flange.
-
-    Parameters
-    ----------
-    file
-        CSV with the columns ``configuration``, ``joint_1 [deg]`` .. or ``axis_1 [deg]`` .., and either the pose of the
-        board in the camera, ``x [mm]``, ``y [mm]``, ``z [mm]``, ``qw``, ``qx``, ``qy``, ``qz`` (and ``sigma [mm]``,
-        ``sigma_rot [mrad]``), or ``picture``: files, named from the folder of the table.
-    on_flange
-        ``camera``, the board standing beside the robot, or ``board``, the camera standing there.
-    board
-        The ChArUco board that the pictures show: ``14x10,25mm,18mm,5X5_250``, its squares, the sides of a square and of
-        a marker, and the dictionary. None for poses.
-    scale_sigma
-        Standard deviation of how much longer than named the lengths on the board are, or of the poses' own scale: 2e-4
-        for 200 ppm. None takes them as exact.
-    ahead
-        How far before the camera the point is that the data follow [m]; None for where the board was on average. A
-        later session of the same camera needs that of the first.
-    out
-        Canonical CSV file to write; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be used, or a picture does not show the board.
-    """
-    table = path_argument(file, "file")
-    choice_argument(on_flange, "on_flange", {name: name for name in ON_FLANGE})
-    if board is not None and not isinstance(board, str):
-        raise wrong_kind("a board belongs here", board, "board", "a text: 14x10,25mm,18mm,5X5_250")
-    named = None if board is None else Charuco.of_text(board)
-    with refusals_of("file"):
-        pictures = pictures_named(table)
-    refuse_wrong_place(pictures, board)
-    scale = None if scale_sigma is None else finite_number(scale_sigma, "scale_sigma", lowest=0.0)
-    if ahead is not None:
-        ahead = length_argument(ahead, "ahead", 0.0)
-        if on_flange != "camera":
+    def check(self) -> None:
+        """Refuse a point ahead of a camera that is not on the flange."""
+        if self.ahead is not None and self.on_flange != "camera":
             raise InputError(
                 "only a camera on the flange has a point ahead of it",
                 parameter="ahead",
-                came=f"{ahead * 1e3:g} mm",
+                came=f"{self.ahead * 1e3:g} mm",
                 cure="Leave it out.",
             )
-    target = None if out is None else file_for(out, table, *pictures)
-    with refusals_of("file"):
-        read = read_hand_eye(table, on_flange, named, ahead)
-    data = replace(read.data, scale_sigma=scale)
-    if target is not None:
-        write_text(target, csv_text(data))
-    return ImportedHandEye(data, on_flange, read.ahead, read.views.lens, target)
+
+    def run(self) -> ImportedHandEye:
+        """Import."""
+        from truearm.board.readings import of_views
+
+        return of_views(self)
+
+
+import_hand_eye = job(ImportHandEye)

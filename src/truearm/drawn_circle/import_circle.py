@@ -1,232 +1,89 @@
-"""Measurements from circles that the robot drew: scanned pages, and tables of what was read on the way round."""
+"""What an import of circles that the robot drew is asked for."""
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from truearm.engine.base.errors import InputError
+from truearm.engine.command.groups import IntoFile
+from truearm.engine.command.kinds import Given, NamedFiles, Number
+from truearm.engine.command.request import job, option, required
 
-from truearm.drawn_circle.scan import DrawnCircle, drawn_circle, read_circle
-from truearm.engine.base.arrays import finite_number
-from truearm.engine.base.errors import InputError, refusals_of
-from truearm.engine.base.files import read_text
-from truearm.engine.base.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
-from truearm.engine.base.writing import write_text
-from truearm.engine.command.arguments import deviation_argument, file_for, files_argument, numbers_argument
-from truearm.engine.data.dataset import Dataset
-from truearm.engine.data.readers.canonical import csv_text, refuse_other_separators
-from truearm.engine.data.readers.cells import Cells, Layout, read_cells
-from truearm.engine.data.readers.rows import Configurations, found_configurations, in_order
-from truearm.engine.document.records import ImportedCircles
-from truearm.engine.robot.urdf_writing import joint_names
-
-_HEADING: Final = re.compile(r"(configuration|(?:joint|axis)_[1-9][0-9]{0,3}|angle|height)\s*(?:\[([^\]]*)\])?")
-_ALLOWED: Final = "configuration, joint_1 [deg] .. or axis_1 [deg] .., angle [deg], height [mm]"
-#: How well the middle of a circle lies in its paper [m].
-_PAPER_DEVIATION: Final = 1e-5
+if TYPE_CHECKING:
+    from truearm.engine.document.records import ImportedCircles
 
 
-@dataclass(frozen=True)
-class Page:
-    """A page and what was read while the circle on it was drawn."""
+class _Dots(Given):
+    """Dots per inch: one number, or those along x and y."""
 
-    scan: Path  #: Image of the page.
-    #: CSV with the columns ``configuration``, ``joint_1 [deg]`` .. (or ``axis_1 [deg]`` .., as the controller shows
-    #: them), ``angle [deg]`` on the page and ``height [mm]`` over it.
-    points: Path
+    def check(self, value: Any, name: str) -> Any:
+        """Return one number or two."""
+        from truearm.engine.base.arrays import finite_number
+        from truearm.engine.command.arguments import numbers_argument
+
+        allowed = "a number above zero, or two"
+        if not isinstance(value, Sequence) or isinstance(value, str):
+            return finite_number(value, name, allowed=allowed)
+        return numbers_argument(value, name, 2, allowed)
+
+    def read(self, typed: Any, name: str) -> Any:
+        """Return the numbers of a text, a single one as it is."""
+        from truearm.engine.command.texts import read_numbers
+
+        found = read_numbers(typed, name, "a number, or X,Y")
+        return found[0] if len(found) == 1 else found
+
+    def typed_again(self, value: Any) -> list[str]:
+        """Return them with commas between."""
+        return [",".join(Number().typed_again(one)[0] for one in (value if isinstance(value, tuple) else (value,)))]
 
 
-def read_drawn_circles(
-    pages: Mapping[str, Page], dpi: float | tuple[float, float] | None = None, sigma: float | None = None
-) -> Dataset:
-    """Read drawn circles as distances from their centres and heights over their papers.
+class ImportCircle(IntoFile):
+    """Circles that the robot drew with a pencil: scanned pages and the potentiometer's readings."""
 
-    Args:
-        pages: By name.
-        dpi: Resolution of the scans, or that along x and that along y; what the files say if None.
-        sigma: Standard deviation of radius and height [m]; nothing is declared if None.
-
-    Returns:
-        Dataset: Its target is the tip of the ``pencil``; fixtures are the points ``centre_NAME`` and the planes
-            ``paper_NAME``, and the one lies in the other. A gap in the line is a missing distance.
-
-    Raises:
-        InputError: If a page shows no circle, a table cannot be used, or two pages have a configuration of the same
-            name.
-    """
-    drawn = {name: _page(page, dpi) for name, page in pages.items()}
-    _refuse_twice(pages, drawn)
-    labels = tuple(label for found, _ in drawn.values() for label in found.labels)
-    joints = np.concatenate([found.joints for found, _ in drawn.values()])
-    each = [len(found.labels) for found, _ in drawn.values()]
-    distance = np.concatenate([circle.distance for _, circle in drawn.values()])
-    height = np.concatenate([circle.height for _, circle in drawn.values()])
-    page, none = np.repeat(np.arange(len(pages)), each), np.full(len(labels), np.nan)
-    rows = np.argsort(np.tile(np.arange(len(labels)), 2), kind="stable")
-    centres, papers = (tuple(f"{kind}_{name}" for name in pages) for kind in ("centre", "paper"))
-    kinds, joints_are = next(iter(drawn.values()))[0].kinds, next(iter(drawn.values()))[0].joints_are
-    data = Dataset(
-        source=" and ".join(str(one.points) for one in pages.values()),
-        labels=labels,
-        joints=joints,
-        joint_kinds=kinds,
-        joints_are=joints_are,
-        targets=("pencil",),
-        configuration=np.tile(np.arange(len(labels)), 2)[rows],
-        target=np.zeros(2 * len(labels), dtype=np.intp),
-        position=np.full((2 * len(labels), 3), np.nan),
-        distance=np.concatenate([distance, none])[rows],
-        height=np.concatenate([none, height])[rows],
-        fixtures=(*centres, *papers),
-        fixture=np.concatenate([page, len(pages) + page])[rows],
-        sigma=None if sigma is None else np.full(2 * len(labels), sigma),
+    job = "import_circle"
+    words = "import circle"
+    refuses = "If a page shows no circle, or a file cannot be used."
+    scans: Mapping[str, str | Path] = required(
+        NamedFiles("NAME=IMAGE"), "A scanned page.", kw_only=False, word="scan", more="By the names of the pages."
     )
-    known = Dataset(
-        source=data.source,
-        labels=("",),
-        joints=np.zeros((1, joints.shape[1])),
-        joint_kinds=kinds,
-        targets=centres,
-        configuration=np.zeros(len(pages), dtype=np.intp),
-        target=np.arange(len(pages)),
-        position=np.full((len(pages), 3), np.nan),
-        height=np.zeros(len(pages)),
-        fixtures=data.fixtures,
-        fixture=len(pages) + np.arange(len(pages)),
-        sigma=np.full(len(pages), _PAPER_DEVIATION),
+    points: Mapping[str, str | Path] = required(
+        NamedFiles("NAME=FILE"),
+        "Joints, angle and height read while it was drawn; one a page.",
+        kw_only=False,
+        word="points",
+        more="CSV, by the same names.",
     )
-    return in_order(replace(data, setup=known))
-
-
-def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configurations, DrawnCircle]:
-    """Return the configurations of a page, and what was drawn in them."""
-    text = read_text(page.points)
-    refuse_other_separators(text, f"{page.points}, line 1")
-    cells = read_cells(text, str(page.points), Layout())
-    columns = _columns(cells)
-    joints_are, names = joint_names(columns, f"{page.points}, line {cells.header}")
-    joints = [columns[name] for name in names]
-    labels = cells.texts(columns["configuration"][0])
-    found = found_configurations(
-        cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are
+    dpi: float | Sequence[float] | None = option(
+        _Dots("N|X,Y"), "Dots per inch of the scans.", default=None, shown="as the files say"
     )
-    if len(found.labels) < len(labels):
-        again = Counter(labels).most_common(1)[0][0]
-        raise InputError(
-            "a configuration appears twice",
-            where=f"{page.points}, column configuration",
-            came=again,
-            cure="Number the configurations through, in the order in which they were drawn.",
-        )
-    angle, height = (cells.numbers(*columns[name]) for name in ("angle", "height"))
-    return found, drawn_circle(read_circle(page.scan, dpi), angle, found.joints, height)
+    sigma: float | None = option(
+        Number("mm", low=0.0, above=True, deviation=True),
+        "Deviation of radius and height.",
+        default=None,
+        shown="not declared",
+    )
 
-
-def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
-    """Return place and unit of each column, or refuse the header."""
-    columns: dict[str, tuple[int, str]] = {}
-    for place, heading in enumerate(cells.names):
-        where = f"{cells.source}, line {cells.header}, column {place + 1}"
-        match = _HEADING.fullmatch(heading)
-        if match is None or match[1] in columns:
-            what = "the column is not known" if match is None else f"the column {match[1]} appears twice"
-            raise InputError(what, where=where, came=heading, allowed=_ALLOWED)
-        units = {"angle": ANGLE_UNITS, "height": LENGTH_UNITS}.get(match[1], (*ANGLE_UNITS, *LENGTH_UNITS))
-        unit = "1" if match[1] == "configuration" else checked_unit(match[2], units, f"{where}, {heading}")
-        columns[match[1]] = place, unit
-    for name in ("configuration", "angle", "height"):
-        if name not in columns:
-            raise InputError(
-                f"the column {name} is missing", where=f"{cells.source}, line {cells.header}", allowed=_ALLOWED
-            )
-    return columns
-
-
-def _refuse_twice(pages: Mapping[str, Page], drawn: Mapping[str, tuple[Configurations, DrawnCircle]]) -> None:
-    first: dict[str, str] = {}
-    count = {len(found.kinds) for found, _ in drawn.values()}
-    if len({found.joints_are for found, _ in drawn.values()}) > 1:
-        raise InputError(
-            "the pages have joint positions of two kinds",
-            where=" and ".join(str(page.points) for page in pages.values()),
-            came="axis_1 [deg] .. and joint_1 [deg] ..",
-            cure="Name the columns of all pages alike.",
-        )
-    if len(count) > 1:
-        raise InputError(
-            "the pages are of robots with different joints",
-            where=" and ".join(str(page.points) for page in pages.values()),
-            came=f"{' and '.join(map(str, sorted(count)))} joints",
-        )
-    for name, (found, _) in drawn.items():
-        for label in found.labels:
-            if label in first:
+    def check(self) -> None:
+        """Refuse scans and tables that are not of the same pages."""
+        if not self.scans:
+            raise InputError("no page is given", parameter="scans", cure="Give at least one.")
+        for name in (*self.scans, *self.points):
+            if name not in self.scans or name not in self.points:
                 raise InputError(
-                    "a configuration is on two pages",
-                    where=f"{pages[name].points} and {pages[first[label]].points}",
-                    came=label,
-                    cure="Number the configurations through all pages, in the order in which they were drawn.",
+                    "every page needs a scan and a table",
+                    parameter="points" if name in self.scans else "scans",
+                    came=f"nothing for {name}",
+                    allowed="the same names in `scans` and `points`",
                 )
-            first[label] = name
+
+    def run(self) -> ImportedCircles:
+        """Import."""
+        from truearm.drawn_circle.pages import of_pages
+
+        return of_pages(self)
 
 
-def import_circle(
-    scans: Mapping[str, str | Path],
-    points: Mapping[str, str | Path],
-    *,
-    dpi: float | Sequence[float] | None = None,
-    sigma: float | None = None,
-    out: str | Path | None = None,
-) -> ImportedCircles:
-    """Read circles that the robot drew with a pencil, from scanned pages and the potentiometer's readings.
-
-    Parameters
-    ----------
-    scans
-        Image of each page, by the name of the page.
-    points
-        CSV of joints, angle and height that were read while it was drawn, by the same names.
-    dpi
-        Dots per inch of the scans, one number or those along x and y; None for what the files say.
-    sigma
-        Standard deviation of radius and height [m]; None declares none.
-    out
-        Canonical CSV file to write; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If a page shows no circle, or a file cannot be used.
-    """
-    images, tables = files_argument(scans, "scans"), files_argument(points, "points")
-    if not images:
-        raise InputError("no page is given", parameter="scans", cure="Give at least one.")
-    for name in (*images, *tables):
-        if name not in images or name not in tables:
-            raise InputError(
-                "every page needs a scan and a table",
-                parameter="points" if name in images else "scans",
-                came=f"nothing for {name}",
-                allowed="the same names in `scans` and `points`",
-            )
-    file = None if out is None else file_for(out, *images.values(), *tables.values())
-    deviation = None if sigma is None else deviation_argument(sigma, "sigma")
-    pages = {name: Page(images[name], tables[name]) for name in images}
-    with refusals_of("scans, points"):
-        data = read_drawn_circles(pages, _resolution(dpi), deviation)
-    if file is not None:
-        write_text(file, csv_text(data))
-    return ImportedCircles(data, tuple(pages), file)
-
-
-def _resolution(dpi: float | Sequence[float] | None) -> float | tuple[float, float] | None:
-    """Return dots per inch, one number or two."""
-    if dpi is None or not isinstance(dpi, Sequence) or isinstance(dpi, str):
-        return None if dpi is None else finite_number(dpi, "dpi", allowed="a number above zero, or two")
-    along, across = numbers_argument(dpi, "dpi", 2, "a number above zero, or two")
-    return along, across
+import_circle = job(ImportCircle)

@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from truearm.engine.base.errors import InputError, counted, is_one_line, refusals_of
 from truearm.engine.base.files import path_argument, read_text
 from truearm.engine.base.limits import refuse_beyond
-from truearm.engine.base.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, quantity_si, sized_si
+from truearm.engine.base.units import LENGTH_UNITS, quantity_si, sized_si
 from truearm.engine.base.writing import write_text
-from truearm.engine.command.arguments import (
-    JOINTS_OF,
-    choice_argument,
-    deviation_argument,
-    file_for,
-    files_argument,
-    length_argument,
-    name_argument,
-    numbers_argument,
-)
+from truearm.engine.command.arguments import deviation_argument, file_for, length_argument, numbers_argument
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.data.readers.cells import lines_of, refuse_long, split_line
-from truearm.engine.data.readers.robodk import DECIMALS, DELIMITERS, AngleUnit, Decimal, Delimiter, read_robodk
+from truearm.engine.data.readers.robodk import read_robodk
 from truearm.engine.data.readers.rows import Readings, dataset_of
 from truearm.engine.data.readers.sheets import columns_beside_joints, configurations_of, read_named, refuse_repeated
 from truearm.engine.data.readers.table import files_read, read_noting
@@ -36,6 +27,9 @@ from truearm.engine.document.records import Imported, ImportedRoboDK
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 from truearm.engine.robot.postures import approach_of
+
+if TYPE_CHECKING:
+    from truearm.importing.jobs import ImportMatrices, ImportRoboDK, ImportSockets, ImportTable
 
 
 def read_matrices(
@@ -63,8 +57,6 @@ def read_matrices(
         Dataset: The readings, configuration by configuration.
         Mapping: How many readings are missing, by name.
     """
-    checked_unit(angle_unit, ANGLE_UNITS, parameter="angle_unit")
-    checked_unit(length_unit, LENGTH_UNITS, parameter="length_unit")
     if not targets:
         raise InputError("no target is given", parameter="targets", cure="Give at least one.")
     for parameter, names in (("targets", targets), ("references", references)):
@@ -168,100 +160,33 @@ def _number(cell: str, unit: str, where: str, *, missing: bool) -> float:
     raise InputError("a number belongs here", where=where, came=cell, allowed=allowed, cure=cure)
 
 
-def import_matrices(
-    joints: str | Path,
-    targets: Mapping[str, str | Path],
-    references: Mapping[str, str | Path] | None = None,
-    *,
-    angle_unit: str,
-    length_unit: str,
-    joints_are: JointsOf = "model",
-    out: str | Path | None = None,
-) -> Imported:
-    """Read white-space separated matrices, one configuration a row; a row of zeros or NaN is a missing reading.
-
-    Parameters
-    ----------
-    joints
-        File of the joint positions, one column a joint; all joints are revolute.
-    targets
-        File of the positions of each target on the tool, by name; columns x, y, z.
-    references
-        The same for fixed points beside the robot.
-    angle_unit, length_unit
-        Units of the joints, ``deg`` or ``rad``, and of the positions, ``mm``, ``m``, ``um`` or ``in``.
-    joints_are
-        Whose joint positions they are: the ``model``'s, or as the robot's ``controller`` shows them.
-    out
-        Canonical CSV file to write; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be used; the message names the line and the column.
-    """
-    table = path_argument(joints, "joints")
-    seen = files_argument(targets, "targets")
-    beside = {} if references is None else files_argument(references, "references")
-    units = name_argument(angle_unit, "angle_unit"), name_argument(length_unit, "length_unit")
-    whose = choice_argument(joints_are, "joints_are", JOINTS_OF)
-    file = None if out is None else file_for(out, table, *seen.values(), *beside.values())
+def of_matrices(asked: ImportMatrices) -> Imported:
+    """Read the matrices that are asked for, and write them as canonical CSV."""
+    table, seen = path_argument(asked.joints, "joints"), _paths(asked.targets)
+    beside = _paths(asked.references or {})
+    file = None if asked.out is None else file_for(asked.out, table, *seen.values(), *beside.values())
     with refusals_of("joints, targets"):
-        data, missing = read_matrices(table, seen, beside, *units, whose)
+        data, missing = read_matrices(
+            table, seen, beside, asked.angle_unit, asked.length_unit, asked.joints_are or "model"
+        )
     if file is not None:
         write_text(file, csv_text(data))
     return Imported(data, file, missing)
 
 
-def import_robodk(
-    file: str | Path,
-    *,
-    angle_unit: AngleUnit | None = None,
-    joints_are: JointsOf = "model",
-    delimiter: Delimiter = "comma",
-    decimal: Decimal = "point",
-    out: str | Path | None = None,
-) -> ImportedRoboDK:
-    """Read the calibration or validation measurements that RoboDK exports as CSV.
+def _paths(named: Mapping[str, str | Path]) -> dict[str, Path]:
+    return {name: Path(file) for name, file in named.items()}
 
-    Parameters
-    ----------
-    file
-        The table: six joints, the measured point and the tool's point of each measurement, or poses instead of points.
-    angle_unit
-        Unit of the angles of poses, ``deg`` or ``rad``; None for points.
-    joints_are
-        Whose joint positions they are: the ``model``'s, or as the robot's ``controller`` shows them.
-    delimiter
-        What stands between columns: ``comma``, ``semicolon`` or ``tab``.
-    decimal
-        The decimal sign: ``point``, or ``comma`` beside another delimiter.
-    out
-        Canonical CSV file to write; None writes nothing.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be used; the message names the line and the column.
-    """
-    table = path_argument(file, "file")
-    if angle_unit is not None:
-        choice_argument(angle_unit, "angle_unit", dict.fromkeys(("deg", "rad")))
-    whose = choice_argument(joints_are, "joints_are", JOINTS_OF)
-    between = choice_argument(delimiter, "delimiter", DELIMITERS)
-    if choice_argument(decimal, "decimal", DECIMALS) == between:
-        raise InputError(
-            "commas cannot stand between columns and in numbers",
-            parameter="decimal",
-            came="comma",
-            allowed="point, or another `delimiter`",
-        )
-    target = None if out is None else file_for(out, table)
+def of_robodk(asked: ImportRoboDK) -> ImportedRoboDK:
+    """Read a table of RoboDK, and write it as canonical CSV."""
+    table = path_argument(asked.file, "file")
+    out = None if asked.out is None else file_for(asked.out, table)
     with refusals_of("file"):
-        read = read_robodk(table, angle_unit, whose, delimiter, decimal)
-    if target is not None:
-        write_text(target, csv_text(read.data))
-    return ImportedRoboDK(read.data, read.tool_points, target, read.missing)
+        read = read_robodk(table, asked.angle_unit, asked.joints_are or "model", asked.delimiter, asked.decimal)
+    if out is not None:
+        write_text(out, csv_text(read.data))
+    return ImportedRoboDK(read.data, read.tool_points, out, read.missing)
 
 
 # A ball that was put into two sockets, again and again: joint positions, and in which socket.
@@ -273,7 +198,8 @@ def import_robodk(
 BALL: Final = "ball"
 _SHOWN: Final = {"configuration": "configuration", "socket": "socket"}
 _WHOLE: Final = "200mm,0.02mm"
-_LENGTHS: Final = ("mm", "m", "um", "in")
+#: A distance with a larger share of doubt was not measured: a tape measure leaves one in a hundred.
+_VAGUEST: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -292,9 +218,26 @@ class Apart:
                 "a distance and its standard deviation belong here", parameter=parameter, came=text, allowed=_WHOLE
             )
         return cls(
-            quantity_si(parts[0], _LENGTHS, parameter, "200", _WHOLE),
-            quantity_si(parts[1], _LENGTHS, parameter, "0.02", _WHOLE, deviation=True),
+            quantity_si(parts[0], LENGTH_UNITS, parameter, "200", _WHOLE),
+            quantity_si(parts[1], LENGTH_UNITS, parameter, "0.02", _WHOLE, deviation=True),
         )
+
+    @classmethod
+    def of_numbers(cls, numbers: object, parameter: str = "apart") -> Apart:
+        """Return what two numbers say [m]."""
+        distance, deviation = numbers_argument(numbers, parameter, 2, "200mm,0.02mm, or two numbers in m")
+        return cls(length_argument(distance, parameter, 0.0), deviation_argument(deviation, parameter))
+
+    def refuse_vague(self, parameter: str) -> None:
+        """Refuse a distance that is hardly known."""
+        if self.sigma > _VAGUEST * self.distance:
+            raise InputError(
+                "the distance of the sockets is hardly known, and nothing else says how long anything is",
+                parameter=parameter,
+                came=f"{1e3 * self.distance:g} mm with a standard deviation of {1e3 * self.sigma:g} mm",
+                allowed=f"a standard deviation of up to {_VAGUEST:.0%} of the distance",
+                cure="Measure the distance with a caliper, and give its deviation second: 200mm,0.02mm.",
+            )
 
 
 def read_sockets(path: Path, apart: Apart, ball: float, sigma: float | None) -> Dataset:
@@ -363,105 +306,27 @@ def read_sockets(path: Path, apart: Apart, ball: float, sigma: float | None) -> 
     return replace(data, setup=known)
 
 
-#: A distance with a larger share of doubt was not measured: a tape measure leaves one in a hundred.
-_VAGUEST: Final = 0.1
-
-
-def import_sockets(
-    file: str | Path,
-    *,
-    apart: str | Sequence[float],
-    ball: str | float,
-    sigma: float | None = None,
-    out: str | Path | None = None,
-) -> Imported:
-    """Read in which of two sockets a ball on the flange was, and at which joint positions.
-
-    Parameters
-    ----------
-    file
-        CSV with the columns ``configuration``, ``joint_1 [deg]`` .. or ``axis_1 [deg]`` .., and ``socket``.
-    apart
-        Distance of the sockets' centres and its standard deviation, as a text with units, ``200mm,0.02mm``, or both as
-        numbers [m].
-    ball
-        Diameter of the ball, as a text with its unit, ``25mm``, or a number [m].
-    sigma
-        How well the ball comes to rest in a socket: standard deviation of each coordinate [m]; None declares none.
-    out
-        Canonical CSV file to write; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If there are not two sockets, they are closer than the ball is large, or a file cannot be used.
-    """
-    table = path_argument(file, "file")
-    if isinstance(apart, str):
-        known = Apart.of_text(apart)
-    else:
-        distance, deviation = numbers_argument(apart, "apart", 2, "200mm,0.02mm, or two numbers in m")
-        known = Apart(length_argument(distance, "apart", 0.0), deviation_argument(deviation, "apart"))
-    if known.sigma > _VAGUEST * known.distance:
-        raise InputError(
-            "the distance of the sockets is hardly known, and nothing else says how long anything is",
-            parameter="apart",
-            came=f"{1e3 * known.distance:g} mm with a standard deviation of {1e3 * known.sigma:g} mm",
-            allowed=f"a standard deviation of up to {_VAGUEST:.0%} of the distance",
-            cure="Measure the distance with a caliper, and give its deviation second: 200mm,0.02mm.",
-        )
-    if isinstance(ball, str):
-        diameter = quantity_si(ball, ("mm", "m", "um", "in"), "ball", "25", "25mm")
-    else:
-        diameter = length_argument(ball, "ball")
-    if diameter <= 0.0:
-        raise InputError("the ball has no size", parameter="ball", came=f"{1e3 * diameter:g} mm", allowed="above 0 mm")
-    rest = None if sigma is None else deviation_argument(sigma, "sigma")
-    target = None if out is None else file_for(out, table)
+def of_sockets(asked: ImportSockets) -> Imported:
+    """Read in which socket a ball was, and write it as canonical CSV."""
+    table = path_argument(asked.file, "file")
+    out = None if asked.out is None else file_for(asked.out, table)
+    apart, ball = Apart.of_numbers(asked.apart), float(asked.ball)
     with refusals_of("file"):
-        data = read_sockets(table, known, diameter, rest)
-    if target is not None:
-        write_text(target, csv_text(data))
-    return Imported(data, target)
+        data = read_sockets(table, apart, ball, asked.sigma)
+    if out is not None:
+        write_text(out, csv_text(data))
+    return Imported(data, out)
 
 
-def import_table(
-    file: str | Path,
-    mapping: str | Path,
-    *,
-    joints: str | Path | None = None,
-    joints_are: JointsOf | None = None,
-    out: str | Path | None = None,
-) -> Imported:
-    """Read any table of points or poses, by a mapping that says which column is what.
-
-    Parameters
-    ----------
-    file
-        A CSV, another delimited text, or an Excel workbook.
-    mapping
-        Mapping file, schema ``truearm-mapping/1``, or the name of a preset: ``spatial-analyzer`` or ``t-mac``.
-    joints
-        Second file with the joint positions; None for the one that the mapping names, or none.
-    joints_are
-        Whose joint positions they are: the ``model``'s, or as the robot's ``controller`` shows them; None for what the
-        mapping says, the model's if it says nothing.
-    out
-        Canonical CSV file to write; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be used; the message names the line and the column.
-    """
-    table, columns = path_argument(file, "file"), path_argument(mapping, "mapping")
-    whose = None if joints_are is None else choice_argument(joints_are, "joints_are", JOINTS_OF)
-    beside = None if joints is None else path_argument(joints, "joints")
+def of_table(asked: ImportTable) -> Imported:
+    """Read a table by its mapping, and write it as canonical CSV."""
+    table, columns = path_argument(asked.file, "file"), path_argument(asked.mapping, "mapping")
+    beside = None if asked.joints is None else path_argument(asked.joints, "joints")
     with refusals_of("mapping"):
         read = files_read(table, columns, beside)
-    target = None if out is None else file_for(out, *read)
+    out = None if asked.out is None else file_for(asked.out, *read)
     with refusals_of("file"):
-        data, noticed = read_noting(table, columns, whose, beside)
-    if target is not None:
-        write_text(target, csv_text(data))
-    return Imported(data, target, warnings=noticed)
+        data, noticed = read_noting(table, columns, asked.joints_are, beside)
+    if out is not None:
+        write_text(out, csv_text(data))
+    return Imported(data, out, warnings=noticed)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ruamel.yaml import YAML
 
@@ -47,6 +47,9 @@ from truearm.importing.meanings import (
     time_among,
     unit_of,
 )
+
+if TYPE_CHECKING:
+    from truearm.importing.jobs import GuessMapping
 
 _NUMBERED: Final = re.compile("(.*?)[0-9]{1,9}")
 
@@ -257,24 +260,7 @@ def _write_labels(
     time = time_among(left.columns)
     left.take([] if time is None else time.columns)
     label, target, pattern = _names(left, several)
-    if pattern is not None and label is not None:
-        text.add(
-            "names", "", "the names have parts between ::", f"names: {{column: {named(label)}, pattern: '{pattern}'}}"
-        )
-    elif label is not None:
-        because = "its name or its texts"
-        if label.is_numeric:
-            because += "; whole numbers tell the order of measurement"
-        if target is None and not several and label.distinct < len(label.texts):
-            because += "; rows with the same label count as repeated readings of one target"
-        text.add("configuration", "", because, f"configuration: {{column: {named(label)}}}")
-    else:
-        text.add(
-            "configuration",
-            "",
-            "no column looks like a label; rows then count as measured in their order",
-            "configuration: {each: row}",
-        )
+    _write_label(text, label, target, pattern, several=several)
     every = [column for three in positions.values() for column in three]
     if (visit := None if label is None else _visit(left, label, target)) is not None:
         text.add("visit", f"{{column: {named(visit)}}}", "its name; labels come again with another number")
@@ -326,6 +312,30 @@ def _write_labels(
         value = f"{{column: {named(temperature)}, unit: {quoted(unit)}}}"
         text.add("temperature", value, "its name")
     _write_order(text, label, time, pattern)
+
+
+def _write_label(
+    text: MappingText, label: Column | None, target: Column | None, pattern: str | None, *, several: bool
+) -> None:
+    """Write where the labels of configurations are."""
+    if pattern is not None and label is not None:
+        text.add(
+            "names", "", "the names have parts between ::", f"names: {{column: {named(label)}, pattern: '{pattern}'}}"
+        )
+    elif label is not None:
+        because = "its name or its texts"
+        if label.is_numeric:
+            because += "; whole numbers tell the order of measurement"
+        if target is None and not several and label.distinct < len(label.texts):
+            because += "; rows with the same label count as repeated readings of one target"
+        text.add("configuration", "", because, f"configuration: {{column: {named(label)}}}")
+    else:
+        text.add(
+            "configuration",
+            "",
+            "no column looks like a label; rows then count as measured in their order",
+            "configuration: {each: row}",
+        )
 
 
 def _write_orientation(
@@ -473,27 +483,12 @@ class GuessedMapping(Record):
         return text
 
 
-def import_guess(file: str | Path, *, out: str | Path | None = None) -> GuessedMapping:
-    """Look at a table and write the mapping file that it seems to need; nothing is imported.
-
-    Every guess is marked, and `import_table` refuses the mapping until somebody has written ``confirmed: yes`` into it.
-
-    Parameters
-    ----------
-    file
-        A CSV, another delimited text, or an Excel workbook.
-    out
-        Mapping file to write, which must not exist yet; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If the file does not look like a table of measurements.
-    """
-    table = path_argument(file, "file")
-    target = None if out is None else new_file(file_for(out, table))
+def guessed_mapping(asked: GuessMapping) -> GuessedMapping:
+    """Guess the mapping of a table, and write it into a file that does not exist yet."""
+    table = path_argument(asked.file, "file")
+    out = None if asked.out is None else new_file(file_for(asked.out, table))
     with refusals_of("file"):
         guessed = guess_mapping(table)
-    if target is not None:
-        write_text(target, guessed.text)
-    return GuessedMapping(guessed, target)
+    if out is not None:
+        write_text(out, guessed.text)
+    return GuessedMapping(guessed, out)

@@ -54,7 +54,7 @@ class Demonstrate(Long):
     job = "demo"
     refuses = "If the folder holds other measurements or another program: they are not overwritten."
     out: str | Path = option(
-        File("DIR"), "Folder for data and results.", default="truearm-demo", repeated=False, kw_only=False
+        File("DIR"), "Folder for data and results.", default="truearm-demo", repeated=False, kw_only=False, word="out"
     )
 
     def run(self) -> Demonstration:

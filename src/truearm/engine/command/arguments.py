@@ -488,6 +488,6 @@ def written_in_python(value: object) -> str:
         words = ", ".join(written_in_python(entry) for entry in value)
         return f"[{words}]"
     if isinstance(value, dict):
-        return repr(value)
+        return f"{{{', '.join(f'{name!r}: {written_in_python(one)}' for name, one in value.items())}}}"
     plain = value is None or isinstance(value, str | bool | int | float)
     return repr(value) if plain else type(value).__name__.upper()

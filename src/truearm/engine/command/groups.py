@@ -298,6 +298,14 @@ class IntoFile(Request):
     )
 
 
+class AlsoIntoFile(Request):
+    """What writes a file where one is asked for."""
+
+    out: str | Path | None = option(
+        File("FILE"), "File to write.", default=None, shown="none is written", repeated=False
+    )
+
+
 class IntoFolder(Request):
     """What writes files into a folder."""
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Final
 from truearm.engine.base.errors import InputError, Words, wrong_kind
 
 #: Units at the edges, and the one in Python of each that is another there.
-_IN_PYTHON: Final = {"mm": "m", "deg": "rad", "mm/s": "m/s"}
+_IN_PYTHON: Final = {"mm": "m", "deg": "rad", "mm/s": "m/s", "ppm": "1"}
 
 
 class Kind:
@@ -72,6 +72,20 @@ class File(Given):
 
         path_argument(value, name)
         return value
+
+
+class Files(Given):
+    """A file or several, which the job itself reads."""
+
+    typed = list[str]
+
+    def read(self, typed: Any, name: str) -> Any:
+        """Return the files, None for none."""
+        return typed or None
+
+    def typed_again(self, value: Any) -> list[str]:
+        """Return each of them."""
+        return [*map(str, value)] if isinstance(value, list | tuple) else [str(value)]
 
 
 class Flag(Given):
@@ -382,6 +396,7 @@ class NamedFiles(Given):
     """Files by name."""
 
     typed = list[str]
+    what: ClassVar[str] = "file"
 
     def check(self, value: Any, name: str) -> Any:
         """Refuse what are no paths by name."""
@@ -395,7 +410,8 @@ class NamedFiles(Given):
         for text in typed:
             key, given, file = text.partition("=")
             if not key or not given or not file:
-                raise InputError("a name and a file belong here", parameter=name, came=text, allowed="NAME=FILE")
+                allowed = f"NAME={self.what.upper()}"
+                raise InputError(f"a name and a {self.what} belong here", parameter=name, came=text, allowed=allowed)
             if key in named:
                 raise InputError("this name is given twice", parameter=name, came=key)
             named[key] = file

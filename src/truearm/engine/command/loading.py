@@ -43,6 +43,7 @@ class LoadData(Measured):
         shown="leaves joint positions as they are",
         more="Joint positions that its controller shows become its model's.",
         kw_only=False,
+        word="",
     )
 
     def run(self) -> Dataset:

@@ -12,7 +12,6 @@ from contextvars import ContextVar
 from dataclasses import replace
 from functools import wraps
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
 
 import typer
@@ -24,17 +23,6 @@ from truearm.engine.command.request import Option, Request, flag_of
 if TYPE_CHECKING:
     from truearm.engine.base.errors import Notice
     from truearm.engine.document.records import Record
-
-
-JointsAreText = Annotated[
-    str | None,
-    typer.Option(
-        "--joints-are",
-        metavar="controller|model",
-        help="Whose joint positions they are: as the robot's controller shows them, or its model's.",
-        show_default="the model's",
-    ),
-]
 
 
 C = TypeVar("C", bound=Callable[..., Any])
@@ -147,20 +135,6 @@ def _option(name: str) -> str:
         if parameter.name == name:
             return max(parameter.opts, key=len)
     return f"--{name.replace('_', '-')}"
-
-
-def _named(entries: list[str], parameter: str, what: str = "FILE") -> dict[str, Path]:
-    named: dict[str, Path] = {}
-    for entry in entries:
-        name, separator, file = entry.partition("=")
-        if not separator or not name or not file:
-            raise InputError(
-                f"a name and a {what.lower()} belong here", parameter=parameter, came=entry, allowed=f"NAME={what}"
-            )
-        if name in named:
-            raise InputError("this name is given twice", parameter=parameter, came=name)
-        named[name] = Path(file)
-    return named
 
 
 def by_device(command: C, others: Mapping[str, Callable[..., None]]) -> C:

@@ -60,9 +60,10 @@ def option(
     """Declare an option with a default; arguments as in :class:`Option`.
 
     Args:
-        kw_only: Whether Python takes it by its name alone.
+        kw_only: Whether Python takes it by its name alone; the command has another as an argument if it has no word.
     """
-    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=False, repeated=repeated)
+    argument = not kw_only and word is None
+    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=argument, repeated=repeated)
     return field(default=default, kw_only=kw_only, metadata={"option": made})
 
 
@@ -162,7 +163,8 @@ class Request:
                 for text in declared.kind.typed_again(value):
                     words += [flag, text]
         out = dict(self.options()).get("out")
-        words += [] if out is None else [flag_of("out", out), metavar_of(out)]
+        writes = out is not None and (out.needed or getattr(self, "out", None) is not None)
+        words += [flag_of("out", out), metavar_of(out)] if out is not None and writes else []
         return shlex.join(["truearm", *self.command_words().split(), *arguments, *words])
 
     def __repr__(self) -> str:
@@ -209,10 +211,12 @@ def job(request: Callable[P, Runs[R]]) -> Callable[P, R]:
 
 def docstring(request: type[Request]) -> str:
     """Return the docstring of a job, in the style of NumPy."""
-    parts = [inspect.cleandoc(request.__doc__ or ""), "", "Parameters", "----------"]
-    for name, declared in request.options():
+    parts, options = [inspect.cleandoc(request.__doc__ or "")], [*request.options()]
+    parts += ["", "Parameters", "----------"] if options else []
+    for name, declared in options:
         parts += [name, _indented(_entry(declared, request.default(name)))]
-    return "\n".join([*parts, "", "Raises", "------", "InputError", _indented(request.refuses)])
+    parts += ["", "Raises", "------", "InputError", _indented(request.refuses)] if request.refuses else []
+    return "\n".join(parts)
 
 
 def _indented(text: str) -> str:

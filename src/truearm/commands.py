@@ -34,7 +34,7 @@ from truearm.robot_files.command import convert, export, export_robodk, ik, robo
 from truearm.simulation.command import devices, influence, simulate
 from truearm.starting.command import demo, example, new_robot, study, study_help
 from truearm.studio.command import studio
-from truearm.validation.command import distances, lines, sphere, tolerance, validate
+from truearm.validation.jobs import JudgeDistances, JudgeSphere, JudgeTolerance, TestLines, Validate
 
 # A calibration's matrices are small: a second BLAS thread gains nothing on a quiet machine and waits for its turn on
 # a busy one. NumPy reads this when it is first imported, which is after here.
@@ -82,8 +82,7 @@ importing.command()(ros)
 app.command()(check)
 add(app, Calibrate)
 app.command()(tilting)
-app.command()(validate)
-app.command()(distances)
+add(app, Validate, JudgeDistances)
 app.command()(compensate)
 app.command()(ik)
 app.command()(by_device(plan, {"inclinometers": plan_pairs}))
@@ -91,10 +90,9 @@ app.command()(measure)
 app.command()(poses)
 app.command()(path)
 app.command()(axes)
-app.command()(tolerance)
-app.command()(lines)
+add(app, JudgeTolerance, TestLines)
 app.command()(influence)
-app.command()(sphere)
+add(app, JudgeSphere)
 app.command()(by_device(simulate, {"inclinometers": simulate_readings}))
 app.command()(devices)
 app.add_typer(importing, name="import")

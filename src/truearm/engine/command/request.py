@@ -55,10 +55,11 @@ def option(
     more: str = "",
     needed: bool = False,
     repeated: bool = True,
+    is_argument: bool = False,
 ) -> Any:
-    """Declare an option with a default; arguments as in :class:`Option`."""
-    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=False, repeated=repeated)
-    return field(default=default, kw_only=True, metadata={"option": made})
+    """Declare an option with a default, or an argument that may be left out; arguments as in :class:`Option`."""
+    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=is_argument, repeated=repeated)
+    return field(default=default, kw_only=not is_argument, metadata={"option": made})
 
 
 def required(
@@ -164,7 +165,9 @@ def metavar_of(declared: Option) -> str:
 
 def flag_of(name: str, declared: Option) -> str:
     """Return how the command line calls an option, or an argument by its metavar."""
-    return metavar_of(declared) if declared.is_argument else f"--{(declared.word or name).replace('_', '-')}"
+    return (
+        metavar_of(declared).strip("[]") if declared.is_argument else f"--{(declared.word or name).replace('_', '-')}"
+    )
 
 
 class Runs(Protocol[R]):
@@ -197,10 +200,13 @@ def job(request: Callable[P, Runs[R]]) -> Callable[P, R]:
 
 def docstring(request: type[Request]) -> str:
     """Return the docstring of a job, in the style of NumPy."""
-    parts = [inspect.cleandoc(request.__doc__ or ""), "", "Parameters", "----------"]
+    said, parts = inspect.cleandoc(request.__doc__ or ""), list[str]()
     for name, declared in request.options():
         parts += [name, _indented(_entry(declared, request.default(name)))]
-    return "\n".join([*parts, "", "Raises", "------", "InputError", _indented(request.refuses)])
+    if not parts:
+        return said
+    raises = ["", "Raises", "------", "InputError", _indented(request.refuses)]
+    return "\n".join([said, "", "Parameters", "----------", *parts, *raises])
 
 
 def _indented(text: str) -> str:

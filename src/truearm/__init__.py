@@ -62,9 +62,9 @@ if TYPE_CHECKING:
     from truearm.robot_files.inverse import inverse as inverse
     from truearm.robot_files.show import robots as robots
     from truearm.robot_files.show import show as show
-    from truearm.simulation.influence import influence as influence
-    from truearm.simulation.simulate import devices as devices
-    from truearm.simulation.simulate import simulate as simulate
+    from truearm.simulation.jobs import devices as devices
+    from truearm.simulation.jobs import influence as influence
+    from truearm.simulation.jobs import simulate as simulate
     from truearm.starting.demo import demo as demo
     from truearm.starting.example import example as example
     from truearm.starting.example import new_robot as new_robot
@@ -101,18 +101,18 @@ JOBS: Final = {
     "poses": "truearm.planning.poses",
     "path": "truearm.compensation.path",
     "measure": "truearm.measuring.measure",
-    "simulate": "truearm.simulation.simulate",
+    "simulate": "truearm.simulation.jobs",
     "simulate_inclinometers": "truearm.inclinometers.pairs",
     "inverse": "truearm.robot_files.inverse",
     "robots": "truearm.robot_files.show",
-    "devices": "truearm.simulation.simulate",
+    "devices": "truearm.simulation.jobs",
     "axes": "truearm.axis_circles.axes",
     "tolerance": "truearm.validation.jobs",
     "lines": "truearm.validation.jobs",
     "iso9283_plan": "truearm.iso9283.jobs",
     "iso9283_simulate": "truearm.iso9283.jobs",
     "iso9283_evaluate": "truearm.iso9283.jobs",
-    "influence": "truearm.simulation.influence",
+    "influence": "truearm.simulation.jobs",
     "sphere": "truearm.validation.jobs",
     "hexapod_enumerate": "truearm.hexapod.jobs",
     "hexapod_uncertainty": "truearm.hexapod.jobs",

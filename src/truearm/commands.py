@@ -31,7 +31,8 @@ from truearm.iso9283.command import app as iso9283
 from truearm.measuring.command import measure
 from truearm.planning.command import plan, poses
 from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
-from truearm.simulation.command import devices, influence, simulate
+from truearm.simulation.command import simulate
+from truearm.simulation.jobs import FindInfluence, ListDevices
 from truearm.starting.command import demo, example, new_robot, study, study_help
 from truearm.studio.command import studio
 from truearm.validation.jobs import JudgeDistances, JudgeSphere, JudgeTolerance, TestLines, Validate
@@ -91,10 +92,10 @@ app.command()(poses)
 app.command()(path)
 app.command()(axes)
 add(app, JudgeTolerance, TestLines)
-app.command()(influence)
+add(app, FindInfluence)
 add(app, JudgeSphere)
 app.command()(by_device(simulate, {"inclinometers": simulate_readings}))
-app.command()(devices)
+add(app, ListDevices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")
 app.add_typer(iso9283, name="iso9283")

@@ -55,11 +55,16 @@ def option(
     more: str = "",
     needed: bool = False,
     repeated: bool = True,
-    is_argument: bool = False,
+    kw_only: bool = True,
 ) -> Any:
-    """Declare an option with a default, or an argument that may be left out; arguments as in :class:`Option`."""
-    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=is_argument, repeated=repeated)
-    return field(default=default, kw_only=not is_argument, metadata={"option": made})
+    """Declare an option with a default; arguments as in :class:`Option`.
+
+    Args:
+        kw_only: Whether Python takes it by its name alone; the command has another as an argument if it has no word.
+    """
+    argument = not kw_only and word is None
+    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=argument, repeated=repeated)
+    return field(default=default, kw_only=kw_only, metadata={"option": made})
 
 
 def required(

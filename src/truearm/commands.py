@@ -17,7 +17,7 @@ from truearm.axis_circles.command import axes
 from truearm.bags.command import ros
 from truearm.board.command import hand_eye
 from truearm.calibration.calibrate import Calibrate
-from truearm.checking.command import check
+from truearm.checking.check import Check
 from truearm.compensation.command import compensate, path
 from truearm.drawn_circle.command import circle
 from truearm.engine.base.errors import InputError, is_one_line, printable
@@ -80,8 +80,7 @@ importing.command("hand-eye")(hand_eye)
 importing.command("ur-kinematics")(ur_kinematics)
 importing.command()(ros)
 
-app.command()(check)
-add(app, Calibrate)
+add(app, Check, Calibrate)
 app.command()(tilting)
 add(app, Validate, JudgeDistances)
 app.command()(compensate)

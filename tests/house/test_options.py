@@ -84,7 +84,21 @@ def test_an_option_is_declared_once() -> None:
 
 
 #: Names and words of the command that mean several things, still.
-TWICE = ("data", "frames", "joints", "model", "noise", "out", "plan", "poses", "target", "tip", "truth", "--model")
+TWICE = (
+    "data",
+    "frames",
+    "joints",
+    "model",
+    "noise",
+    "out",
+    "plan",
+    "poses",
+    "robot",
+    "target",
+    "tip",
+    "truth",
+    "--model",
+)
 
 
 def test_units_are_those_at_the_edges() -> None:

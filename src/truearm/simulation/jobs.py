@@ -39,12 +39,13 @@ def _models() -> Collection[str]:
 
 
 class Simulate(OfRobot, SeenBy, Drawn, Loaded, ForcedAt, JointsOfModel, IntoFile, Long):
-    """Measure a digital twin whose truth is known, with a simulated instrument, or with inclinometers.
+    """Measure a digital twin whose truth is known, with a simulated instrument.
 
     Configurations are measured in their order: what depends on the way the arm came, or on how long it has been moving,
     follows from it. Where the table of a plan says where to stop right before each (approach_i), the joints come from
     there. The data then count these stops in their order, so that no configuration follows another. They also say what
-    acted on the flange (force_x to moment_z). The file is a canonical CSV.
+    acted on the flange (force_x to moment_z). The file is a canonical CSV. Inclinometers are a device of the command
+    alone; in Python there is truearm.simulate_inclinometers.
     """
 
     job = "simulate"

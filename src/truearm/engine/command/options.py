@@ -346,15 +346,6 @@ WrenchFrameText = Annotated[
         show_default="base",
     ),
 ]
-WrenchAtText = Annotated[
-    str | None,
-    typer.Option(
-        "--wrench-at",
-        metavar="NAME",
-        help="The target on which --wrench acts, or flange.",
-        show_default="the only target",
-    ),
-]
 NoteTexts = Annotated[
     list[str] | None,
     typer.Option(

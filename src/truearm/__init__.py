@@ -63,18 +63,18 @@ if TYPE_CHECKING:
     from truearm.robot_files.inverse import inverse as inverse
     from truearm.robot_files.show import robots as robots
     from truearm.robot_files.show import show as show
-    from truearm.simulation.influence import influence as influence
-    from truearm.simulation.simulate import devices as devices
-    from truearm.simulation.simulate import simulate as simulate
+    from truearm.simulation.jobs import devices as devices
+    from truearm.simulation.jobs import influence as influence
+    from truearm.simulation.jobs import simulate as simulate
     from truearm.starting.jobs import demo as demo
     from truearm.starting.jobs import example as example
     from truearm.starting.jobs import new_robot as new_robot
     from truearm.starting.study import study as study
-    from truearm.validation.distances import distances as distances
-    from truearm.validation.lines import lines as lines
-    from truearm.validation.sphere import sphere as sphere
-    from truearm.validation.tolerances import tolerance as tolerance
-    from truearm.validation.validate import validate as validate
+    from truearm.validation.jobs import distances as distances
+    from truearm.validation.jobs import lines as lines
+    from truearm.validation.jobs import sphere as sphere
+    from truearm.validation.jobs import tolerance as tolerance
+    from truearm.validation.jobs import validate as validate
 
 #: Every job, in the order of the work, and where it is. A job is a function that takes objects, arrays or paths and
 #: plain keywords, refuses what it cannot use with an :class:`InputError` that names the parameter, and returns a frozen
@@ -95,26 +95,26 @@ JOBS: Final = {
     "check": "truearm.checking.check",
     "calibrate": "truearm.calibration.calibrate",
     "tilting": "truearm.inclinometers.tilting",
-    "validate": "truearm.validation.validate",
-    "distances": "truearm.validation.distances",
+    "validate": "truearm.validation.jobs",
+    "distances": "truearm.validation.jobs",
     "plan": "truearm.planning.plan",
     "plan_inclinometers": "truearm.inclinometers.pairs",
     "poses": "truearm.planning.poses",
     "path": "truearm.compensation.path",
     "measure": "truearm.measuring.measure",
-    "simulate": "truearm.simulation.simulate",
+    "simulate": "truearm.simulation.jobs",
     "simulate_inclinometers": "truearm.inclinometers.pairs",
     "inverse": "truearm.robot_files.inverse",
     "robots": "truearm.robot_files.show",
-    "devices": "truearm.simulation.simulate",
+    "devices": "truearm.simulation.jobs",
     "axes": "truearm.axis_circles.axes",
-    "tolerance": "truearm.validation.tolerances",
-    "lines": "truearm.validation.lines",
+    "tolerance": "truearm.validation.jobs",
+    "lines": "truearm.validation.jobs",
     "iso9283_plan": "truearm.iso9283.jobs",
     "iso9283_simulate": "truearm.iso9283.jobs",
     "iso9283_evaluate": "truearm.iso9283.jobs",
-    "influence": "truearm.simulation.influence",
-    "sphere": "truearm.validation.sphere",
+    "influence": "truearm.simulation.jobs",
+    "sphere": "truearm.validation.jobs",
     "hexapod_enumerate": "truearm.hexapod.jobs",
     "hexapod_uncertainty": "truearm.hexapod.jobs",
     "hexapod_plan": "truearm.hexapod.jobs",

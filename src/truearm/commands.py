@@ -17,7 +17,7 @@ from truearm.axis_circles.axes import Axes
 from truearm.bags.import_ros import ImportRos
 from truearm.board.import_hand_eye import ImportHandEye
 from truearm.calibration.calibrate import Calibrate
-from truearm.checking.command import check
+from truearm.checking.check import Check
 from truearm.compensation.command import compensate, path
 from truearm.drawn_circle.import_circle import ImportCircle
 from truearm.engine.base.errors import InputError, is_one_line, printable
@@ -31,12 +31,13 @@ from truearm.iso9283.command import app as iso9283
 from truearm.measuring.command import measure
 from truearm.planning.command import plan, poses
 from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
-from truearm.simulation.command import devices, influence, simulate
+from truearm.simulation.command import simulate
+from truearm.simulation.jobs import FindInfluence, ListDevices
 from truearm.starting.command import study_help
 from truearm.starting.jobs import Demonstrate, NewRobot, WriteExample
 from truearm.starting.study import MakeStudy
 from truearm.studio.command import studio
-from truearm.validation.command import distances, lines, sphere, tolerance, validate
+from truearm.validation.jobs import JudgeDistances, JudgeSphere, JudgeTolerance, TestLines, Validate
 
 # A calibration's matrices are small: a second BLAS thread gains nothing on a quiet machine and waits for its turn on
 # a busy one. NumPy reads this when it is first imported, which is after here.
@@ -75,24 +76,18 @@ add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK, ImportCi
 importing.command("ur-kinematics")(ur_kinematics)
 add(importing, ImportRos)
 
-app.command()(check)
-add(app, Calibrate)
+add(app, Check, Calibrate)
 app.command()(tilting)
-app.command()(validate)
-app.command()(distances)
+add(app, Validate, JudgeDistances)
 app.command()(compensate)
 app.command()(ik)
 app.command()(by_device(plan, {"inclinometers": plan_pairs}))
 app.command()(measure)
 app.command()(poses)
 app.command()(path)
-add(app, Axes)
-app.command()(tolerance)
-app.command()(lines)
-app.command()(influence)
-app.command()(sphere)
+add(app, Axes, JudgeTolerance, TestLines, FindInfluence, JudgeSphere)
 app.command()(by_device(simulate, {"inclinometers": simulate_readings}))
-app.command()(devices)
+add(app, ListDevices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")
 app.add_typer(iso9283, name="iso9283")

@@ -27,7 +27,7 @@ from truearm.engine.robot.parameters import FreeParameters
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.twin.twin import Twin, measure
-from truearm.simulation.simulate import simulate
+from truearm.simulation.jobs import simulate
 
 KNOWN = Held(IDENTITY, {TIP: IDENTITY})
 OFFSETS, GEOMETRIC = named_model("offsets"), named_model("geometric")

@@ -13,7 +13,7 @@ from truearm.calibration.calibrate import calibrate
 from truearm.commands import app
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import csv_text
-from truearm.validation.validate import validate
+from truearm.validation.jobs import validate
 
 DATA = campaign("irb120", 24, 0.05e-3, 4)[1]
 

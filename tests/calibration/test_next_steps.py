@@ -30,7 +30,7 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
 from truearm.engine.twin.twin_joint import JointTruth
-from truearm.simulation.simulate import simulate
+from truearm.simulation.jobs import simulate
 
 NOISE, POSES = 0.02e-3, 60
 LOAD = Payload(2.0, (0.02, -0.01, 0.08))

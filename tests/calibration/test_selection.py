@@ -30,7 +30,7 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
 from truearm.engine.twin.twin_joint import PERFECT, JointTruth
-from truearm.validation.validate import validate
+from truearm.validation.jobs import validate
 
 #: The module of the job.
 calibrating = import_module("truearm.calibration.calibrating")

@@ -24,7 +24,7 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import measure
 from truearm.importing.files import read_matrices
-from truearm.simulation.simulate import simulate
+from truearm.simulation.jobs import simulate
 
 GEOMETRIC = named_model("geometric")
 UR10, UR10E = load_robot("ur10"), load_robot("ur10e")

@@ -23,7 +23,7 @@ from truearm.engine.twin.devices import named_device
 from truearm.engine.twin.devices.device import measured_with
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin
-from truearm.validation.validate import validate
+from truearm.validation.jobs import validate
 
 ROBOT = load_robot("irb120")
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]

@@ -37,8 +37,8 @@ from truearm.engine.robot.library import load_robot as library_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
-from truearm.simulation.simulate import simulate
-from truearm.validation.validate import validate
+from truearm.simulation.jobs import simulate
+from truearm.validation.jobs import validate
 
 GEOMETRIC = named_model("geometric")
 

@@ -115,10 +115,10 @@ def test_words_that_cannot_be_shown_or_written(truearm: Truearm, word: str, said
     ("words", "said"),
     [
         (["--poses", "3", "--seed", "x"], "--seed: a whole number belongs here; got 'x'; allowed: a whole number"),
-        (["--poses", "3", "--seed", "-1"], "--seed: the number is too small; got '-1'; allowed: 0 or more."),
+        (["--poses", "3", "--seed", "-1"], "--seed: the number is out of range; got -1; allowed: 0 or more."),
         (["--poses", "3", "--seed", "9" * 5000], "--seed: the number is too large; got '999"),
-        (["--poses", "3", "--noise", "nan"], "--noise: this is not a number; got 'nan'; allowed: 0 or more."),
-        (["--poses", "3", "--noise", "inf"], "--noise: the number is too large to be plausible; got inf"),
+        (["--poses", "3", "--noise", "nan"], "--noise: the number cannot be used; got 'nan'; allowed: 0 mm or more."),
+        (["--poses", "3", "--noise", "inf"], "--noise: the number cannot be used; got 'inf'; allowed: 0 mm or more."),
     ],
 )
 def test_numbers_on_the_command_line(truearm: Truearm, tmp_path: Path, words: list[str], said: str) -> None:

@@ -23,7 +23,7 @@ from papers.li_table.run import Followed, Following
 from papers.li_table.tables import METHOD_WORDS, SURFACE_WORDS
 from papers.study import Row, Study, Table
 from truearm.calibration.calibrate import calibrate
-from truearm.validation.validate import validate
+from truearm.validation.jobs import validate
 
 THEIRS, UNBOUNDED = METHOD_WORDS["distances"], METHOD_WORDS["unbounded"]
 TOGETHER = SURFACE_WORDS["together"]

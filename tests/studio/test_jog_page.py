@@ -20,7 +20,7 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.engine.robot.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
 from truearm.planning.plan import plan
-from truearm.simulation.simulate import simulate
+from truearm.simulation.jobs import simulate
 from truearm.studio import words
 from truearm.studio.arrows import Arrows, coloured, error_arrows
 from truearm.studio.pages.jog import JogPage

@@ -11,7 +11,7 @@ import pytest
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.library import load_robot
 from truearm.planning.plan import plan
-from truearm.simulation.simulate import simulate
+from truearm.simulation.jobs import simulate
 from truearm.studio.recorded import Motion, Recorded, labels_text, list_of, read_recorded
 
 Q = np.deg2rad([[10.0, 20.0, -15.0, 30.0, 40.0, -50.0], [0.0, 5.0, 5.0, 0.0, 30.0, 0.0]])

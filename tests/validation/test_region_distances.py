@@ -18,8 +18,9 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.proof import MOST_MEASURED, Proof
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import is_intact
+from truearm.validation.jobs import validate
 from truearm.validation.region import RegionDistances, distance_lines, distance_summary, region_distances
-from truearm.validation.validate import measure_farther, validate
+from truearm.validation.validate import measure_farther
 
 
 @pytest.fixture(scope="module")

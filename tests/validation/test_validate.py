@@ -15,7 +15,7 @@ from truearm.commands import app
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
-from truearm.validation.validate import validate
+from truearm.validation.jobs import validate
 
 
 @pytest.fixture(scope="module")

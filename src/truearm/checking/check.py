@@ -1,106 +1,45 @@
-"""Checks of measurements before a calibration."""
+"""What a check of measurements is asked for."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from truearm.engine.base.errors import InputError, Notice, listed
-from truearm.engine.base.units import Marked, parts_of
-from truearm.engine.command.arguments import (
-    data_argument,
-    device_argument,
-    readings_argument,
-    refuse_swapped,
-    robot_argument,
-)
-from truearm.engine.command.reading import count_excluded, excluded_notices, without_excluded
-from truearm.engine.data.dataset import Dataset
-from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.data_check import compared_with
-from truearm.engine.diagnose.next_step import NextStep
-from truearm.engine.diagnose.next_steps import steps_after_check
-from truearm.engine.diagnose.unmodelled import LeftOver
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
-from truearm.engine.robot.robot import Robot
+from truearm.engine.command.groups import Excluding, Long, SeenBy
+from truearm.engine.command.kinds import Given
+from truearm.engine.command.request import job, option
+
+if TYPE_CHECKING:
+    from truearm.checking.checking import DataCheck
+    from truearm.engine.data.dataset import Dataset
+    from truearm.engine.robot.robot import Robot
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class DataCheck(Record):
-    """What was found wrong with measurements."""
-
-    data: Dataset  #: The measurements.
-    warnings: tuple[Notice, ...]  #: One notice for each kind of fault; none for believable data.
-    next: tuple[NextStep, ...] = ()  #: What to do next, three steps at most, the most useful first.
-    simulated_from: tuple[Marked, ...] = ()  #: What of measurements and robot comes from a virtual instrument.
-
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "configurations": self.data.configurations,
-            "targets": list(self.data.targets),
-            "warnings": notice_summaries(self.warnings),
-            "next": [step.summary() for step in self.next],
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        data = self.data
-        text = [f"{data.source}: {data.configurations} configurations, targets {listed(data.targets)}"]
-        text += notice_lines(self.warnings) or [self._clean]
-        return text + [step.line for step in self.next]
-
-    @property
-    def _clean(self) -> str:
-        """What is said where nothing has a name; configurations may be off all the same."""
-        if any(step.gain is not None and step.code == "measure-again" for step in self.next):
-            return "Nothing looks wrong but the configurations named next."
-        return "Nothing looks wrong."
-
-
-def check(
-    robot: Robot | Dataset | str | Path | None,
-    data: Dataset | str | Path | None = None,
-    *,
-    device: str | None = None,
-    exclude: str | Path | None = None,
-) -> DataCheck:
+class Check(SeenBy, Excluding, Long):
     """Say what is wrong with measurements before they are believed.
 
-    Parameters
-    ----------
-    robot
-        The nominal robot, or what :func:`truearm.load_robot` takes. With it, units, joint order and signs, limits and
-        single readings are checked too. It may be left out: ``check(data)``, or None.
-    data
-        Readings, or a canonical CSV file.
-    device
-        Name of the instrument, of ``truearm.devices()``; with it, readings beyond its range are named.
-    exclude
-        File of readings that are excluded, each with its reason, as for :func:`truearm.calibrate`.
-
-    Raises
-    ------
-    InputError
-        If the robot or the data cannot be used, or their joints do not belong together.
+    With `robot`, also units, joint order and signs, limits, and readings that are far off; with `device` its range.
     """
-    if data is None:
-        robot, data = None, robot
-    refuse_swapped(robot, data, "check")
-    against = None if robot is None else robot_argument(robot)
-    measured = data_argument(data) if against is None else readings_argument(against, data)
-    measured, excluded = without_excluded(measured, exclude)
-    parts = [measured] if measured.references is None else [measured, measured.references]
-    if not any(part.has_reading.any() for part in parts):
-        raise InputError(
-            "there is no reading", parameter="data", where=measured.source, cure="Fill in x, y and z, or distance."
-        )
-    noticed, fit, part = compared_with(
-        measured, against, None if device is None else device_argument(device), excluded=count_excluded(excluded)
+
+    job = "check"
+    refuses = "If the robot or the data cannot be used, or their joints do not belong together."
+    robot: Robot | Dataset | str | Path | None = option(
+        Given("[ROBOT]"),
+        "A library id, a robot file or a URDF.",
+        default=None,
+        shown=False,
+        kw_only=False,
+        more="It may be left out: ``check(data)``, or None.",
     )
-    noticed, marks = (*noticed, *excluded_notices(excluded)), parts_of((measured, against))
-    if fit is None or part is None:
-        return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None), marks)
-    steps = steps_after_check(noticed, LeftOver.of(fit, part), errors_of(fit.robot, part))
-    return DataCheck(measured, noticed, steps, marks)
+    data: Dataset | str | Path | None = option(
+        Given("DATA.csv"), "Measurements in the canonical CSV.", default=None, shown=False, kw_only=False
+    )
+
+    def run(self) -> DataCheck:
+        """Check."""
+        from truearm.checking.checking import checked
+
+        return checked(self)
+
+
+check = job(Check)

@@ -67,7 +67,9 @@ def plan_pairs(
         print_line(f"Written: {out}, {out.with_name(f'{out.stem}-ways.csv')}")
 
 
-def simulate_readings(robot: str, poses: str, *, pull: float | None, gravity: str | None, **given: Any) -> None:
+def simulate_readings(
+    robot: str, poses: str, *, pull: float | None, gravity: str | None, json: bool, **given: Any
+) -> None:
     """Simulate what inclinometers read: ``truearm simulate --device inclinometers``."""
     from truearm.inclinometers.pairs import simulate_inclinometers
 
@@ -81,7 +83,10 @@ def simulate_readings(robot: str, poses: str, *, pull: float | None, gravity: st
             progress=say,
             **{name: given[name] for name in ("truth", "out", "seed", "payload", "joints")},
         )
-    print_record(read)
+    if json:
+        print_json(read.summary())
+    else:
+        print_record(read)
 
 
 def _refuse_beside(given: Mapping[str, object]) -> None:

@@ -6,35 +6,25 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from truearm.engine.base.arrays import finite_number
 from truearm.engine.base.errors import InputError, Notice, counted, has_error, listed, refusals_of
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.base.units import SHOWN_AS, Marked, from_si, parts_of
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.command.arguments import (
     choice_argument,
-    command_argument,
-    count_argument,
     files_of,
     folder_beside,
-    gravity_argument,
-    length_argument,
-    payload_argument,
-    progress_argument,
-    python_call,
     readings_argument,
     refuse_swapped,
     robot_argument,
-    whole_argument,
 )
-from truearm.engine.command.groups import Train
 from truearm.engine.command.split import check_split, check_trained_before, train_count
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, errors_of
@@ -42,12 +32,10 @@ from truearm.engine.document.records import Record, notice_lines, notice_summari
 from truearm.engine.document.summaries import error_line, errors_summary
 from truearm.engine.fit.fit import identify, place
 from truearm.engine.fit.models import MODELS, Model
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.simulation.influences import (
     WAYS,
-    Combination,
     Influence,
     PoseByPose,
     Way,
@@ -57,6 +45,9 @@ from truearm.simulation.influences import (
     positions_of,
 )
 from truearm.simulation.influences import influence as influence_of
+
+if TYPE_CHECKING:
+    from truearm.simulation.jobs import FindInfluence
 
 #: What is written into a folder.
 INFLUENCE_FILES: Final = ("influence.csv", "result.json", "report.html")
@@ -95,6 +86,11 @@ class InfluenceResult(Record):
     def warnings(self) -> tuple[Notice, ...]:
         """What to know about the result."""
         return self.notices
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """Names of its files."""
+        return INFLUENCE_FILES
 
     @property
     def finished(self) -> bool:
@@ -215,8 +211,6 @@ class InfluenceResult(Record):
 
 
 Frames = Literal["placed", "robot"]
-#: What is too large to be an error of an angle or a length [rad, m].
-_LARGEST: Final = (math.radians(10.0), 0.1)
 #: Moves the tip by less than rounding [m].
 _NOTHING: Final = 1e-12
 
@@ -224,149 +218,86 @@ _NOTHING: Final = 1e-12
 _LEAST: Final = 5
 
 
-def influence(
-    robot: Robot | str | Path,
-    data: Dataset | str | Path | None = None,
-    *,
-    out: str | Path | None = None,
-    model: str = "geometric",
-    target: str | None = None,
-    angle: float = math.radians(0.05),
-    length: float = 1e-4,
-    poses: int | None = None,
-    frames: Frames = "placed",
-    combination: Combination = "mean",
-    train: Train = None,
-    seed: int = 0,
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-    command: str | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-) -> InfluenceResult:
-    """Change one parameter after the other and see what the tip does; with readings, identify by that.
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What was given, as it was read."""
 
-    Parameters
-    ----------
-    robot
-        Perturbed about its values, or what :func:`truearm.load_robot` takes.
-    data
-        Position readings, or a canonical CSV file: then the configurations are theirs, and the parameters are
-        identified pose by pose by minimum norm and by influence (Patel, sections 3.6 and 3.7), from all poses at once,
-        and as :func:`truearm.calibrate` does it.
-    out
-        Folder for influence.csv, result.json and report.html; None writes nothing, see :meth:`InfluenceResult.save`.
-    model
-        Whose parameters are changed, one of :data:`truearm.engine.fit.models.MODELS` by name.
-    target
-        The tip; the first one of the readings or the robot if None, or the flange of a robot without any.
-    angle, length
-        By how much angles [rad] and lengths [m] are changed; what has another unit is changed by its prior.
-    poses
-        How many configurations, drawn evenly within the limits; 118 if None. Not with `data`.
-    frames
-        ``placed``: base and targets are fitted with the nominal robot and then held, except where the whole
-        calibration finds them anew; ``robot``: they are where the robot file has them, and the readings in that frame.
-    combination
-        How one set is made of those of all poses: ``mean``, ``scaled-mean`` or ``best-pose``.
-    train, seed
-        Split of the readings, as in :func:`truearm.calibrate`; without readings the seed is that of the configurations.
-    payload, gravity
-        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
-        [m/s^2].
-    command
-        How to run it again, for the report; None writes the call in Python.
-    progress
-        Called with a few words at each step.
+    robot: Robot  #: As it was given.
+    nominal: Robot  #: With what it carried, and the effects of the model.
+    model: Model
+    names: tuple[str, ...]  #: Of the parameters that are changed.
+    changes: dict[str, float]  #: By how much, in SI units.
+    measured: Dataset | None
+    tip: str | None  #: None is the flange.
 
-    Raises
-    ------
-    InputError
-        For anything that cannot be used, with a message that says what to do.
-    """
-    progress_argument(progress)
-    wanted = choice_argument(model, "model", {m.name: m for m in MODELS})
-    choice_argument(frames, "frames", {name: name for name in get_args(Frames)})
-    choice_argument(combination, "combination", {name: name for name in get_args(Combination)})
-    turned = finite_number(angle, "angle")
-    if not 0.0 < turned <= _LARGEST[0]:
-        raise InputError(
-            "no angle errs by that",
-            parameter="angle",
-            came=f"{math.degrees(turned):g} deg",
-            allowed="above 0, to 10 deg",
-        )
-    moved = length_argument(length, "length")
-    if not 0.0 < moved <= _LARGEST[1]:
-        raise InputError(
-            "no length errs by that", parameter="length", came=f"{moved * 1e3:g} mm", allowed="above 0, to 100 mm"
-        )
-    count = None if poses is None else count_argument(poses, "poses")
-    seed = whole_argument(seed, "seed")
-    carried, fall = payload_argument(payload), gravity_argument(gravity)
-    call = command_argument(command) or python_call(
-        "influence",
-        robot,
-        data,
-        model=model,
-        target=target,
-        angle=angle,
-        length=length,
-        poses=poses,
-        frames=frames,
-        combination=combination,
-        train=train,
-        seed=seed,
-        payload=carried,
-        gravity=fall,
-    )
-    refuse_swapped(robot, data, "influence")
-    folder = None if out is None else folder_beside(INFLUENCE_FILES, INFLUENCE_FILES[0], out, robot, data)
-    progress("reading the robot")
-    given = robot_argument(robot)
-    nominal = wanted.prepared(given.with_payload(carried, fall))
-    names = _names(nominal, wanted)
-    measured = None if data is None else readings_argument(nominal, data)
-    _refuse_unused(measured, count, train)
-    tip = _tip(nominal, measured, target)
-    changes = {
-        name: {"rad": turned, "m": moved}.get(nominal.parameters[name].unit, nominal.parameters[name].prior)
-        for name in names
-    }
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """The readings, and the nominal robot in their frames."""
+
+    placed: Robot
+    first: Dataset  #: What is trained on.
+    second: Dataset | None  #: What judges; None if nothing is held out.
+
+
+def found(asked: FindInfluence) -> InfluenceResult:
+    """Change the parameters, identify them if there are readings, and write what comes of it."""
+    refuse_swapped(asked.robot, asked.data, "influence")
+    inputs = (asked.robot, asked.data)
+    folder = None if asked.out is None else folder_beside(INFLUENCE_FILES, INFLUENCE_FILES[0], asked.out, *inputs)
+    asked.progress("reading the robot")
+    given = _read(asked)
+    names, measured = given.names, given.measured
     identified, notices = None, list[Notice]()
     if measured is None:
-        n = count or 118
+        n = asked.poses or 118
         refuse_beyond("derivatives", 9 * len(names) * n, parameter="poses")
-        placed, labels = nominal, tuple(str(number) for number in range(1, n + 1))
-        at = Postures(nominal.random_configurations(n, np.random.default_rng(seed)))
+        placed, labels = given.nominal, tuple(str(number) for number in range(1, n + 1))
+        at = Postures(given.nominal.random_configurations(n, np.random.default_rng(asked.seed)))
     else:
         labels, at = measured.labels, measured.postures
         refuse_beyond("derivatives", 9 * len(names) * len(labels), parameter="data")
         with refusals_of("data"):
-            progress("placing the nominal robot")
-            placed, parts = _parts(nominal, measured, str(tip), frames, train, seed)
-            split = train_count(train, measured.configurations, measured.source), measured.configurations, seed
-            notices += check_trained_before(given, measured, None, split, "")
-            progress("identifying the parameters in every way")
-            identified = _identified(nominal, placed, *parts, wanted, names, str(tip), changes, combination, frames)
+            asked.progress("placing the nominal robot")
+            parts = _parts(asked, given, measured)
+            placed = parts.placed
+            split = train_count(asked.train, len(labels), measured.source), len(labels), asked.seed
+            notices += check_trained_before(given.robot, measured, None, split, "")
+            asked.progress("identifying the parameters in every way")
+            identified = _identified(asked, given, parts)
         notices += _compared(identified)
-    progress("changing one parameter after the other")
-    made = influence_of(placed, at, names, tip, changes)
+    asked.progress("changing one parameter after the other")
+    made = influence_of(placed, at, names, given.tip, given.changes)
     notices += _still(made)
-    found = InfluenceResult(
+    result = InfluenceResult(
         placed,
         made,
         labels,
-        "the flange" if tip is None else f"target {tip}",
+        "the flange" if given.tip is None else f"target {given.tip}",
         identified,
         tuple(notices),
-        call,
-        files_of(robot, data),
-        parts_of((given, measured)),
+        asked.again,
+        files_of(*inputs),
+        parts_of((given.robot, measured)),
     )
     if folder is not None:
-        progress("writing the files")
-        found.save(folder)
-    return found
+        asked.progress("writing the files")
+        result.save(folder)
+    return result
+
+
+def _read(asked: FindInfluence) -> _Given:
+    """Read robot and data, and say what is changed by how much."""
+    model = next(one for one in MODELS if one.name == asked.model)
+    robot = robot_argument(asked.robot)
+    nominal = model.prepared(asked.loads.on(robot))
+    names = _names(nominal, model)
+    measured = None if asked.data is None else readings_argument(nominal, asked.data)
+    tip = _tip(nominal, measured, asked.target)
+    by_unit = {"rad": asked.angle, "m": asked.length}
+    parameters = [nominal.parameters[name] for name in names]
+    changes = {one.name: by_unit.get(one.unit, one.prior) for one in parameters}
+    return _Given(robot, nominal, model, names, changes, measured, tip)
 
 
 def _names(robot: Robot, model: Model) -> tuple[str, ...]:
@@ -376,16 +307,6 @@ def _names(robot: Robot, model: Model) -> tuple[str, ...]:
     if not names:
         raise InputError("the model has no parameter of this robot", parameter="model", came=model.name)
     return names
-
-
-def _refuse_unused(data: Dataset | None, poses: int | None, train: object) -> None:
-    """Refuse what says nothing with readings, or nothing without them."""
-    if data is not None and poses is not None:
-        raise InputError(
-            "the configurations are those of the readings", parameter="poses", came=poses, cure="Leave `poses` out."
-        )
-    if data is None and train is not None:
-        raise InputError("there are no readings to split", parameter="train", cure="Give `data`, or leave it out.")
 
 
 def _tip(robot: Robot, data: Dataset | None, target: object) -> str | None:
@@ -406,13 +327,12 @@ def _tip(robot: Robot, data: Dataset | None, target: object) -> str | None:
     return with_positions[0]
 
 
-def _parts(
-    nominal: Robot, data: Dataset, tip: str, frames: str, train: Train, seed: int
-) -> tuple[Robot, tuple[Dataset, Dataset | None]]:
-    """Return the nominal robot in the frames of the readings, and the readings to train on and to judge by."""
+def _parts(asked: FindInfluence, given: _Given, data: Dataset) -> _Parts:
+    """Split the readings, and put the nominal robot into their frames."""
+    nominal, tip = given.nominal, str(given.tip)
     if not (data.has_position & (data.target == data.targets.index(tip))).any():
         raise InputError("there is no position reading of this target", where=data.source, came=tip)
-    count = train_count(train, data.configurations, data.source)
+    count = train_count(asked.train, data.configurations, data.source)
     if count < _LEAST:
         raise InputError(
             "base, target and parameters are not found from so few configurations",
@@ -421,7 +341,7 @@ def _parts(
             came=counted(count, "training configuration"),
             allowed=f"{_LEAST} or more",
         )
-    order = np.random.default_rng(seed).permutation(data.configurations)
+    order = np.random.default_rng(asked.seed).permutation(data.configurations)
     first = data.of_configurations(order[:count])
     second = data.of_configurations(order[count:]) if count < data.configurations else None
     if second is not None:
@@ -432,7 +352,7 @@ def _parts(
             "the training part has no position of the tip", where=data.source, came=tip, cure="Change `seed`."
         )
     others = None if second is None else positions_of(second, tip)
-    if frames == "robot":
+    if asked.frames == "robot":
         if tip not in [target.name for target in nominal.targets]:
             raise InputError(
                 "the robot file does not say where this target is",
@@ -441,38 +361,30 @@ def _parts(
                 allowed=listed([target.name for target in nominal.targets]) or "placed",
                 cure="Use `frames=placed`.",
             )
-        return nominal, (alone, others)
-    return place(nominal, alone), (alone, others)
+        return _Parts(nominal, alone, others)
+    return _Parts(place(nominal, alone), alone, others)
 
 
-def _identified(
-    nominal: Robot,
-    placed: Robot,
-    first: Dataset,
-    second: Dataset | None,
-    model: Model,
-    names: tuple[str, ...],
-    tip: str,
-    changes: dict[str, float],
-    combination: Combination,
-    frames: str,
-) -> Identified:
+def _identified(asked: FindInfluence, given: _Given, parts: _Parts) -> Identified:
     """Identify the same parameters in every way from the same readings."""
+    nominal, names, tip, first = given.nominal, given.names, str(given.tip), parts.first
     units = {n: nominal.parameters[n].prior for n in names if nominal.parameters[n].unit not in ("rad", "m")}
-    by_norm = minimum_norm(placed, first, names, tip, combination=combination, units=units)
+    how = asked.combination
+    by_norm = minimum_norm(parts.placed, first, names, tip, combination=how, units=units)
     by_influence = influence_based(
-        placed, first, names, tip, combination=combination, units=units, perturbations=changes
+        parts.placed, first, names, tip, combination=how, units=units, perturbations=given.changes
     )
     robots: dict[Way, Robot] = {
-        "nominal": placed,
+        "nominal": parts.placed,
         "minimum norm": by_norm.robot,
         "influence": by_influence.robot,
-        "least squares": least_squares(placed, first, names, tip),
-        "calibrate": identify(nominal, first, model).robot,
+        "least squares": least_squares(parts.placed, first, names, tip),
+        "calibrate": identify(nominal, first, given.model).robot,
     }
-    judges = first if second is None else second
+    judges = first if parts.second is None else parts.second
     errors = {way: errors_of(one, judges) for way, one in robots.items()}
-    return Identified(robots, errors, second is not None, first.configurations, by_influence, by_norm, frames)
+    held_out = parts.second is not None
+    return Identified(robots, errors, held_out, first.configurations, by_influence, by_norm, asked.frames)
 
 
 def _compared(found: Identified) -> list[Notice]:

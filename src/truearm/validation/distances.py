@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,13 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.engine.base.errors import InputError, counted, refusals_of
 from truearm.engine.base.units import Marked, parts_of
 from truearm.engine.command.arguments import refuse_swapped
-from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.document.records import Record
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.parts import Payload
-from truearm.engine.robot.robot import Robot
 from truearm.validation.validate import as_measured
+
+if TYPE_CHECKING:
+    from truearm.validation.jobs import JudgeDistances
 
 # Errors of the distances between all pairs of measured points (Nubiola, Tables 4.5 and 4.6, Figure 4.8).
 #
@@ -334,32 +332,10 @@ class Distances(Record):
         return edges
 
 
-def distances(
-    robot: Robot | str | Path,
-    data: Dataset | str | Path,
-    *,
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-) -> Distances:
-    """Judge a robot by the distances between all pairs of measured points; no common frame is needed.
-
-    Parameters
-    ----------
-    robot
-        A calibrated robot, or its file.
-    data
-        Readings of whatever instrument's frame, or a canonical CSV file.
-    payload, gravity
-        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
-        [m/s^2] this time, if they differ from the calibration.
-
-    Raises
-    ------
-    InputError
-        If the robot has no targets, the data name others, or there are positions at one configuration only.
-    """
-    refuse_swapped(robot, data, "distances")
-    arm, readings = as_measured(robot, data, payload, gravity)
+def judged(asked: JudgeDistances) -> Distances:
+    """Compare the distances between all pairs of measured points with those that the robot predicts."""
+    refuse_swapped(asked.robot, asked.data, "distances")
+    arm, readings = as_measured(asked.robot, asked.data, asked.loads)
     predicted = errors_of(arm, readings).position_errors
     seen = readings.has_position
     measured = readings.position[seen]

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from truearm.engine.base.errors import InputError, refusals_of
-from truearm.engine.base.files import path_argument
 from truearm.engine.base.units import Marked, parts_of
 from truearm.engine.base.writing import output_file, write_text
 from truearm.engine.command.arguments import (
-    count_argument,
     file_for,
     files_of,
     joints_argument,
-    length_argument,
-    lengths_argument,
     readings_argument,
     robot_argument,
-    whole_argument,
 )
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.document.records import Record
@@ -41,6 +35,9 @@ from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin
+
+if TYPE_CHECKING:
+    from truearm.validation.jobs import TestLines
 
 # Off-line compensation through the model with inverted joint errors (KR5 paper, equation 11).
 #
@@ -226,6 +223,7 @@ class LineTest(Record):
     #: Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
+    out: Path | None = None  #: The file that holds the joint positions; None if none was written.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""
@@ -244,7 +242,12 @@ class LineTest(Record):
                     f"   max reduced by {row['reduction_percent']:.1f} %"
                 )
             text.append(words)
-        return text or [f"The robot can go to all {len(self.poses.labels)} poses."]
+        text = text or [f"The robot can go to all {len(self.poses.labels)} poses."]
+        if self.out is not None:
+            said = "compensated" if self.compensated else "nominal"
+            shown = " as the controller shows them (axis_i)" if self.joints_are == "controller" else ""
+            text.append(f"{self.out}: {len(self.joints)} configurations, {said} joint positions{shown}.")
+        return text
 
     def csv_text(self) -> str:
         """Return the plan as CSV: one configuration a pose, joint positions in deg, those of sliding joints in mm."""
@@ -275,63 +278,15 @@ def _shown(errors: LineErrors, direction: str) -> dict[str, float]:
     return {"mean": errors.mean(direction) * 1e3, "max": errors.largest(direction) * 1e3}
 
 
-def lines(
-    robot: Robot | str | Path,
-    centre: Sequence[float],
-    *,
-    size: Sequence[float] = (0.6, 0.8, 0.4),
-    joint_errors: Robot | str | Path | None = None,
-    truth: str | Path | None = None,
-    data: Dataset | str | Path | None = None,
-    noise: float = 0.0,
-    repeats: int = 30,
-    seed: int = 0,
-    joints: JointsOf | None = None,
-    out: str | Path | None = None,
-) -> LineTest:
-    """Test a robot along seven directions of a box, and compensate it off-line through its joint errors.
-
-    Parameters
-    ----------
-    robot
-        The nominal robot, as the controller knows it, or what :func:`truearm.load_robot` takes.
-    centre, size
-        Of the box in the robot's base frame [m], three numbers each.
-    joint_errors
-        The same robot with joint errors, or its file: joint positions are compensated with it.
-    truth
-        Try it on a twin, as for :func:`truearm.simulate`: ``nominal``, ``random``, a truth of the robot file, a file.
-    data
-        Or judge measurements: configurations named as the poses are, ``x-1`` to ``xyz-11``.
-    noise
-        Standard deviation of each coordinate of a repetition on the twin [m].
-    repeats
-        Repetitions on the twin.
-    seed
-        Of the noise, and of a random truth.
-    joints
-        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
-        controller's where the robot file says that they differ.
-    out
-        CSV file for the joint positions to command; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If the robot cannot go to a pose, joint errors or data are of another robot, or both truth and data are given.
-    """
-    middle, sides = lengths_argument(centre, "centre", 3), lengths_argument(size, "size", 3)
-    scatter, repeats = length_argument(noise, "noise", 0.0), count_argument(repeats, "repeats")
-    seed = whole_argument(seed, "seed")
-    if truth is not None and data is not None:
-        raise InputError("only one of them can be compared", parameter="truth, data", cure="Leave one out.")
-    inputs = files_of(robot, joint_errors, truth, data)
-    path = None if out is None else file_for(out, *inputs)
-    nominal = robot_argument(robot)
-    errors = None if joint_errors is None else robot_argument(joint_errors, "joint_errors")
+def tested(asked: TestLines) -> LineTest:
+    """Plan the test, compensate it, and compare it with a twin or with measurements."""
+    inputs = files_of(asked.robot, asked.joint_errors, asked.truth, asked.data)
+    path = None if asked.out is None else file_for(asked.out, *inputs)
+    nominal = robot_argument(asked.robot)
+    errors = None if asked.joint_errors is None else robot_argument(asked.joint_errors, "joint_errors")
     with refusals_of("size"):
-        poses = seven_lines(middle, sides)
-    joints_are = joints_argument(joints, nominal)
+        poses = seven_lines(asked.centre, asked.size)
+    joints_are = joints_argument(asked.joints, nominal)
     with refusals_of("centre"):
         at_poses = poses.joints(nominal)
     commanded = at_poses
@@ -342,18 +297,18 @@ def lines(
     before: LineErrors | None = None
     after: LineErrors | None = None
     measured: Dataset | None = None
-    if truth is not None:
-        rng = np.random.default_rng(seed)
+    if asked.truth is not None:
+        rng = np.random.default_rng(asked.seed)
         with refusals_of("truth"):
-            twin = truth_twin(nominal, str(path_argument(truth, "truth")), rng)
-        before = on_twin(poses, twin, at_poses, scatter, repeats, rng)
-        after = None if errors is None else on_twin(poses, twin, commanded, scatter, repeats, rng)
-    elif data is not None:
-        measured = readings_argument(nominal, data)
+            twin = truth_twin(nominal, str(asked.truth), rng)
+        before = on_twin(poses, twin, at_poses, asked.noise, asked.repeats, rng)
+        after = None if errors is None else on_twin(poses, twin, commanded, asked.noise, asked.repeats, rng)
+    elif asked.data is not None:
+        measured = readings_argument(nominal, asked.data)
         with refusals_of("data"):
             before = from_data(poses, _placed(nominal, errors, measured), measured)
-    marks = parts_of((nominal, errors, measured)) if truth is None else ("data",)
-    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are, marks)
+    marks = parts_of((nominal, errors, measured)) if asked.truth is None else ("data",)
+    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are, marks, path)
     if path is not None:
         found.save(path)
     return found

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,14 +14,8 @@ from truearm.engine.base.errors import InputError, Notice, counted, refusals_of
 from truearm.engine.base.units import Marked, parts_of
 from truearm.engine.base.writing import output_file, write_text
 from truearm.engine.command.arguments import (
-    command_argument,
     file_for,
     files_of,
-    gravity_argument,
-    lengths_argument,
-    name_argument,
-    payload_argument,
-    python_call,
     readings_argument,
     refuse_swapped,
     robot_argument,
@@ -33,10 +26,12 @@ from truearm.engine.document.records import Record, notice_lines, notice_summari
 from truearm.engine.programs.fake_targets import nominal_robot
 from truearm.engine.programs.gauge import best_agreement
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY
+
+if TYPE_CHECKING:
+    from truearm.validation.jobs import JudgeSphere
 
 # One end of the bar is at a target of the tool, the other at a ball on the table. Whatever the robot does, the bar
 # reads the distance between the two; the robot's model predicts it. No tracker is needed, and no common frame but the
@@ -161,6 +156,7 @@ class SphereTests(Record):
     warnings: tuple[Notice, ...] = ()  #: What speaks against the calibration of the robot.
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
+    out: Path | None = None  #: The page; None if none was written.
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""
@@ -193,7 +189,7 @@ class SphereTests(Record):
             if one.before is not None:
                 text.append(f"  nominal     {_words(one.before)}")
             text.append(f"  {'calibrated' if one.before is not None else 'this robot'}  {_words(one.after)}")
-        return [*text, *notice_lines(self.warnings)]
+        return [*text, *notice_lines(self.warnings), *([] if self.out is None else [f"Written: {self.out}"])]
 
     def save(self, file: str | Path) -> Path:
         """Write a page with the errors of every reading; return the file."""
@@ -213,52 +209,12 @@ def _words(test: SphereTest) -> str:
     return f"mean {mean:.3f}  deviation {deviation:.3f}  largest {largest:.3f} mm"
 
 
-def sphere(
-    robot: Robot | str | Path,
-    data: Dataset | str | Path,
-    *,
-    taught: str | None = None,
-    tip: Sequence[float] | None = None,
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-    out: str | Path | None = None,
-    command: str | None = None,
-) -> SphereTests:
-    """Judge a robot by a ballbar between its tool and a fixed ball, before and after calibration.
-
-    Parameters
-    ----------
-    robot
-        Usually calibrated, or what :func:`truearm.load_robot` takes. A calibrated robot is judged beside its nominal
-        self.
-    data
-        Readings of distances, or a canonical CSV file. Each pair of a target and a fixture is a sphere. A
-        configuration without a length was beyond the range of the bar and is left out.
-    taught
-        Name of the configuration at which the target was brought to the ball by hand, so that the centre is where a
-        model says it was; errors in teaching then count. It is not judged itself. None takes the centre that fits best.
-    tip
-        Where the bar is attached in the flange frame [m], if the robot does not know the target.
-    payload, gravity
-        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
-        [m/s^2]; None for what its file says.
-    out
-        HTML file with the error of every reading; None writes nothing.
-    command
-        How to run it again, for the page; None writes the call in Python.
-
-    Raises
-    ------
-    InputError
-        If there are no distances, too few of them, or the robot does not know where the bar is attached.
-    """
-    refuse_swapped(robot, data, "sphere")
-    page = None if out is None else file_for(out, robot, data)
-    call = command_argument(command) or python_call(
-        "sphere", robot, data, taught=taught, tip=tip, payload=payload_argument(payload), gravity=gravity
-    )
-    arm = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
-    measured = readings_argument(arm, data)
+def judged(asked: JudgeSphere) -> SphereTests:
+    """Judge every sphere of the measurements."""
+    refuse_swapped(asked.robot, asked.data, "sphere")
+    page = None if asked.out is None else file_for(asked.out, asked.robot, asked.data)
+    arm = asked.loads.on(robot_argument(asked.robot))
+    measured = readings_argument(arm, asked.data)
     if measured.distance is None or not np.isfinite(measured.distance).any():
         raise InputError(
             "there are no distances of a ballbar",
@@ -267,40 +223,45 @@ def sphere(
             allowed="the columns target, fixture and distance [mm]",
             cure="Give what the bar read, one row a configuration.",
         )
-    if tip is not None:
-        place = lengths_argument(tip, "tip", 3)
-        arm = arm.with_frames(arm.base, dict.fromkeys(measured.targets, place))
+    if asked.tip is not None:
+        arm = arm.with_frames(arm.base, dict.fromkeys(measured.targets, asked.tip))
     with refusals_of("data"):
         for name in measured.targets:
             arm.target(name)
-    nominal = _nominal(arm)
-    at_ball = None if taught is None else _taught(measured, name_argument(taught, "taught"))
-    spheres = []
-    for number, fixture in enumerate(measured.fixtures):
-        for index, target in enumerate(measured.targets):
-            rows = np.flatnonzero((measured.target == index) & (measured.against == number))
-            if at_ball is not None:
-                rows = rows[measured.configuration[rows] != at_ball]
-            if not len(rows):
-                continue
-            lengths = measured.distance[rows]
-            inside = np.isfinite(lengths)
-            before = None if nominal is None else _judged(nominal, measured, rows, target, at_ball)
-            after = _judged(arm, measured, rows, target, at_ball)
-            spheres.append(OneSphere(target, fixture, lengths[inside], int((~inside).sum()), before, after))
+    at_ball = None if asked.taught is None else _taught(measured, asked.taught)
     found = SphereTests(
         arm,
         measured.source,
-        tuple(spheres),
-        taught,
-        call,
-        (*changed_since(robot), *told_of(arm)),
-        files_of(robot, data),
+        _spheres(arm, measured, at_ball),
+        asked.taught,
+        asked.again,
+        (*changed_since(asked.robot), *told_of(arm)),
+        files_of(asked.robot, asked.data),
         parts_of((arm, measured)),
+        page,
     )
     if page is not None:
         found.save(page)
     return found
+
+
+def _spheres(arm: Robot, data: Dataset, at_ball: int | None) -> tuple[OneSphere, ...]:
+    """Return the test of each target about each ball; `at_ball` is the configuration that was taught."""
+    assert data.distance is not None
+    nominal, spheres = _nominal(arm), []
+    for number, fixture in enumerate(data.fixtures):
+        for index, target in enumerate(data.targets):
+            rows = np.flatnonzero((data.target == index) & (data.against == number))
+            if at_ball is not None:
+                rows = rows[data.configuration[rows] != at_ball]
+            if not len(rows):
+                continue
+            lengths = data.distance[rows]
+            inside = np.isfinite(lengths)
+            before = None if nominal is None else _judged(nominal, data, rows, target, at_ball)
+            after = _judged(arm, data, rows, target, at_ball)
+            spheres.append(OneSphere(target, fixture, lengths[inside], int((~inside).sum()), before, after))
+    return tuple(spheres)
 
 
 def _judged(model: Robot, data: Dataset, rows: NDArray[np.intp], target: str, at_ball: int | None) -> SphereTest:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -18,6 +17,9 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.robot import Robot
 from truearm.validation.lines import CONVENTION, design
+
+if TYPE_CHECKING:
+    from truearm.validation.jobs import JudgeTolerance
 
 
 # Source: KR5 paper, sections 2.3 and 4.3. A hole of depth l whose far end may lie delta aside of its place lets the
@@ -180,48 +182,19 @@ class AllowedErrors(Record):
 _CONFIGURATIONS: Final = 2000
 
 
-def tolerance(
-    robot: Robot | str | Path,
-    depth: float | Sequence[float],
-    *,
-    lean: float | Sequence[float] | None = None,
-    position: float | Sequence[float] | None = None,
-) -> UsedTolerances | AllowedErrors:
-    """Say what joint errors use of their tolerances, or what tolerances may do at the flange.
-
-    Parameters
-    ----------
-    robot
-        A robot, or what :func:`truearm.load_robot` takes. Without `lean` and `position` it must have joint errors, as
-        ``truearm.axes`` writes them.
-    depth
-        Of each joint's hole [m]: one number for all joints, or one each.
-    lean
-        Perpendicularity or parallelism that is allowed [m], one number or one a joint.
-    position
-        Radius about its place within which a joint may lie [m], half of the drawing's diameter: one number or one a
-        joint.
-
-    Returns
-    -------
-    found
-        With `lean` or `position` the largest flange error that they allow, else the tolerances that the robot's own
-        errors use.
-
-    Raises
-    ------
-    InputError
-        If the robot has other joints than revolute ones, or no joint errors, or a length is none.
-    """
-    robot = robot_argument(robot)
+def judged(asked: JudgeTolerance) -> UsedTolerances | AllowedErrors:
+    """Return what the robot's own errors use of their tolerances, or what tolerances allow."""
+    robot = robot_argument(asked.robot)
     count = len(robot.joints)
-    depths = tuple(checked_depth(d) for d in lengths_argument(depth, "depth", count, one_for_all=True))
-    if lean is None and position is None:
+    depths = tuple(checked_depth(d) for d in lengths_argument(asked.depth, "depth", count, one_for_all=True))
+    if asked.lean is None and asked.position is None:
         with refusals_of("robot"):
             design(robot)  # refuses robots without joint errors
         return UsedTolerances(robot.name, depths, joint_tolerances(robot, depths), robot.simulated_from)
-    leans = lengths_argument(0.0 if lean is None else lean, "lean", count, 0.0, one_for_all=True)
-    positions = lengths_argument(0.0 if position is None else position, "position", count, 0.0, one_for_all=True)
+    leans = lengths_argument(0.0 if asked.lean is None else asked.lean, "lean", count, 0.0, one_for_all=True)
+    positions = lengths_argument(
+        0.0 if asked.position is None else asked.position, "position", count, 0.0, one_for_all=True
+    )
     with refusals_of("robot"):
         errors = robot if robot.convention_name == CONVENTION else converted(robot, CONVENTION)
     q = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))

@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from truearm.engine.base.errors import InputError, Notice, counted, has_error, refusals_of
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.manifest import sets_in
 from truearm.engine.base.writing import output_folder, write_files
-from truearm.engine.choosing.zones import zoned_robot
+from truearm.engine.choosing.zones import ZonedRobot, zoned_robot
 from truearm.engine.command.arguments import (
-    choice_argument,
-    command_argument,
     data_argument,
     files_of,
-    gravity_argument,
-    notes_argument,
-    payload_argument,
     pushed_at_argument,
-    python_call,
     readings_argument,
     refuse_swapped,
     robot_argument,
@@ -36,13 +30,12 @@ from truearm.engine.diagnose.external_force import check_force, check_payload
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.document.records import Record, notice_lines, notice_summaries
 from truearm.engine.document.summaries import error_line, errors_summary, refit_lines, refit_summary
-from truearm.engine.fit.refit import MOVED, Refit
+from truearm.engine.fit.refit import Refit
 from truearm.engine.fit.refit import refit as find_moved
 from truearm.engine.robot.effects.warm_up import LEFT
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.proof import BASE
 from truearm.engine.robot.robot import Robot
-from truearm.engine.robot.wrench import Wrench, WrenchFrame
+from truearm.engine.robot.wrench import Wrench
 from truearm.validation.frames import check_frames, check_names, check_proof
 from truearm.validation.region import (
     OrientationErrors,
@@ -54,6 +47,10 @@ from truearm.validation.region import (
     orientation_summary,
     region_distances,
 )
+
+if TYPE_CHECKING:
+    from truearm.engine.command.groups import Loads
+    from truearm.validation.jobs import Validate
 
 #: What a validation writes into its folder.
 VALIDATION_FILES: Final = ("result.json", "report.html")
@@ -82,6 +79,11 @@ class Validation(Record):
     zones: dict[str, tuple[int, float]] | None = None
     command: str = ""  #: How to run it again.
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """Names of its files."""
+        return VALIDATION_FILES
 
     @property
     def position(self) -> Spread | None:
@@ -171,94 +173,101 @@ class Validation(Record):
         return tuple(folder / name for name in files)
 
 
-def validate(
-    robot: Robot | str | Path,
-    data: Dataset | str | Path,
-    *,
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-    wrench: Wrench | Sequence[float] | str | None = None,
-    wrench_frame: WrenchFrame | None = None,
-    wrench_at: str | None = None,
-    refit: str | None = None,
-    out: str | Path | None = None,
-    notes: Mapping[str, str] | None = None,
-    command: str | None = None,
-) -> Validation:
-    """Judge a calibrated robot on new data taken in the same frames.
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What was given, as it was read."""
 
-    Parameters
-    ----------
-    robot
-        A calibrated robot, or its file; or the ``zones.yaml`` of a calibration by zones: each configuration is then
-        judged by the robot of its zone.
-    data
-        Readings, or a canonical CSV file.
-    payload, gravity
-        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
-        [m/s^2] this time, if they differ from the calibration.
-    wrench, wrench_frame
-        External force and moment while it was measured, the same at every configuration, and whose axes it is given in,
-        as for :func:`truearm.inverse`; None where none acted, or the data have their own (``force_x`` to ``moment_z``).
-    wrench_at
-        The target on which it acted, or ``flange``; None where there is one target.
-    refit
-        What was moved since and is found anew from these readings, while everything else stays: ``base`` (the
-        instrument, or the robot's base), ``targets`` (each by itself), or ``tool`` (all targets as one rigid body). The
-        errors of each configuration are then those of what was found without it.
-    out
-        Folder for result.json and report.html; None writes nothing.
-    notes
-        What to write beside the figures, by its name: ``date``, ``serial``, ``operator``, ``instrument``, or any other.
-    command
-        How to run it again, for the report; None writes the call in Python.
+    robot: Robot  #: With what it carried, and what acted on it.
+    as_calibrated: Robot  #: With what acts on it, and the loads of its file.
+    data: Dataset
+    digest: str | None  #: SHA-256 of the data's file.
+    notices: tuple[Notice, ...]  #: What is to be known about the robot's file and what moved.
+    other_session: tuple[Notice, ...]  #: What is to be known about its warmth.
 
-    Raises
-    ------
-    InputError
-        If the robot has no targets, the data name others, or there are too few of them for `refit`.
-    """
-    refuse_swapped(robot, data, "validate")
-    zoned = zoned_robot(robot)
-    moved = None if refit is None else choice_argument(refit, "refit", {kind: kind for kind in MOVED})
-    notes = notes_argument(notes)
-    call = command_argument(command) or python_call(
-        "validate",
-        robot,
-        data,
-        payload=payload,
-        gravity=gravity,
-        wrench=wrench,
-        wrench_frame=wrench_frame,
-        wrench_at=wrench_at,
-        refit=refit,
-        notes=notes or None,
-    )
-    inputs = files_of(robot, data)
-    folder = None if out is None else Validation.folder(out, inputs, "out")
-    digest = None
-    if isinstance(data, str | Path):
-        with refusals_of("data"):
-            digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """Errors, and by which robot."""
+
+    robot: Robot
+    errors: Errors
+    refit: Refit | None
+    mistaken: tuple[Notice, ...]  #: What looks exchanged, moved, or beyond what was promised.
+
+
+def validated(asked: Validate) -> Validation:
+    """Read, judge, write."""
+    refuse_swapped(asked.robot, asked.data, "validate")
+    zoned = zoned_robot(asked.robot)
+    inputs = files_of(asked.robot, asked.data)
+    folder = None if asked.out is None else Validation.folder(asked.out, inputs, "out")
+    given = _read(asked, zoned)
+    _refuse_unplaced(asked, given)
+    judged = _judged(asked, given)
+    errors, of_zones = judged.errors, None
     if zoned is not None:
-        if moved is not None:
+        errors = zoned.errors(given.robot, given.data)
+        of_zones = zoned.means(given.data, errors)
+    warnings = (
+        *given.notices,
+        *judged.mistaken,
+        *given.other_session,
+        *check_payload(given.robot),
+        *check_force([(given.robot, given.data.postures)]),
+        *_seen_in_training(given.robot, given.data, given.digest),
+    )
+    distances = region_distances(judged.robot, given.data, errors)
+    validation = Validation(
+        source=given.data.source,
+        errors=errors,
+        warnings=warnings,
+        refit=judged.refit,
+        notes=dict(asked.notes or {}),
+        orientations=orientation_errors(judged.robot, given.data, errors),
+        distances=distances,
+        next=() if has_error(warnings) else measure_farther(distances),
+        robot=judged.robot,
+        data=given.data,
+        zones=of_zones,
+        command=asked.again,
+        inputs=inputs,
+    )
+    if folder is not None:
+        validation.save(folder)
+    return validation
+
+
+def _read(asked: Validate, zoned: ZonedRobot | None) -> _Given:
+    """Read robot and data, the former with its loads."""
+    digest, named = None, asked.robot
+    if isinstance(asked.data, str | Path):
+        with refusals_of("data"):
+            digest = hashlib.sha256(read_bytes(path_argument(asked.data, "data"))).hexdigest()
+    if zoned is not None:
+        if asked.refit is not None:
             raise InputError(
                 "what moved is found with one robot, not with zones",
                 parameter="refit",
-                came=moved,
+                came=asked.refit,
                 cure=f"Give {zoned.file.name} instead of the zones.",
             )
-        robot = zoned.file
-    changed = changed_since(robot)
-    pushed = wrench_argument(wrench, wrench_frame)
-    as_calibrated = robot_argument(robot)
-    robot, data = as_measured(robot, data, payload, gravity)
-    robot = _pushed(robot, data, pushed, wrench_at)
+        named = zoned.file
+    changed = changed_since(named)
+    pushed = wrench_argument(asked.wrench, asked.wrench_frame)
+    as_calibrated = robot_argument(named)
+    robot, data = as_measured(named, asked.data, asked.loads)
+    robot = _pushed(robot, data, pushed, asked.wrench_at)
     data, other_session = _of_another_session(robot, data)
     as_calibrated = as_calibrated.with_wrench(robot.wrench)
+    return _Given(robot, as_calibrated, data, digest, tuple(changed), tuple(other_session))
+
+
+def _refuse_unplaced(asked: Validate, given: _Given) -> None:
+    """Refuse readings in the frame of an instrument that nobody knows the place of."""
+    robot, data = given.robot, given.data
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     found_or_held = "base" in identified or (robot.proof is not None and BASE in robot.proof.held)
-    if moved != "base" and data.anchored and robot.fixtures and identified and not found_or_held:
+    if asked.refit != "base" and data.anchored and robot.fixtures and identified and not found_or_held:
         raise InputError(
             "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
             parameter="data",
@@ -266,13 +275,18 @@ def validate(
             cure="Find its place with `refit=base`, calibrate the calibrated robot with `model=frames`, or compare "
             "distances with 'truearm distances'.",
         )
-    errors, found = errors_of(robot, data), None
-    judged, mistaken = robot, list[Notice]()
+
+
+def _judged(asked: Validate, given: _Given) -> _Judged:
+    """Return the errors, of what is found anew if something moved, and what speaks against them."""
+    data, moved = given.data, asked.refit
+    errors, found = errors_of(given.robot, data), None
+    judged, mistaken = given.robot, list[Notice]()
     if moved is not None:
         # Names that were exchanged would pass for targets that moved.
-        mistaken = [] if moved == "base" else check_names(robot, data, errors)
+        mistaken = [] if moved == "base" else check_names(judged, data, errors)
         with refusals_of("refit"):
-            found = find_moved(robot, data, moved)
+            found = find_moved(judged, data, moved)
         judged, errors = found.robot, found.errors
     # Configurations that decide much alone err more without themselves: that is no sign of anything else.
     agreed = errors if found is None else errors_of(judged, data)
@@ -280,39 +294,9 @@ def validate(
         mistaken
         or check_names(judged, data, agreed)
         or check_frames(judged, data, agreed, moved)
-        or check_proof(as_calibrated, data, agreed)
+        or check_proof(given.as_calibrated, data, agreed)
     )
-    of_zones = None
-    if zoned is not None:
-        errors = zoned.errors(robot, data)
-        of_zones = zoned.means(data, errors)
-    warnings = (
-        *changed,
-        *mistaken,
-        *other_session,
-        *check_payload(robot),
-        *check_force([(robot, data.postures)]),
-        *_seen_in_training(robot, data, digest),
-    )
-    distances = region_distances(judged, data, errors)
-    validation = Validation(
-        source=data.source,
-        errors=errors,
-        warnings=warnings,
-        refit=found,
-        notes=notes,
-        orientations=orientation_errors(judged, data, errors),
-        distances=distances,
-        next=() if has_error(warnings) else measure_farther(distances),
-        robot=judged,
-        data=data,
-        zones=of_zones,
-        command=call,
-        inputs=inputs,
-    )
-    if folder is not None:
-        validation.save(folder)
-    return validation
+    return _Judged(judged, errors, found, tuple(mistaken))
 
 
 def _of_another_session(robot: Robot, data: Dataset) -> tuple[Dataset, list[Notice]]:
@@ -373,7 +357,7 @@ def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[N
     ]
 
 
-def as_measured(robot: object, data: object, payload: object, gravity: object) -> tuple[Robot, Dataset]:
+def as_measured(robot: object, data: object, loads: Loads) -> tuple[Robot, Dataset]:
     """Return the robot with what it carried when data were measured, and those, or refuse what cannot be judged."""
     measured, robot = data_argument(data), robot_argument(robot)
     if not robot.targets:
@@ -384,7 +368,7 @@ def as_measured(robot: object, data: object, payload: object, gravity: object) -
             cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
         )
     data = readings_argument(robot, measured)
-    robot = robot.with_payload(payload_argument(payload), gravity_argument(gravity))
+    robot = loads.on(robot)
     if data.temperature is None and any(effect.warmed for effect in robot.effects):
         raise InputError(
             "the robot was calibrated with its temperature, and the data hold no temperature",

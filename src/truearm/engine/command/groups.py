@@ -45,6 +45,12 @@ def _silent(words: str) -> None:
     """Tell nobody."""
 
 
+def _devices() -> list[str]:
+    from truearm.engine.twin.devices import DEVICES
+
+    return [device.name for device in DEVICES]
+
+
 def _languages() -> list[str]:
     from truearm.engine.programs import PROGRAM_LANGUAGES
 
@@ -137,6 +143,17 @@ class Instrument(Request):
         Number("deg", low=0.0, deviation=True),
         "Of the instrument: standard deviation of an angle.",
         default=math.radians(0.005),
+    )
+
+
+class SeenBy(Request):
+    """Which instrument reads."""
+
+    device: str | None = option(
+        Choice("NAME", _devices),
+        "An instrument of 'truearm devices'.",
+        default=None,
+        shown="one that sees every target everywhere",
     )
 
 
@@ -259,6 +276,16 @@ class JointsWritten(Request):
     )
 
 
+class JointsOfModel(Request):
+    """Whose joint positions data hold, where those of the model are the usual ones."""
+
+    joints: JointsOf = option(
+        Choice(known=("controller", "model")),
+        "Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
+        default="model",
+    )
+
+
 class Programmed(Request):
     """A program that drives what is planned."""
 
@@ -311,4 +338,12 @@ class IntoFolder(Request):
 
     out: str | Path | None = option(
         File("DIR"), "Folder for the results.", default=None, shown="none are written", needed=True, repeated=False
+    )
+
+
+class AlsoIntoFolder(Request):
+    """What writes files into a folder where one is asked for."""
+
+    out: str | Path | None = option(
+        File("DIR"), "Folder for the results.", default=None, shown="none are written", repeated=False
     )

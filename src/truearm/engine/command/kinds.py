@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Final
 
 from truearm.engine.base.errors import InputError, Words, wrong_kind
@@ -307,6 +308,34 @@ class NumberOr(Given):
             return int(typed)
         except ValueError:
             return typed
+
+
+class CountOr(NumberOr):
+    """How many of something, or what has them: measurements or a file."""
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse what is no count."""
+        from truearm.engine.command.arguments import count_argument
+        from truearm.engine.data.dataset import Dataset
+
+        return value if isinstance(value, Dataset | str | Path) else count_argument(value, name)
+
+
+class Truth(Given):
+    """What a simulated robot truly is: a robot, its file, or a name."""
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse what is neither a robot nor a text."""
+        from truearm.engine.base.files import path_argument
+        from truearm.engine.robot.robot import Robot
+
+        if isinstance(value, Robot):
+            return value
+        if not isinstance(value, str | Path):
+            allowed = "nominal, random, gear-errors, tooth-errors, a truth's name, or a robot"
+            raise wrong_kind("a truth belongs here", value, name, allowed)
+        path_argument(value, name)
+        return value
 
 
 class PayloadKind(Given):

@@ -217,7 +217,7 @@ def command_of(request: type[Request]) -> Callable[..., None]:
             own = {"command": asked.as_command(), "progress": say}
             result = replace(asked, **{name: value for name, value in own.items() if name in declared}).run()
         _show(result, as_json=as_json, details=details)
-        if not as_json and result.written:
+        if not as_json and result.written and "out" in given:
             print_line(f"Written to {given['out']}: {', '.join(result.written)}")
         if not result.finished:
             raise typer.Exit(3)
@@ -246,7 +246,7 @@ def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, O
         text = f"{text.removesuffix('.')} \\[{kind.at_edges}]."
     typed = kind.typed
     if declared.is_argument:
-        how = typer.Argument(metavar=metavar, help=text)
+        how = typer.Argument(metavar=metavar, help=text, show_default=False)
     else:
         told = isinstance(declared.shown, str) or (declared.shown and default not in (None, ()))
         shown: Any = declared.shown if told and not declared.needed else False
@@ -287,7 +287,7 @@ def _shown_if_kept(*, as_json: bool, details: bool) -> Iterator[None]:
 
 def _show(result: Any, *, as_json: bool, details: bool) -> None:
     if as_json:
-        print_json(result.summary())
+        print_json(result.as_json())
     else:
         print_record(result, details=details)
 
@@ -328,15 +328,6 @@ WrenchFrameText = Annotated[
         metavar="base|tool|world|controller",
         help="Whose axes --wrench is given in.",
         show_default="base",
-    ),
-]
-WrenchAtText = Annotated[
-    str | None,
-    typer.Option(
-        "--wrench-at",
-        metavar="NAME",
-        help="The target on which --wrench acts, or flange.",
-        show_default="the only target",
     ),
 ]
 NoteTexts = Annotated[

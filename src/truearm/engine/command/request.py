@@ -178,7 +178,9 @@ def metavar_of(declared: Option) -> str:
 
 def flag_of(name: str, declared: Option) -> str:
     """Return how the command line calls an option, or an argument by its metavar."""
-    return metavar_of(declared) if declared.is_argument else f"--{(declared.word or name).replace('_', '-')}"
+    return (
+        metavar_of(declared).strip("[]") if declared.is_argument else f"--{(declared.word or name).replace('_', '-')}"
+    )
 
 
 class Runs(Protocol[R]):

@@ -56,6 +56,10 @@ class Record(ABC):
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them, units in the names."""
 
+    def as_json(self) -> Any:
+        """Return what the command prints as JSON."""
+        return self.summary()
+
     @abstractmethod
     def lines(self) -> list[str]:
         """Return the result in words and figures, line by line, as the command prints it."""

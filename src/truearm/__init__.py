@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from truearm.calibration.calibrate import calibrate as calibrate
     from truearm.calibration.result import Calibration as Calibration
     from truearm.checking.check import check as check
-    from truearm.compensation.compensate import compensate as compensate
-    from truearm.compensation.compensate import revert as revert
-    from truearm.compensation.path import path as path
+    from truearm.compensation.jobs import compensate as compensate
+    from truearm.compensation.jobs import path as path
+    from truearm.compensation.jobs import revert as revert
     from truearm.drawn_circle.import_circle import import_circle as import_circle
     from truearm.engine.base.errors import InputError as InputError
     from truearm.engine.command.reading import load_data as load_data
@@ -99,7 +99,7 @@ JOBS: Final = {
     "plan": "truearm.planning.plan",
     "plan_inclinometers": "truearm.inclinometers.pairs",
     "poses": "truearm.planning.poses",
-    "path": "truearm.compensation.path",
+    "path": "truearm.compensation.jobs",
     "measure": "truearm.measuring.measure",
     "simulate": "truearm.simulation.simulate",
     "simulate_inclinometers": "truearm.inclinometers.pairs",
@@ -119,8 +119,8 @@ JOBS: Final = {
     "hexapod_plan": "truearm.hexapod.jobs",
     "hexapod_solve": "truearm.hexapod.jobs",
     "hexapod_world_frame": "truearm.hexapod.jobs",
-    "compensate": "truearm.compensation.compensate",
-    "revert": "truearm.compensation.compensate",
+    "compensate": "truearm.compensation.jobs",
+    "revert": "truearm.compensation.jobs",
     "convert": "truearm.robot_files.convert",
     "export": "truearm.robot_files.convert",
     "export_robodk": "truearm.robot_files.convert",

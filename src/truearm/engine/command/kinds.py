@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar, Final
 
 from truearm.engine.base.errors import InputError, Words, wrong_kind
@@ -72,6 +73,25 @@ class File(Given):
 
         path_argument(value, name)
         return value
+
+
+@dataclass(frozen=True)
+class Files(Given):
+    """One or more files."""
+
+    what: str = "file"  #: What each of them is, for messages.
+
+    typed = list[str]
+
+    def check(self, value: Any, name: str) -> Any:
+        """Return their paths."""
+        from truearm.engine.command.arguments import paths_argument
+
+        return paths_argument(value, name, self.what)
+
+    def typed_again(self, value: Any) -> list[str]:
+        """Return each of them."""
+        return [*map(str, value)]
 
 
 class Flag(Given):
@@ -251,6 +271,13 @@ class Choice(Kind):
 
 
 @dataclass(frozen=True)
+class ByFlags(Choice):
+    """One of some names, for which the command has flags."""
+
+    flags: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: Word and help of each but the default.
+
+
+@dataclass(frozen=True)
 class Names(Kind):
     """Names."""
 
@@ -373,9 +400,21 @@ class WrenchKind(Given):
 
     def typed_again(self, value: Any) -> list[str]:
         """Return its text."""
-        if isinstance(value, str):
-            return [value]
+        if isinstance(value, str | Path):
+            return [str(value)]
         return [value.text] if hasattr(value, "text") else Numbers().typed_again(value)
+
+
+class Positions(Given):
+    """Joint positions by the model, or a text in deg and mm: only with the robot it is known what that is."""
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse a text without numbers; the job counts them."""
+        from truearm.engine.command.texts import read_numbers
+
+        if isinstance(value, str):
+            read_numbers(value, name, "0,-30,45, ..")
+        return value
 
 
 class NamedFiles(Given):

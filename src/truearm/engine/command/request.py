@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import Field, dataclass, field, fields
 from typing import Any, ClassVar, Final, ParamSpec, Protocol, TypeVar, dataclass_transform
 
-from truearm.engine.command.kinds import Kind
+from truearm.engine.command.kinds import ByFlags, Kind
 
 #: What a default is that is compared with what was given.
 _PLAIN: Final = (bool, int, float, str, tuple)
@@ -50,15 +50,21 @@ def option(
     metavar: str | None = None,
     *,
     default: Any,
+    kw_only: bool = True,
     word: str | None = None,
     shown: str | bool = True,
     more: str = "",
     needed: bool = False,
     repeated: bool = True,
 ) -> Any:
-    """Declare an option with a default; arguments as in :class:`Option`."""
-    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=False, repeated=repeated)
-    return field(default=default, kw_only=True, metadata={"option": made})
+    """Declare an option with a default; arguments as in :class:`Option`.
+
+    Args:
+        kw_only: Whether Python takes it by its name alone; the command has another as an argument if it has no word.
+    """
+    argument = not kw_only and word is None
+    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=argument, repeated=repeated)
+    return field(default=default, kw_only=kw_only, metadata={"option": made})
 
 
 def required(
@@ -81,6 +87,8 @@ class Request:
     job: ClassVar[str] = ""
     #: Words of the command; None for the name of the job.
     words: ClassVar[str | None] = None
+    #: What is done where its job is a flag of the command; it takes some of the same options alone.
+    instead: ClassVar[type[Request] | None] = None
     #: What the docstring says under Raises.
     refuses: ClassVar[str] = "For anything that cannot be used, with a message that says what to do."
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -144,6 +152,8 @@ class Request:
             flag = flag_of(name, declared)
             if declared.is_argument:
                 arguments += declared.kind.typed_again(value)
+            elif isinstance(declared.kind, ByFlags):
+                words.append(f"--{declared.kind.flags[value][0]}")
             elif value is True:
                 words.append(flag)
             else:
@@ -164,7 +174,9 @@ def metavar_of(declared: Option) -> str:
 
 def flag_of(name: str, declared: Option) -> str:
     """Return how the command line calls an option, or an argument by its metavar."""
-    return metavar_of(declared) if declared.is_argument else f"--{(declared.word or name).replace('_', '-')}"
+    if declared.is_argument:
+        return metavar_of(declared).strip("[]")
+    return f"--{(declared.word or name).replace('_', '-')}"
 
 
 class Runs(Protocol[R]):
@@ -204,7 +216,7 @@ def docstring(request: type[Request]) -> str:
 
 
 def _indented(text: str) -> str:
-    return textwrap.fill(text, 116, initial_indent="    ", subsequent_indent="    ")
+    return textwrap.fill(text, 116, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
 
 
 def _entry(declared: Option, default: Any) -> str:

@@ -55,13 +55,13 @@ if TYPE_CHECKING:
     from truearm.measuring.measure import measure as measure
     from truearm.planning.plan import plan as plan
     from truearm.planning.poses import poses as poses
-    from truearm.robot_files.convert import convert as convert
-    from truearm.robot_files.convert import export as export
-    from truearm.robot_files.convert import export_robodk as export_robodk
-    from truearm.robot_files.import_ur_kinematics import import_ur_kinematics as import_ur_kinematics
-    from truearm.robot_files.inverse import inverse as inverse
-    from truearm.robot_files.show import robots as robots
-    from truearm.robot_files.show import show as show
+    from truearm.robot_files.jobs import convert as convert
+    from truearm.robot_files.jobs import export as export
+    from truearm.robot_files.jobs import export_robodk as export_robodk
+    from truearm.robot_files.jobs import import_ur_kinematics as import_ur_kinematics
+    from truearm.robot_files.jobs import inverse as inverse
+    from truearm.robot_files.jobs import robots as robots
+    from truearm.robot_files.jobs import show as show
     from truearm.simulation.influence import influence as influence
     from truearm.simulation.simulate import devices as devices
     from truearm.simulation.simulate import simulate as simulate
@@ -80,7 +80,7 @@ if TYPE_CHECKING:
 #: record.
 JOBS: Final = {
     "load_robot": "truearm.engine.command.reading",
-    "show": "truearm.robot_files.show",
+    "show": "truearm.robot_files.jobs",
     "load_data": "truearm.engine.command.reading",
     "import_table": "truearm.importing.files",
     "import_guess": "truearm.importing.guess",
@@ -90,7 +90,7 @@ JOBS: Final = {
     "import_sockets": "truearm.importing.files",
     "import_hand_eye": "truearm.board.import_hand_eye",
     "import_ros": "truearm.bags.import_ros",
-    "import_ur_kinematics": "truearm.robot_files.import_ur_kinematics",
+    "import_ur_kinematics": "truearm.robot_files.jobs",
     "check": "truearm.checking.check",
     "calibrate": "truearm.calibration.calibrate",
     "tilting": "truearm.inclinometers.tilting",
@@ -103,8 +103,8 @@ JOBS: Final = {
     "measure": "truearm.measuring.measure",
     "simulate": "truearm.simulation.simulate",
     "simulate_inclinometers": "truearm.inclinometers.pairs",
-    "inverse": "truearm.robot_files.inverse",
-    "robots": "truearm.robot_files.show",
+    "inverse": "truearm.robot_files.jobs",
+    "robots": "truearm.robot_files.jobs",
     "devices": "truearm.simulation.simulate",
     "axes": "truearm.axis_circles.axes",
     "tolerance": "truearm.validation.tolerances",
@@ -121,9 +121,9 @@ JOBS: Final = {
     "hexapod_world_frame": "truearm.hexapod.jobs",
     "compensate": "truearm.compensation.jobs",
     "revert": "truearm.compensation.jobs",
-    "convert": "truearm.robot_files.convert",
-    "export": "truearm.robot_files.convert",
-    "export_robodk": "truearm.robot_files.convert",
+    "convert": "truearm.robot_files.jobs",
+    "export": "truearm.robot_files.jobs",
+    "export_robodk": "truearm.robot_files.jobs",
     "study": "truearm.starting.study",
     "fleet": "truearm.fleets.fleet",
     "new_robot": "truearm.starting.example",

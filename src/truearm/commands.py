@@ -30,7 +30,15 @@ from truearm.inclinometers.command import plan_pairs, simulate_readings, tilting
 from truearm.iso9283.command import app as iso9283
 from truearm.measuring.command import measure
 from truearm.planning.command import plan, poses
-from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
+from truearm.robot_files.jobs import (
+    ConvertRobot,
+    ExportRobot,
+    ExportToRobodk,
+    FindJoints,
+    ImportUrKinematics,
+    ListRobots,
+    ShowRobot,
+)
 from truearm.simulation.command import devices, influence, simulate
 from truearm.starting.command import demo, example, new_robot, study, study_help
 from truearm.studio.command import studio
@@ -76,7 +84,7 @@ importing.command()(robodk)
 importing.command()(circle)
 importing.command()(sockets)
 importing.command("hand-eye")(hand_eye)
-importing.command("ur-kinematics")(ur_kinematics)
+add(importing, ImportUrKinematics)
 importing.command()(ros)
 
 app.command()(check)
@@ -85,7 +93,7 @@ app.command()(tilting)
 app.command()(validate)
 app.command()(distances)
 add(app, Compensate)
-app.command()(ik)
+add(app, FindJoints)
 app.command()(by_device(plan, {"inclinometers": plan_pairs}))
 app.command()(measure)
 app.command()(poses)
@@ -100,11 +108,7 @@ app.command()(devices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")
 app.add_typer(iso9283, name="iso9283")
-app.command()(robots)
-app.command()(show)
-app.command()(convert)
-app.command()(export)
-app.command()(export_robodk)
+add(app, ListRobots, ShowRobot, ConvertRobot, ExportRobot, ExportToRobodk)
 app.command("new-robot")(new_robot)
 app.command(help=study_help())(study)
 app.command()(fleet)

@@ -84,7 +84,21 @@ def test_an_option_is_declared_once() -> None:
 
 
 #: Names that mean several things, still.
-TWICE = ("frames", "out", "plan", "program", "programs", "seed", "wrench")
+TWICE = (
+    "file",
+    "frame",
+    "frames",
+    "joints",
+    "joints_are",
+    "out",
+    "plan",
+    "poses",
+    "program",
+    "programs",
+    "robot",
+    "seed",
+    "wrench",
+)
 
 
 def test_units_are_those_at_the_edges() -> None:

@@ -24,8 +24,7 @@ from tests.studio.typing_in import typed
 from truearm.calibration.calibrate import calibrate
 from truearm.compensation.jobs import compensate
 from truearm.engine.robot.library import load_robot
-from truearm.robot_files.convert import export
-from truearm.robot_files.import_ur_kinematics import import_ur_kinematics
+from truearm.robot_files.jobs import export, import_ur_kinematics
 from truearm.studio.drawn_program import corrected_program
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.programs import ProgramsPage

@@ -406,15 +406,11 @@ class WrenchKind(Given):
 
 
 class Positions(Given):
-    """Joint positions by the model, or a text in deg and mm: only with the robot it is known what that is."""
+    """Joint positions as Python has them, or a text in deg and mm, which the job reads with the robot at hand."""
 
-    def check(self, value: Any, name: str) -> Any:
-        """Refuse a text without numbers; the job counts them."""
-        from truearm.engine.command.texts import read_numbers
-
-        if isinstance(value, str):
-            read_numbers(value, name, "0,-30,45, ..")
-        return value
+    def typed_again(self, value: Any) -> list[str]:
+        """Return a text; numbers are typed in units that only the robot knows."""
+        return [value if isinstance(value, str) else self.metavar]
 
 
 class NamedFiles(Given):

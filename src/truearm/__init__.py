@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from truearm.calibration.calibrate import calibrate as calibrate
     from truearm.calibration.result import Calibration as Calibration
     from truearm.checking.check import check as check
-    from truearm.compensation.compensate import compensate as compensate
-    from truearm.compensation.compensate import revert as revert
-    from truearm.compensation.path import path as path
+    from truearm.compensation.jobs import compensate as compensate
+    from truearm.compensation.jobs import path as path
+    from truearm.compensation.jobs import revert as revert
     from truearm.drawn_circle.import_circle import import_circle as import_circle
     from truearm.engine.base.errors import InputError as InputError
     from truearm.engine.command.loading import load_data as load_data
@@ -56,13 +56,13 @@ if TYPE_CHECKING:
     from truearm.measuring.measure import measure as measure
     from truearm.planning.plan import plan as plan
     from truearm.planning.poses import poses as poses
-    from truearm.robot_files.convert import convert as convert
-    from truearm.robot_files.convert import export as export
-    from truearm.robot_files.convert import export_robodk as export_robodk
-    from truearm.robot_files.import_ur_kinematics import import_ur_kinematics as import_ur_kinematics
-    from truearm.robot_files.inverse import inverse as inverse
-    from truearm.robot_files.show import robots as robots
-    from truearm.robot_files.show import show as show
+    from truearm.robot_files.jobs import convert as convert
+    from truearm.robot_files.jobs import export as export
+    from truearm.robot_files.jobs import export_robodk as export_robodk
+    from truearm.robot_files.jobs import import_ur_kinematics as import_ur_kinematics
+    from truearm.robot_files.jobs import inverse as inverse
+    from truearm.robot_files.jobs import robots as robots
+    from truearm.robot_files.jobs import show as show
     from truearm.simulation.jobs import devices as devices
     from truearm.simulation.jobs import influence as influence
     from truearm.simulation.jobs import simulate as simulate
@@ -81,7 +81,7 @@ if TYPE_CHECKING:
 #: record.
 JOBS: Final = {
     "load_robot": "truearm.engine.command.loading",
-    "show": "truearm.robot_files.show",
+    "show": "truearm.robot_files.jobs",
     "load_data": "truearm.engine.command.loading",
     "import_table": "truearm.importing.jobs",
     "import_guess": "truearm.importing.jobs",
@@ -91,7 +91,7 @@ JOBS: Final = {
     "import_sockets": "truearm.importing.jobs",
     "import_hand_eye": "truearm.board.import_hand_eye",
     "import_ros": "truearm.bags.import_ros",
-    "import_ur_kinematics": "truearm.robot_files.import_ur_kinematics",
+    "import_ur_kinematics": "truearm.robot_files.jobs",
     "check": "truearm.checking.check",
     "calibrate": "truearm.calibration.calibrate",
     "tilting": "truearm.inclinometers.tilting",
@@ -100,12 +100,12 @@ JOBS: Final = {
     "plan": "truearm.planning.plan",
     "plan_inclinometers": "truearm.inclinometers.pairs",
     "poses": "truearm.planning.poses",
-    "path": "truearm.compensation.path",
+    "path": "truearm.compensation.jobs",
     "measure": "truearm.measuring.measure",
     "simulate": "truearm.simulation.jobs",
     "simulate_inclinometers": "truearm.inclinometers.pairs",
-    "inverse": "truearm.robot_files.inverse",
-    "robots": "truearm.robot_files.show",
+    "inverse": "truearm.robot_files.jobs",
+    "robots": "truearm.robot_files.jobs",
     "devices": "truearm.simulation.jobs",
     "axes": "truearm.axis_circles.axes",
     "tolerance": "truearm.validation.jobs",
@@ -120,11 +120,11 @@ JOBS: Final = {
     "hexapod_plan": "truearm.hexapod.jobs",
     "hexapod_solve": "truearm.hexapod.jobs",
     "hexapod_world_frame": "truearm.hexapod.jobs",
-    "compensate": "truearm.compensation.compensate",
-    "revert": "truearm.compensation.compensate",
-    "convert": "truearm.robot_files.convert",
-    "export": "truearm.robot_files.convert",
-    "export_robodk": "truearm.robot_files.convert",
+    "compensate": "truearm.compensation.jobs",
+    "revert": "truearm.compensation.jobs",
+    "convert": "truearm.robot_files.jobs",
+    "export": "truearm.robot_files.jobs",
+    "export_robodk": "truearm.robot_files.jobs",
     "study": "truearm.starting.study",
     "fleet": "truearm.fleets.fleet",
     "new_robot": "truearm.starting.jobs",

@@ -18,7 +18,7 @@ from truearm.bags.import_ros import ImportRos
 from truearm.board.import_hand_eye import ImportHandEye
 from truearm.calibration.calibrate import Calibrate
 from truearm.checking.check import Check
-from truearm.compensation.command import compensate, path
+from truearm.compensation.jobs import Compensate, FollowPath
 from truearm.drawn_circle.import_circle import ImportCircle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
@@ -30,7 +30,15 @@ from truearm.inclinometers.command import plan_pairs, simulate_readings, tilting
 from truearm.iso9283.command import app as iso9283
 from truearm.measuring.command import measure
 from truearm.planning.command import plan, poses
-from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
+from truearm.robot_files.jobs import (
+    ConvertRobot,
+    ExportRobot,
+    ExportToRobodk,
+    FindJoints,
+    ImportUrKinematics,
+    ListRobots,
+    ShowRobot,
+)
 from truearm.simulation.command import simulate
 from truearm.simulation.jobs import FindInfluence, ListDevices
 from truearm.starting.command import study_help
@@ -73,34 +81,23 @@ importing = Commands(
     no_args_is_help=True,
 )
 add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK, ImportCircle, ImportSockets, ImportHandEye)
-importing.command("ur-kinematics")(ur_kinematics)
-add(importing, ImportRos)
+add(importing, ImportUrKinematics, ImportRos)
 
 add(app, Check, Calibrate)
 app.command()(tilting)
-add(app, Validate, JudgeDistances)
-app.command()(compensate)
-app.command()(ik)
+add(app, Validate, JudgeDistances, Compensate, FindJoints)
 app.command()(by_device(plan, {"inclinometers": plan_pairs}))
 app.command()(measure)
 app.command()(poses)
-app.command()(path)
-add(app, Axes, JudgeTolerance, TestLines, FindInfluence, JudgeSphere)
+add(app, FollowPath, Axes, JudgeTolerance, TestLines, FindInfluence, JudgeSphere)
 app.command()(by_device(simulate, {"inclinometers": simulate_readings}))
 add(app, ListDevices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")
 app.add_typer(iso9283, name="iso9283")
-app.command()(robots)
-app.command()(show)
-app.command()(convert)
-app.command()(export)
-app.command()(export_robodk)
-add(app, NewRobot)
+add(app, ListRobots, ShowRobot, ConvertRobot, ExportRobot, ExportToRobodk, NewRobot)
 app.command(help=study_help())(command_of(MakeStudy))
-add(app, CalibrateFleet)
-add(app, WriteExample)
-add(app, Demonstrate)
+add(app, CalibrateFleet, WriteExample, Demonstrate)
 app.command()(studio)
 
 

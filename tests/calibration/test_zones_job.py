@@ -22,7 +22,7 @@ from truearm.engine.robot.robot_file.seal import is_intact
 from truearm.engine.twin.devices import named_device
 from truearm.engine.twin.devices.device import measured_with
 from truearm.engine.twin.twin import Twin
-from truearm.robot_files.inverse import inverse
+from truearm.robot_files.jobs import inverse
 from truearm.validation.jobs import validate
 
 HEAD = "truearm: truearm-zones/1\nunits: {length: mm}\n"

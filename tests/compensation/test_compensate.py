@@ -195,14 +195,6 @@ def test_moves_are_split(truearm: Truearm, cell: Path) -> None:
     assert "moves-not-divided" in said
     text = (cell / "out" / "plate.mod").read_text()
     assert text.count("MoveC") > 2
-    for bad, words in (
-        ("0", "allowed: 0.001 to 100 mm"),
-        ("-1", "moves cannot be split by this distance"),
-        ("nan", "--split: the number cannot be used"),
-    ):
-        code, said = run(truearm, cell, "--split", bad, out="bad")
-        assert code == 2
-        assert words in said
 
 
 def test_a_move_on_which_the_posture_changes_is_not_split(truearm: Truearm, cell: Path) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,10 +59,8 @@ def test_the_call_that_made_it_is_in_the_report(program: Path) -> None:
     robot = program.parent / "calibrated.yaml"
     robot.write_text(robot_text(calibrated()))
     correction = compensate(robot, [program], payload="1kg,0mm,0mm,50mm", split=1e-5, out=program.parent / "o")
-    answers = "controller_kinematics='nominal', split=1e-05, taught=['none']"
-    assert correction.command == (
-        f"truearm.compensate('{robot}', ['{program}'], payload='1kg,0mm,0mm,50mm', {answers})"
-    )
+    answers = "taught=['none'], payload='1kg,0mm,0mm,50mm', controller_kinematics='nominal'"
+    assert correction.command == f"truearm.compensate('{robot}', ['{program}'], split=1e-05, {answers})"
     assert correction.robot.payload.mass == 1.0
     page = (program.parent / "o" / "compensation.html").read_text()
     assert "split=1e-05" in page
@@ -108,14 +107,14 @@ def test_refusals_name_the_parameter(program: Path) -> None:
         "tools:\n  tElse: {of: flange}\nframes:\n  wobjElse: {of: base}\n"
     )
     robot = calibrated()
-    for keywords, parameter, said in (
+    cases: tuple[tuple[dict[str, Any], str, str], ...] = (
         ({"out": program.parent}, "out", "would be overwritten"),
         ({"tools": cell}, "tools", r"no tool that the programs use is in the file.*or leave out `tools`"),
         ({"frames": cell}, "frames", r"no frame that the programs use is in the file.*or leave out `frames`"),
         ({"tools": program.parent / "none.yaml"}, "tools", "none.yaml"),
         ({"frames": program.parent / "none.yaml"}, "frames", "none.yaml"),
-        ({"split": 0.5}, "split", r"cannot be split by this distance; got '500 mm'; allowed: 0.001 to 100 mm"),
-    ):
+    )
+    for keywords, parameter, said in cases:
         with pytest.raises(InputError, match=said) as refusal:
             compensate(robot, [program], **keywords)
         assert refusal.value.parameter == parameter

@@ -46,7 +46,7 @@ from truearm.measuring.reading_log import ReadingLog, read_about
 from truearm.measuring.session import Quality, Session
 from truearm.measuring.watched_folder import WatchedFolder
 from truearm.robot_files.formats import complete_dh_csv, read_dh_csv
-from truearm.robot_files.import_ur_kinematics import import_ur_kinematics
+from truearm.robot_files.jobs import import_ur_kinematics
 
 
 @dataclass(frozen=True)

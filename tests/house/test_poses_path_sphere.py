@@ -193,7 +193,6 @@ def test_poses_for_a_controller_with_kinematics_of_its_own_are_refused(tmp_path:
         ({"programs": ["basic"]}, "no language of this name", "programs"),
         ({"programs": ["rapid"], "name": "2nd"}, "cannot be called so in every language", "name"),
         ({"programs": ["rapid"], "targets": "pulses"}, "no targets of this name", "targets"),
-        ({"spacing": 0.0}, "targets are some time apart", "spacing"),
         ({"seed": (0.0, 0.0)}, "seed", "seed"),
         ({"accept": ["anything"]}, "anything", "accept"),
         ({"seed": (0.0, 0.2, 0.4, 0.0, 0.0, 0.0), "file": "way.yaml"}, "no such file", "file"),

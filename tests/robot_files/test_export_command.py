@@ -67,14 +67,6 @@ def test_nearly_parallel_axes_are_refused(truearm: Truearm, calibrated: Path, fo
     assert not (tmp_path / "table.csv").exists()
 
 
-def test_unknown_formats_are_refused(truearm: Truearm, tmp_path: Path) -> None:
-    run = truearm("export", "irb120", "--format", "haiati", "--out", tmp_path / "table.csv")
-    assert (run.code, run.out) == (2, "")
-    message = " ".join(run.err.split())
-    assert "--format: there is no format of this name; got 'haiati'" in message
-    assert "allowed: dh, mdh, hayati, urdf, json, python, ur-kinematics. Did you mean hayati?" in message
-
-
 @pytest.mark.parametrize("format_", FORMATS)
 def test_nothing_is_overwritten(truearm: Truearm, format_: str, tmp_path: Path) -> None:
     out = tmp_path / "mine"

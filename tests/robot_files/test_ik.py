@@ -125,7 +125,6 @@ def test_what_is_not_reached_is_explained_and_ends_with_3(truearm: Truearm, tmp_
         ("numbers separated by commas", ["--seed-joints", "a,b"]),
         ("--seed-joints: NaN and infinity cannot be used here", ["--seed-joints", "nan,0,0,0,0,0"]),
         ("there is no target; got 'gripper'", ["--target", "gripper"]),
-        ("--frame: there is no frame of this name", ["--frame", "tool"]),
         ("--position-only, --axis-only: only one of them", ["--position-only", "--axis-only"]),
     ],
 )

@@ -9,7 +9,7 @@ from tests.studio.pressing import below
 from tests.studio.test_jog_page import act, eventually
 from tests.studio.typing_in import typed
 
-from truearm.compensation.path import path as job
+from truearm.compensation.jobs import path as job
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.library import load_robot
 from truearm.studio.pages.jog import JogPage

@@ -12,7 +12,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.robot.inverse.pose_solver import PoseStatus
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.transform import Transform, rotation_vector
-from truearm.robot_files.inverse import inverse
+from truearm.robot_files.jobs import inverse
 from truearm.studio.jogging import Jogging
 
 Q = np.deg2rad([10.0, 20.0, -15.0, 30.0, 40.0, -50.0])

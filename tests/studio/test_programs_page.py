@@ -22,10 +22,9 @@ from tests.studio.pressing import act, at_once, below, notices
 from tests.studio.typing_in import typed
 
 from truearm.calibration.calibrate import calibrate
-from truearm.compensation.compensate import compensate
+from truearm.compensation.jobs import compensate
 from truearm.engine.robot.library import load_robot
-from truearm.robot_files.convert import export
-from truearm.robot_files.import_ur_kinematics import import_ur_kinematics
+from truearm.robot_files.jobs import export, import_ur_kinematics
 from truearm.studio.drawn_program import corrected_program
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.programs import ProgramsPage
@@ -248,7 +247,7 @@ def test_a_correction_that_is_refused_leaves_nothing_of_the_one_before(
     assert "44 targets" in page._said.content
     assert page._stands.content == ""
     report = (folder / "result/corrected/compensation.html").read_text()
-    assert "truearm compensate result/calibrated.yaml plate.mod --tool cell.yaml --controller" in report
+    assert "truearm compensate result/calibrated.yaml plate.mod --tool cell.yaml --taught" in report
     (folder / "cell.yaml").write_text(_TOOL.replace("tProbe", "tOther"))
     act(page._run)
     assert "tother" in notices(window)

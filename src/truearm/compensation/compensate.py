@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from truearm.compensation.advice import check_correction
+from truearm.compensation.jobs import TAUGHT_KIND
 from truearm.compensation.limit import (
     CorrectionLimit,
     check_size,
@@ -19,42 +21,20 @@ from truearm.compensation.limit import (
     controller_question,
     correction_limit,
     day_of,
+    kinematics_file,
     ledger_of,
     ledger_to_write,
     numbers_read,
     refuse_corrected_already,
     refuse_kinematics_of_another_arm,
     refuse_proprietary_controller,
+    with_controller,
 )
-from truearm.compensation.program_correction import (
-    CorrectedPrograms,
-    ProgramSplit,
-    check_tolerance,
-    corrected_programs,
-    split_program,
-)
+from truearm.compensation.program_correction import CorrectedPrograms, ProgramSplit, corrected_programs, split_program
 from truearm.compensation.result import REPORT, FileCorrection, ProgramCorrection, RestoredPrograms
-from truearm.engine.base.arrays import finite_number
 from truearm.engine.base.errors import InputError, Notice, counted, refusals_at, refusals_of
-from truearm.engine.base.files import path_argument
 from truearm.engine.base.units import IN_PROGRAMS
-from truearm.engine.command.arguments import (
-    choice_argument,
-    choices_argument,
-    command_argument,
-    files_of,
-    flag_argument,
-    folder_for,
-    hashes_of,
-    names_argument,
-    notes_argument,
-    paths_argument,
-    payload_argument,
-    progress_argument,
-    python_call,
-    robot_argument,
-    wrench_argument,
-)
+from truearm.engine.command.arguments import files_of, folder_for, hashes_of, robot_argument, wrench_argument
 from truearm.engine.command.split import (
     NOT_BETTER,
     NUMBERS_READ,
@@ -79,144 +59,131 @@ from truearm.engine.programs.cell import (
 from truearm.engine.programs.chosen_targets import TAUGHT, Choice, Taught, refuse_unanswered, taught_question
 from truearm.engine.programs.correction import Correction, shared_motion
 from truearm.engine.programs.gauge import turns_between
-from truearm.engine.programs.program import Edit, Language, correction_comment
-from truearm.engine.programs.program_files import edited, language_called, program_files, read_programs, restored
+from truearm.engine.programs.program import Edit, Language, Program, correction_comment
+from truearm.engine.programs.program_files import (
+    ProgramFile,
+    edited,
+    language_called,
+    program_files,
+    read_programs,
+    restored,
+)
 from truearm.engine.programs.program_poses import place
-from truearm.engine.robot.controller_kinematics import with_controller_kinematics
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
-from truearm.engine.robot.robot_file.entries import STATED
-from truearm.engine.robot.wrench import Wrench, WrenchFrame
+from truearm.engine.robot.wrench import Wrench
+
+if TYPE_CHECKING:
+    from truearm.compensation.jobs import Compensate, Revert
 
 #: Targets that cannot be corrected, shown one by one in a refusal.
 _SHOWN: Final = 5
 
 
-def compensate(
-    robot: Robot | str | Path,
-    programs: Sequence[str | Path],
-    *,
-    out: str | Path | None = None,
-    tools: str | Path | None = None,
-    frames: str | Path | None = None,
-    payload: Payload | str | None = None,
-    wrench: Wrench | Sequence[float] | str | Path | None = None,
-    wrench_frame: WrenchFrame | None = None,
-    controller_kinematics: str | Path | None = None,
-    split: float | None = None,
-    again: bool = False,
-    joint_targets: str = "keep",
-    only: Sequence[str] = (),
-    keep: Sequence[str] = (),
-    taught: Sequence[str] | None = None,
-    accept: Sequence[str] = (),
-    accept_correction: str | None = None,
-    notes: Mapping[str, str] | None = None,
-    command: str | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-) -> ProgramCorrection:
-    """Correct robot programs so that the real robot goes where they say.
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What was given beside the programs, as it was read."""
 
-    Parameters
-    ----------
-    robot
-        A calibrated robot, or its file.
-    programs
-        Files in one robot language. Those given together share what has to be assumed of base and flange.
-    out
-        Folder for the corrected programs, their records and compensation.html; None writes nothing, see
-        :meth:`truearm.compensation.result.ProgramCorrection.save`.
-    tools, frames
-        Files that say where tools and frames are, see :mod:`truearm.engine.programs.cell`.
-    payload
-        What the flange carries in production (an object, or a text such as ``2.7kg,50mm,25mm,100mm``); None for what
-        the program says of each tool, and what it carried in calibration where the program does not say it.
-    wrench
-        External force and moment on the tool at its point: six numbers [N, N m], a text such as
-        ``0N,0N,80N,0Nm,0Nm,1.5Nm``, or an object, at every target; or a file that says it of targets and tools by name,
-        see :mod:`truearm.engine.programs.cell`. None for none.
-    wrench_frame
-        Whose axes it is given in, if not by a file: ``base`` (also for None), ``tool``, ``world`` or ``controller``.
-    controller_kinematics
-        With what the controller turns poses into joint positions: ``nominal`` (the table of the robot file),
-        ``proprietary`` (a calibration of its maker that nobody else can read), ``unknown``, or the file of its
-        kinematics, as :func:`truearm.import_ur_kinematics` reads it; None for what a cell file or the robot file says.
-    split
-        Split straight and circular moves where the correction between targets would deviate farther [m].
-    again
-        Take the originals of programs that were corrected already.
-    joint_targets
-        ``keep`` leaves targets that are given by joints as they are, home positions for instance; ``correct`` sends the
-        real robot where the nominal one would be.
-    only, keep
-        Names of targets, or patterns such as ``pHole*``: the only ones that are corrected, and some that stay.
-    taught
-        What was taught with this robot and is right already: ``points``, ``frames``, ``tools``, or ``none``, if all
-        was computed off-line. None for what a cell file says.
-    accept
-        What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
-        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with, such as
-        ``wrong-robot``; ``maker`` for programs in the language of another maker; ``other-kinematics`` for kinematics of
-        the controller that are not this arm's; ``skipped`` for programs of which some targets cannot be corrected and
-        stay as they are; ``numbers-read`` for programs that compute with numbers of corrected targets; and
-        ``not-better-here`` to correct also the targets that would rather get worse.
-    accept_correction
-        How far targets may be moved and turned, such as ``95mm,3deg``, in place of the limit: twice the largest
-        deviation of the calibrated from the nominal robot, see :mod:`truearm.compensation.limit`.
-    notes
-        What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other. A date such as
-        ``2026-11-27`` is the one in the comment of the programs too.
-    command
-        How to do it again, for the report; None writes the call in Python.
-    progress
-        Called with a few words at each step.
+    calibrated: Robot  #: As its controller computes.
+    arm: Robot  #: With what it carries.
+    kinematics: tuple[str | Path, ...]  #: The file of the controller's kinematics, if there is one.
+    choice: Choice
+    allowed: CorrectionLimit | None
+    accepted: tuple[str, ...]
+    acting: tuple[TargetWrench, ...]
+    folder: Path | None
+    hashes: dict[str, str]
 
-    Raises
-    ------
-    InputError
-        If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
-        badly or is another maker's, a tool or frame is not defined, a target cannot be corrected and that is not
-        accepted, or would be moved or turned farther than the robot's errors explain, or nothing says what was taught,
-        or with what a controller computes whose maker offers a calibration.
-    """
-    progress_argument(progress)
-    paths = paths_argument(programs, "programs", "program")
-    tool_file = None if tools is None else path_argument(tools, "tools")
-    frame_file = None if frames is None else path_argument(frames, "frames")
-    payload = payload_argument(payload)
-    wrench_file = _wrench_file(wrench)
-    pushed = None if wrench_file is not None else wrench_argument(wrench, wrench_frame)
-    if wrench_file is not None and wrench_frame is not None:
-        raise InputError("the file says the frame of each force", parameter="wrench_frame", came=wrench_frame)
-    notes = notes_argument(notes)
-    again = flag_argument(again, "again")
-    if split is not None:
-        split = finite_number(split, "split")
-        check_tolerance(split)
-    answers = read_answers({"tools": tool_file, "frames": frame_file})
-    kinematics = answers.controller_kinematics if controller_kinematics is None else controller_kinematics
-    said_by = "controller_kinematics" if controller_kinematics is not None else "tools, frames"
+
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """The programs, and what was measured of tools and frames."""
+
+    files: tuple[ProgramFile, ...]
+    programs: tuple[Program, ...]
+    language: Language
+    cell: Cell
+    foreign: tuple[Notice, ...]  #: What is to be said of the language of another maker.
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """How the programs are corrected."""
+
+    result: CorrectedPrograms
+    splits: tuple[ProgramSplit, ...]
+    ledger: Path | None
+    unremembered: tuple[Notice, ...]  #: What is to be said where their targets cannot be remembered.
+    accepted: tuple[Notice, ...]  #: What would be refused, and was accepted.
+
+
+def corrected(asked: Compensate) -> ProgramCorrection:
+    """Correct programs, and write them."""
+    given = _given(asked)
+    read = _read(asked, given)
+    made = _made(asked, given, read)
+    day = day_of(asked.notes or {})
+    arm = given.arm
+    correction = ProgramCorrection(
+        robot=arm,
+        files=_corrected_files(given, read, made, day),
+        result=made.result,
+        splits=made.splits,
+        warnings=(
+            *changed_since(asked.robot),
+            *known_of(arm),
+            *read.foreign,
+            *controller_notices(arm, read.programs),
+            *_payloads_unlikely(arm, made.result),
+            *check_force(made.result.pushed),
+            *made.accepted,
+            *check_correction(arm, made.result, made.splits),
+            *made.unremembered,
+        ),
+        command=asked.command or asked.as_python(),
+        inputs=files_of(asked.robot, asked.tools, asked.frames, asked.wrench_file, *given.kinematics),
+        hashes=given.hashes,
+        notes=dict(asked.notes or {}),
+        date=day.isoformat(),
+        ledger=made.ledger,
+    )
+    if given.folder is not None:
+        with refusals_of("out"):
+            correction.save(given.folder, asked.progress)
+    return correction
+
+
+def _given(asked: Compensate) -> _Given:
+    """Read the robot, and what is said of the cell and of the correction."""
+    wrench_file = asked.wrench_file
+    pushed = None if wrench_file is not None else wrench_argument(asked.wrench, asked.wrench_frame)
+    answers = read_answers({"tools": _path(asked.tools), "frames": _path(asked.frames)})
+    said, said_by = asked.controller_kinematics, "controller_kinematics"
+    if said is None:
+        said, said_by = answers.controller_kinematics, "tools, frames"
+    taught = asked.taught
+    if taught is None and answers.taught is not None:
+        taught = TAUGHT_KIND.check(answers.taught, "taught")
     choice = Choice(
-        joint_targets=choice_argument(joint_targets, "joint_targets", {"keep": False, "correct": True}),
-        only=names_argument(only, "only"),
-        keep=names_argument(keep, "keep"),
-        taught=_taught(answers.taught if taught is None else taught),
+        joint_targets=asked.joint_targets == "correct",
+        only=tuple(asked.only),
+        keep=tuple(asked.keep),
+        taught=None if taught is None else frozenset(what for what in TAUGHT if what in taught),
     )
-    folder = (
-        None
-        if out is None
-        else folder_for((REPORT,), out, robot, tools, frames, wrench_file, *_kinematics_file(kinematics), *paths)
-    )
+    kinematics = kinematics_file(said)
+    read = (asked.robot, asked.tools, asked.frames, wrench_file, *kinematics)
+    folder = None if asked.out is None else folder_for((REPORT,), asked.out, *read, *asked.programs)
     hashes = hashes_of(
-        robot=robot,
-        tools=tools,
-        frames=frames,
+        robot=asked.robot,
+        tools=asked.tools,
+        frames=asked.frames,
         wrench=wrench_file,
-        controller_kinematics=next(iter(_kinematics_file(kinematics)), None),
+        controller_kinematics=next(iter(kinematics), None),
     )
-    allowed = None if accept_correction is None else CorrectionLimit.of(accept_correction, "accept_correction")
-    calibrated = _with_controller(robot_argument(robot), kinematics, said_by)
-    arm = calibrated.with_payload(payload)
+    allowed = None
+    if asked.accept_correction is not None:
+        allowed = CorrectionLimit.of(asked.accept_correction, "accept_correction")
+    calibrated = with_controller(robot_argument(asked.robot), said, said_by)
+    arm = asked.loads.on(calibrated)
     if arm.wrench is not None:
         raise InputError(
             "something acts on the tool of this robot already",
@@ -224,119 +191,88 @@ def compensate(
             came=arm.wrench.text,
             cure="Give it as `wrench`, and the robot without it.",
         )
-    accepted = accept_argument(accept, arm)
-    invocation = command_argument(command) or python_call(
-        "compensate",
-        robot,
-        paths,
-        tools=tools,
-        frames=frames,
-        payload=payload,
-        wrench=wrench,
-        wrench_frame=wrench_frame,
-        controller_kinematics=controller_kinematics,
-        split=split,
-        again=again or None,
-        joint_targets="correct" if choice.joint_targets else None,
-        only=list(choice.only) or None,
-        keep=list(choice.keep) or None,
-        taught=None if choice.taught is None else sorted(choice.taught) or ["none"],
-        accept=list(accepted) or None,
-        accept_correction=accept_correction,
-        notes=notes or None,
-    )
+    accepted = accept_argument(asked.accept, arm)
     refuse_unaccepted(arm, accepted)
     acting = _wrenches(arm, pushed, wrench_file)
+    return _Given(calibrated, arm, kinematics, choice, allowed, accepted, acting, folder, hashes)
+
+
+def _path(given: str | Path | None) -> Path | None:
+    return None if given is None else Path(given)
+
+
+def _read(asked: Compensate, given: _Given) -> _Read:
+    """Read the programs, tools and frames, and refuse what is not known well enough of them."""
+    arm = given.arm
     with refusals_of("programs"):
-        files = program_files(paths, again=again)
-        progress("reading the programs")
-        read = read_programs(files)
-    language = language_called(read[0].language)
+        files = program_files([*map(Path, asked.programs)], again=asked.again)
+        asked.progress("reading the programs")
+        programs = read_programs(files)
+    language = language_called(programs[0].language)
+    tool_file, frame_file = _path(asked.tools), _path(asked.frames)
     with refusals_of("tools"):
-        tools_given = read_tools(arm, tool_file, language.flange)
+        tools = read_tools(arm, tool_file, language.flange)
     with refusals_of("frames"):
-        frames_given = read_frames(arm, frame_file, language.base)
-    cell = Cell(tools_given, frames_given)
+        frames = read_frames(arm, frame_file, language.base)
+    cell = Cell(tools, frames)
     for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
-        if path != wrench_file:
+        if path != asked.wrench_file:
             refuse_wrenches_left_out(path, parameter)
-    _refuse_taught_and_measured(choice, cell)
-    foreign = check_maker(arm, language, accepted)
-    refuse_proprietary_controller(arm, read)
-    refuse_unanswered([taught_question(read, choice), controller_question(arm, read)])
+    _refuse_taught_and_measured(given.choice, cell)
+    foreign = check_maker(arm, language, given.accepted)
+    refuse_proprietary_controller(arm, programs)
+    refuse_unanswered([taught_question(programs, given.choice), controller_question(arm, programs)])
     with refusals_of("robot"):
-        refuse_kinematics_of_another_arm(arm, accepted)
+        refuse_kinematics_of_another_arm(arm, given.accepted)
+    return _Read(tuple(files), programs, language, cell, tuple(foreign))
+
+
+def _made(asked: Compensate, given: _Given, read: _Read) -> _Made:
+    """Correct the programs, and refuse what the robot's errors do not explain, or what would harm."""
+    accepted, language = given.accepted, read.language
     with refusals_of("robot"):
         result = corrected_programs(
-            arm,
-            read,
-            cell,
-            progress,
-            choice=replace(choice, every=NOT_BETTER in accepted),
-            weigh_tools=payload is None,
-            wrenches=acting,
+            given.arm,
+            read.programs,
+            read.cell,
+            asked.progress,
+            choice=replace(given.choice, every=NOT_BETTER in accepted),
+            weigh_tools=asked.payload is None,
+            wrenches=given.acting,
         )
-    refuse_corrected_already(result, paths, folder, ledger_of(robot))
-    ledger, unremembered = ledger_to_write(ledger_of(robot))
-    large = _check_size(result, correction_limit(calibrated), allowed)
+    refuse_corrected_already(result, [*map(Path, asked.programs)], given.folder, ledger_of(asked.robot))
+    ledger, unremembered = ledger_to_write(ledger_of(asked.robot))
+    large = _check_size(result, correction_limit(given.calibrated), given.allowed)
     if SKIPPED not in accepted:
         _refuse_skipped(result)
     read_by_program = _check_numbers_read(language, result, accepted)
     splits: tuple[ProgramSplit, ...] = ()
-    if split is not None:
-        progress("splitting moves")
+    if asked.split is not None:
+        asked.progress("splitting moves")
         splits = tuple(
-            split_program(language, correction, between, split)
+            split_program(language, correction, between, asked.split)
             for correction, between in zip(result.corrections, result.between, strict=True)
         )
-    day = day_of(notes)
-    comment = correction_comment(day, arm.name, hashes.get("robot", ""))
+    return _Made(result, splits, ledger, tuple(unremembered), (*large, *read_by_program))
+
+
+def _corrected_files(given: _Given, read: _Read, made: _Made, day: date) -> tuple[FileCorrection, ...]:
+    """Return the files with their new texts, in the order in which they were given."""
+    arm = given.arm
+    comment = correction_comment(day, arm.name, given.hashes.get("robot", ""))
     comment += (IN_PROGRAMS,) if arm.simulated else ()
-    corrected = []
-    for number, correction in enumerate(result.corrections):
-        edits = _edits(correction, splits[number] if splits else None)
+    bounded = arm.proof is not None and arm.proof.lower_bound
+    found = []
+    for number, correction in enumerate(made.result.corrections):
+        edits = _edits(correction, made.splits[number] if made.splits else None)
         for index, source in enumerate(correction.program.sources):
-            file = next(file for file in files if file.path == source.path)
+            file = next(file for file in read.files if file.path == source.path)
             text = edited(source.text, [edit for edit in edits if edit.source == index])
             if text != source.text:
-                text = language.comment(text, comment)
-            bounded = arm.proof is not None and arm.proof.lower_bound
-            corrected.append(FileCorrection(file, correction, index, text.encode("latin-1"), result.relative, bounded))
-    corrected.sort(key=lambda one: files.index(one.file))
-    made = ProgramCorrection(
-        robot=arm,
-        files=tuple(corrected),
-        result=result,
-        splits=splits,
-        warnings=(
-            *changed_since(robot),
-            *known_of(arm),
-            *foreign,
-            *controller_notices(arm, read),
-            *_payloads_unlikely(arm, result),
-            *check_force(result.pushed),
-            *large,
-            *read_by_program,
-            *check_correction(arm, result, splits),
-            *unremembered,
-        ),
-        command=invocation,
-        inputs=files_of(robot, tools, frames, wrench_file, *_kinematics_file(kinematics)),
-        hashes=hashes,
-        notes=notes,
-        date=day.isoformat(),
-        ledger=ledger,
-    )
-    if folder is not None:
-        with refusals_of("out"):
-            made.save(folder, progress)
-    return made
-
-
-def _wrench_file(wrench: object) -> Path | None:
-    """Return the file that says what acts on tools; None if that is said otherwise, or not at all."""
-    named = isinstance(wrench, str) and wrench.lower().endswith((".yaml", ".yml"))
-    return path_argument(wrench, "wrench") if named or isinstance(wrench, Path) else None
+                text = read.language.comment(text, comment)
+            relative = made.result.relative
+            found.append(FileCorrection(file, correction, index, text.encode("latin-1"), relative, bounded))
+    return tuple(sorted(found, key=lambda one: read.files.index(one.file)))
 
 
 def _wrenches(arm: Robot, pushed: Wrench | None, file: Path | None) -> tuple[TargetWrench, ...]:
@@ -355,33 +291,6 @@ def _payloads_unlikely(arm: Robot, result: CorrectedPrograms) -> list[Notice]:
     """Say which loads no arm of this size carries."""
     loads = [load for load in dict.fromkeys(result.loads.values()) if load is not None]
     return [notice for load in [arm.payload, *loads] for notice in check_payload(arm.with_payload(load))][:1]
-
-
-def _with_controller(arm: Robot, said: str | Path | None, said_by: str) -> Robot:
-    """Return a robot with what was said of its controller's kinematics, by which parameter."""
-    if said is None:
-        return arm
-    with refusals_of(said_by):
-        return with_controller_kinematics(arm, str(path_argument(said, said_by)), Path())
-
-
-def _kinematics_file(said: str | Path | None) -> tuple[str | Path, ...]:
-    return () if said is None or str(said) in STATED else (said,)
-
-
-def _taught(taught: object) -> frozenset[Taught] | None:
-    """Return what was taught; None if that was not said."""
-    if taught is None:
-        return None
-    named = choices_argument(taught, "taught", [*TAUGHT, "none"], "answer")
-    if not named or ("none" in named and len(named) > 1):
-        raise InputError(
-            "what was taught is not clear",
-            parameter="taught",
-            came=", ".join(named) or "nothing",
-            allowed=f"none, or some of {', '.join(TAUGHT)}",
-        )
-    return frozenset(what for what in TAUGHT if what in named)
 
 
 def _refuse_taught_and_measured(choice: Choice, cell: Cell) -> None:
@@ -475,23 +384,10 @@ def _edits(correction: Correction, split: ProgramSplit | None) -> list[Edit]:
     return [*split.edits, *filter(stays, correction.edits)]
 
 
-def revert(programs: Sequence[str | Path], *, out: str | Path | None = None) -> RestoredPrograms:
-    """Restore the originals of corrected programs from the records beside them.
-
-    Parameters
-    ----------
-    programs
-        Corrected programs.
-    out
-        Folder for the originals; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If a program has no record or was changed since, or a file would be overwritten.
-    """
-    paths = paths_argument(programs, "programs", "program")
-    folder = None if out is None else folder_for((path.name for path in paths), out, *paths)
+def reverted(asked: Revert) -> RestoredPrograms:
+    """Restore the originals of corrected programs, and write them."""
+    paths = [*map(Path, asked.programs)]
+    folder = None if asked.out is None else folder_for((path.name for path in paths), asked.out, *paths)
     with refusals_of("programs"):
         made = RestoredPrograms(restored(paths))
     if folder is None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from truearm.compensation.program_correction import CorrectedPrograms
 from truearm.engine.base.errors import InputError, Notice, Words, refusals_of, wrong_kind
-from truearm.engine.base.files import exists
+from truearm.engine.base.files import exists, path_argument
 from truearm.engine.base.units import ANGLE_UNITS, LENGTH_UNITS, quantity_si
 from truearm.engine.base.writing import writable_folder
 from truearm.engine.programs import LANGUAGES
@@ -28,8 +28,10 @@ from truearm.engine.programs.program import Language, MakersCalibration, Program
 from truearm.engine.programs.program_files import known_by_records
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import OTHER_ARM, ControllerKinematics
+from truearm.engine.robot.controller_kinematics import with_controller_kinematics
 from truearm.engine.robot.inverse.kinematics import reach
 from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.robot_file.entries import STATED
 
 #: How far beyond the measured range of a joint nothing new is to be expected, as a share of that range.
 _MARGIN: Final = 0.1
@@ -61,6 +63,19 @@ def beyond_measured(robot: Robot, joints: Array) -> NDArray[np.bool_]:
 _KEPT: Final = (
     "The robot file keeps the answer (controller: {{kinematics: {0}}}), or a cell file (controller_kinematics: {0})."
 )
+
+
+def with_controller(arm: Robot, said: str | Path | None, said_by: str) -> Robot:
+    """Return a robot with what was said of its controller's kinematics, and by which parameter; None for nothing."""
+    if said is None:
+        return arm
+    with refusals_of(said_by):
+        return with_controller_kinematics(arm, str(path_argument(said, said_by)), Path())
+
+
+def kinematics_file(said: str | Path | None) -> tuple[str | Path, ...]:
+    """Return the file that was named for a controller's kinematics, if there is one."""
+    return () if said is None or str(said) in STATED else (said,)
 
 
 def refuse_proprietary_controller(robot: Robot, programs: Sequence[Program]) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -18,41 +18,36 @@ from truearm.compensation.corrected_path import (
     TIP,
     CorrectedPath,
     Knowledge,
-    TargetKind,
     correct_path,
     path_program,
 )
+from truearm.compensation.jobs import ALL
 from truearm.compensation.limit import (
     CorrectionLimit,
     check_size,
     controller_notices,
     controller_question,
     correction_limit,
+    kinematics_file,
     ledger_of,
     ledger_to_write,
     refuse_proprietary_controller,
+    with_controller,
 )
-from truearm.engine.base.arrays import finite_number
-from truearm.engine.base.errors import InputError, Notice, counted, listed, millimetres, refusals_of
+from truearm.engine.base.errors import Notice, counted, listed, millimetres, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.command.arguments import (
     array_argument,
-    choice_argument,
-    choices_argument,
-    command_argument,
     files_of,
     folder_beside,
-    gravity_argument,
     joints_argument,
-    name_argument,
-    payload_argument,
     pushed_argument,
-    python_call,
     robot_argument,
     wrench_argument,
 )
 from truearm.engine.command.split import accept_argument, changed_since, refuse_unaccepted, told_of
+from truearm.engine.command.texts import positions_of
 from truearm.engine.diagnose.external_force import check_force
 from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
 from truearm.engine.motion.path_file import read_path
@@ -64,13 +59,12 @@ from truearm.engine.programs.new_program import NewProgram
 from truearm.engine.programs.program import Language, Source
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
-from truearm.engine.robot.controller_kinematics import with_controller_kinematics
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
-from truearm.engine.robot.robot_file.entries import STATED
 from truearm.engine.robot.transform import homogeneous
 from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
-from truearm.engine.robot.wrench import Wrench, WrenchFrame
+
+if TYPE_CHECKING:
+    from truearm.compensation.jobs import FollowPath
 
 #: Files that are always written.
 MOTION: Final = "motion.csv"
@@ -192,6 +186,11 @@ class FollowedPath(Record):
             files[LOADS] = self.loads_csv()
         return files | dict(self.programs) | {REPORT: path_page(self)}
 
+    @property
+    def written(self) -> tuple[str, ...]:
+        """Names of all files."""
+        return tuple(self.contents())
+
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write all files into a folder; return them."""
         contents = self.contents()
@@ -225,159 +224,70 @@ def _table(heading: list[str], rows: list[list[str]]) -> str:
     return stream.getvalue()
 
 
-#: Every language at once.
-ALL = "all"
 #: A program that leaves the path by no more than this between its targets is said nothing of [m].
 _FAR = 0.02e-3
 
 
-def path(
-    robot: Robot | str | Path,
-    file: str | Path,
-    *,
-    seed: Array | Sequence[float] | None = None,
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-    wrench: Wrench | Sequence[float] | str | None = None,
-    wrench_frame: WrenchFrame | None = None,
-    programs: Sequence[str] = (),
-    targets: str = "joints",
-    spacing: float = 0.02,
-    name: str = "truearm_path",
-    controller_kinematics: str | Path | None = None,
-    accept: Sequence[str] = (),
-    accept_correction: str | None = None,
-    joints: JointsOf | None = None,
-    out: str | Path | None = None,
-    command: str | None = None,
-) -> FollowedPath:
-    """Follow a path of lines, circles and waypoints, and correct it for the calibrated robot.
-
-    Parameters
-    ----------
-    robot
-        A calibrated robot, or what :func:`truearm.load_robot` takes. One that is nominal follows the path, and there is
-        nothing to correct.
-    file
-        The path, see :mod:`truearm.engine.motion.path_file`.
-    seed
-        Joint positions of the model ``(joints,)`` [rad; m for prismatic joints] near which the motion shall begin; zero
-        if None.
-    payload, gravity
-        What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
-        [m/s^2]; None for what its file says.
-    wrench, wrench_frame
-        External force and moment on the tip, the same all along the path, and whose axes it is given in, as for
-        :func:`truearm.inverse`.
-    programs
-        Languages in which to write the corrected path: ``rapid``, ``krl``, ``fanuc-ls``, ``urscript``, ``inform``,
-        ``val3``, or ``all``.
-    targets
-        ``joints`` if the targets of the programs are joint positions, ``poses`` for straight moves to poses.
-    spacing
-        Time from one target to the next [s], or a little less; that of the file's samples at the least.
-    name
-        Of the programs.
-    controller_kinematics
-        With what the controller turns poses into joint positions, as :func:`truearm.compensate` takes it.
-    accept
-        What may speak against the robot's calibration, by name, as :func:`truearm.compensate` takes it; asked for where
-        programs are written.
-    accept_correction
-        How far a program may move and turn the tip from the path, such as ``95mm,3deg``, as for
-        :func:`truearm.compensate`.
-    joints
-        Whose joint positions the CSV files hold: the ``model``'s, or as the ``controller`` shows them; None for the
-        controller's where the robot file says that they differ.
-    out
-        Folder for the joint motion, the corrected one, the loads, the programs and report.html; None writes nothing.
-    command
-        How to run it again, for the page; None writes the call in Python.
-
-    Raises
-    ------
-    InputError
-        If the file is malformed, or the robot cannot follow the path: with the place on it. If the correction of a
-        program is larger than the robot's errors explain.
-    """
-    read = path_argument(file, "file")
-    known = [*BY_NAME, ALL]
-    languages = choices_argument(programs, "programs", known, "language")
-    if ALL in languages:
-        languages = tuple(BY_NAME)
-    kinds: dict[str, TargetKind] = {"joints": "joints", "poses": "poses"}
-    kind = choice_argument(targets, "targets", kinds)
-    called = name_argument(name, "name")
-    time = finite_number(spacing, "spacing", allowed="a time in s")
-    if not time > 0.0:
-        raise InputError("targets are some time apart", parameter="spacing", came=f"{time:g} s", allowed="above 0 s")
-    kinematics = (
-        () if controller_kinematics is None or str(controller_kinematics) in STATED else (controller_kinematics,)
-    )
-    written = (MOTION, CORRECTED, LOADS, REPORT)
-    folder = None if out is None else folder_beside(written, MOTION, out, robot, file, *kinematics)
-    pushed = wrench_argument(wrench, wrench_frame)
-    carried, fall = payload_argument(payload), gravity_argument(gravity)
-    allowed = None if accept_correction is None else CorrectionLimit.of(accept_correction, "accept_correction")
-    calibrated = robot_argument(robot)
-    if controller_kinematics is not None:
-        with refusals_of("controller_kinematics"):
-            said = str(path_argument(controller_kinematics, "controller_kinematics"))
-            calibrated = with_controller_kinematics(calibrated, said, Path())
-    arm = pushed_argument(calibrated.with_payload(carried, fall), pushed)
-    accepted = accept_argument(accept, arm)
-    call = command_argument(command) or python_call(
-        "path",
-        robot,
-        file,
-        seed=None if seed is None else np.asarray(seed).tolist(),
-        payload=carried,
-        gravity=fall,
-        wrench=None if pushed is None else pushed.text,
-        wrench_frame=wrench_frame,
-        programs=list(languages) or None,
-        targets=kind,
-        spacing=time,
-        name=called,
-        controller_kinematics=controller_kinematics,
-        accept=list(accepted) or None,
-        accept_correction=accept_correction,
-        joints=joints,
-    )
-    if languages:
-        refuse_unaccepted(arm, accepted)
-    joints_are = joints_argument(joints, arm)
-    near = None
-    if seed is not None:
-        near = array_argument(seed, "seed", (len(arm.joints),), f"{len(arm.joints)} numbers, one for each joint")
-    with refusals_of("file"):
-        followed = correct_path(arm, read_path(read), near)
-    chosen = [BY_NAME[one] for one in languages]
-    notices = [*changed_since(robot), *told_of(arm), *check_force([(arm, followed.joints[followed.best])])]
-    texts: dict[str, str] = {}
+def follow(asked: FollowPath) -> FollowedPath:
+    """Follow a path, correct it, and write what was asked for."""
+    chosen = [BY_NAME[one] for one in (BY_NAME if ALL in asked.programs else asked.programs)]
+    inputs = (asked.robot, asked.file, *kinematics_file(asked.controller_kinematics))
+    folder = None
+    if asked.out is not None:
+        folder = folder_beside((MOTION, CORRECTED, LOADS, REPORT), MOTION, asked.out, *inputs)
+    pushed = wrench_argument(asked.wrench, asked.wrench_frame)
+    allowed = None
+    if asked.accept_correction is not None:
+        allowed = CorrectionLimit.of(asked.accept_correction, "accept_correction")
+    calibrated = with_controller(robot_argument(asked.robot), asked.controller_kinematics, "controller_kinematics")
+    arm = pushed_argument(asked.loads.on(calibrated), pushed)
+    accepted = accept_argument(asked.accept, arm)
     if chosen:
-        if followed.calibrated:
-            notices += _check_size(followed, correction_limit(calibrated), allowed)
-        with refusals_of("name" if kind == "joints" else "targets"):
-            content = path_program(followed, arm, called, targets=kind, spacing=time)
-            texts = _programs(arm, content, chosen, notices)
+        refuse_unaccepted(arm, accepted)
+    joints_are = joints_argument(asked.joints, arm)
+    followed = _followed(asked, arm, joints_are)
+    notices = [*changed_since(asked.robot), *told_of(arm), *check_force([(arm, followed.joints[followed.best])])]
+    if chosen and followed.calibrated:
+        notices += _check_size(followed, correction_limit(calibrated), allowed)
+    texts = _texts(asked, arm, followed, chosen, notices)
     ledger = None
     if chosen and followed.calibrated:
-        ledger, unremembered = ledger_to_write(ledger_of(robot))
+        ledger, unremembered = ledger_to_write(ledger_of(asked.robot))
         notices += unremembered
     made = FollowedPath(
         arm,
         followed,
         texts,
-        call,
+        asked.again,
         tuple(dict.fromkeys(notices)),
-        files_of(robot, file, *kinematics),
+        files_of(*inputs),
         joints_are,
         None if ledger is None else (ledger, _entries(arm, chosen, texts)),
     )
     if folder is not None:
         made.save(folder)
     return made
+
+
+def _followed(asked: FollowPath, arm: Robot, joints_are: JointsOf) -> CorrectedPath:
+    """Follow the path, and correct it."""
+    near = None
+    if asked.seed is not None:
+        seed = positions_of(asked.seed, arm, joints_are, "seed")
+        near = array_argument(seed, "seed", (len(arm.joints),), f"{len(arm.joints)} numbers, one for each joint")
+    with refusals_of("file"):
+        return correct_path(arm, read_path(path_argument(asked.file, "file")), near)
+
+
+def _texts(
+    asked: FollowPath, arm: Robot, followed: CorrectedPath, chosen: Sequence[Language], notices: list[Notice]
+) -> dict[str, str]:
+    """Return the texts of the programs, and add what is to be said of them."""
+    if not chosen:
+        return {}
+    with refusals_of("name" if asked.targets == "joints" else "targets"):
+        content = path_program(followed, arm, asked.name, targets=asked.targets, spacing=asked.spacing)
+        return _programs(arm, content, chosen, notices)
 
 
 def _check_size(followed: CorrectedPath, limit: CorrectionLimit, accepted: CorrectionLimit | None) -> list[Notice]:

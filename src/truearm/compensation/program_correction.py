@@ -243,8 +243,6 @@ def _base_of(programs: Sequence[ResolvedProgram], frames: Sequence[str], start: 
 _CHECKED: Final = np.array([0.25, 0.5, 0.75])
 #: A move is split into so many segments at most.
 MOST_SEGMENTS: Final = 64
-#: Smallest and largest tolerance [m].
-_TOLERANCES: Final = (1e-6, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +274,6 @@ def split_program(language: Language, correction: Correction, between: Between, 
         raise InputError(
             f"moves in {language.name} cannot be split", parameter="split", cure="Leave it out, or add targets."
         )
-    check_tolerance(tolerance)
     program = correction.program
     unsplit: list[int] = []
     open_moves: list[_SplitMove] = []
@@ -313,17 +310,6 @@ def split_program(language: Language, correction: Correction, between: Between, 
     unsplit += [program.moves[index].line for index in whole]
     split = [one for one in several if one.index not in whole]
     return ProgramSplit(tuple(edits), len(split), sum(one.segments - 1 for one in split), tuple(sorted(unsplit)))
-
-
-def check_tolerance(tolerance: float) -> None:
-    """Refuse a tolerance [m] by which no move can be split."""
-    if not _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]:
-        raise InputError(
-            "moves cannot be split by this distance",
-            parameter="split",
-            came=f"{tolerance * 1e3:g} mm",
-            allowed=f"{_TOLERANCES[0] * 1e3:g} to {_TOLERANCES[1] * 1e3:g} mm",
-        )
 
 
 class _SplitMove:

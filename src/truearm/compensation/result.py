@@ -369,6 +369,10 @@ class ProgramCorrection(Record):
         language = language_called(self.files[0].language)
         return read_sources(language, [Source(one.file.path, one.text.decode("latin-1")) for one in self.files])
 
+    def written_at(self, out: str) -> str:
+        """Return the line that says where it was written."""
+        return f"Written to {out}, with the report {REPORT}"
+
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write programs, their records and the report ``compensation.html`` into a folder, all or nothing.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import AlsoIntoFile, Drawn, IntoFile, JointsWritten, OfRobot
-from truearm.engine.command.kinds import File, Files, Flag, Given, Names, Number, Numbers, Text, Whole
+from truearm.engine.command.kinds import File, Flag, Given, GivenFiles, Names, Number, Numbers, Text, Whole
 from truearm.engine.command.request import Request, job, option, required
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ class SolveCups(_Ranged, AlsoIntoFile):
         "meet; if sheets are not of one robot and tool, or a fixture did not stand still."
     )
     sheet: Sheet | str | Path | Sequence[Sheet | str | Path] | None = option(
-        Files("SHEET.csv"),
+        GivenFiles("SHEET.csv"),
         "Sheets of 'truearm hexapod plan', filled in, of one robot and tool.",
         default=None,
         kw_only=False,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from truearm.engine.base.errors import InputError, Notice, counted, did_you_mean
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import write_new_text
 from truearm.engine.command.arguments import (
-    choice_argument,
     joints_argument,
     new_file_for,
     readings_argument,
@@ -23,12 +22,16 @@ from truearm.engine.data.controller_joints import in_controller_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.robodk import robodk_csv
 from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
-from truearm.engine.robot.conversion import CONVERSIONS, converted
+from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.engine.robot.wrench import refuse_pushed
 from truearm.robot_files.formats import FORMATS
+
+if TYPE_CHECKING:
+    from truearm.robot_files.jobs import ConvertRobot, ExportRobot, ExportToRobodk
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,27 +56,11 @@ class ConvertedRobot(Record):
         return [text if self.file is None else f"{self.file}: {text}"]
 
 
-def convert(robot: Robot | str | Path, convention: str, *, out: str | Path | None = None) -> ConvertedRobot:
-    """Write a robot in another kinematic convention, every pose the same.
-
-    Parameters
-    ----------
-    robot
-        A robot, or what :func:`truearm.load_robot` takes. Its values become the nominal ones.
-    convention
-        One of :data:`truearm.engine.robot.conversion.CONVERSIONS` by name.
-    out
-        Robot file to write, which must not exist yet; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If there is no such convention, or it cannot describe the robot, or the file exists.
-    """
-    choice_argument(convention, "convention", CONVERSIONS)
-    file = None if out is None else new_file_for(out)
+def converted_robot(asked: ConvertRobot) -> ConvertedRobot:
+    """Convert a robot, and write it."""
+    file = None if asked.out is None else new_file_for(asked.out)
     with refusals_of("robot"):
-        made = converted(robot_argument(robot), convention)
+        made = converted(robot_argument(asked.robot), asked.convention)
     if file is not None:
         write_new_text(file, robot_text(made))
     return ConvertedRobot(made, file)
@@ -96,6 +83,16 @@ class ExportedRobot(Record):
         """What to know about it: what the format cannot hold, and what speaks against the calibration."""
         return (*(Notice("left-out", message) for message in self.left_out), *self.told)
 
+    @property
+    def finished(self) -> bool:
+        """Whether it was exported, whatever speaks against the calibration."""
+        return True
+
+    @property
+    def asides(self) -> int:
+        """All lines but the first: what was left out, and what speaks against the calibration."""
+        return len(self.lines()) - 1
+
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
         return {
@@ -111,35 +108,16 @@ class ExportedRobot(Record):
         return [text if self.file is None else f"{self.file}: {text}", *self.left_out, *notice_lines(self.told)]
 
 
-def export(robot: Robot | str | Path, format: str, *, out: str | Path | None = None) -> ExportedRobot:
-    """Write a robot, nominal or calibrated, for other programs, and say what the format cannot hold.
-
-    Parameters
-    ----------
-    robot
-        A robot, or what :func:`truearm.load_robot` takes.
-    format
-        ``dh`` (standard DH table), ``mdh`` (modified DH table), ``hayati`` (standard DH table with beta between nearly
-        parallel axes), ``urdf``, ``json`` (everything, schema ``truearm-model/1``), ``python`` (a module for forward
-        and inverse kinematics that needs only NumPy) or ``ur-kinematics`` (the kinematics file of the ROS driver of
-        Universal Robots).
-    out
-        File to write, which must not exist yet; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If there is no such format, or it cannot describe the robot, or the file exists.
-    """
-    exported = choice_argument(format, "format", FORMATS)
-    file = None if out is None else new_file_for(out)
-    loaded = robot_argument(robot)
-    refuse_pushed(loaded)
+def exported_robot(asked: ExportRobot) -> ExportedRobot:
+    """Write a robot for other programs."""
+    file = None if asked.out is None else new_file_for(asked.out)
+    robot = robot_argument(asked.robot)
+    refuse_pushed(robot)
     with refusals_of("robot"):
-        made = exported(loaded)
+        made = FORMATS[asked.format](robot)
     if file is not None:
         write_new_text(file, made.text)
-    return ExportedRobot(loaded, format, made.text, made.frames, made.left_out, file, tuple(told_of(loaded)))
+    return ExportedRobot(robot, asked.format, made.text, made.frames, made.left_out, file, tuple(told_of(robot)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -169,35 +147,10 @@ class ExportedMeasurements(Record):
         return [f"{where}{many}", *joints_lines(self.joints_are)]
 
 
-def export_robodk(
-    robot: Robot | str | Path,
-    data: Dataset | str | Path,
-    *,
-    joints: JointsOf | None = None,
-    out: str | Path | None = None,
-) -> ExportedMeasurements:
-    """Write measurements as RoboDK's robot calibration has them.
-
-    Parameters
-    ----------
-    robot
-        A robot with the targets of the data on its tool, or what :func:`truearm.load_robot` takes: a calibrated one, or
-        one whose file has a tool with targets of these names.
-    data
-        Positions, or poses, in the instrument's frame, or a canonical CSV file.
-    joints
-        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
-        controller's where the robot file says that they differ.
-    out
-        File to write, which must not exist yet; None writes nothing.
-
-    Raises
-    ------
-    InputError
-        If the robot has not six turning joints or not these targets, or the data are no positions.
-    """
-    file = None if out is None else new_file_for(out)
-    arm = robot_argument(robot)
+def exported_measurements(asked: ExportToRobodk) -> ExportedMeasurements:
+    """Write measurements for RoboDK."""
+    file = None if asked.out is None else new_file_for(asked.out)
+    arm = robot_argument(asked.robot)
     if [joint.kind for joint in arm.joints] != ["revolute"] * 6:
         raise InputError(
             "RoboDK calibrates arms of six turning joints",
@@ -205,8 +158,24 @@ def export_robodk(
             where=arm.name,
             cure="Use the canonical CSV.",
         )
-    joints_are = joints_argument(joints, arm)
-    readings = readings_argument(arm, data)
+    joints_are = joints_argument(asked.joints, arm)
+    readings = readings_argument(arm, asked.data)
+    points, rotations = _on_flange(arm, readings)
+    shown = in_controller_joints(arm, readings) if joints_are == "controller" else readings
+    text = robodk_csv(shown, points, rotations)
+    if file is not None:
+        write_new_text(file, text)
+    return ExportedMeasurements(
+        text, readings.configurations, len(text.splitlines()) - 1, joints_are, file, readings.simulated_from
+    )
+
+
+def _on_flange(arm: Robot, readings: Dataset) -> tuple[list[Array], list[Array]]:
+    """Return where the targets of measurements are on the flange, and how they are turned there.
+
+    Raises:
+        InputError: If the robot has no such targets on its tool, or these are no positions.
+    """
     with refusals_of("data"):
         if not readings.has_position.any() or (readings.against >= 0).any():
             raise InputError(
@@ -230,11 +199,4 @@ def export_robodk(
     flange = seen.forward_kinematics(np.zeros((1, 6)))
     turned = flange.matrix()[0]
     points = [turned.T @ (known[name].position[:, 0] - flange.position[:, 0]) for name in readings.targets]
-    rotations = [turned.T @ known[name].matrix()[0] for name in readings.targets]
-    shown = in_controller_joints(arm, readings) if joints_are == "controller" else readings
-    text = robodk_csv(shown, points, rotations)
-    if file is not None:
-        write_new_text(file, text)
-    return ExportedMeasurements(
-        text, readings.configurations, len(text.splitlines()) - 1, joints_are, file, readings.simulated_from
-    )
+    return points, [turned.T @ known[name].matrix()[0] for name in readings.targets]

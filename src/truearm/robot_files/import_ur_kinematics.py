@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from truearm.engine.base.errors import InputError, Notice, refusals_of
 from truearm.engine.base.files import path_argument
@@ -23,6 +23,9 @@ from truearm.engine.robot.ur_kinematics import (
     refuse_far,
     with_kinematics,
 )
+
+if TYPE_CHECKING:
+    from truearm.robot_files.jobs import ImportUrKinematics
 
 #: Joint zeros that are so many times smaller speak for another type: of published files they are 8 times and more, or
 #: less than twice.
@@ -95,35 +98,11 @@ def largest_zero(robot: Robot) -> float:
     return max(abs(parameter.value) for parameter in robot.parameters.values() if parameter.group == "joint zero")
 
 
-def import_ur_kinematics(
-    file: str | Path, robot: Robot | str | Path, *, out: str | Path | None = None
-) -> ImportedKinematics:
-    """Read the kinematics that the controller of a Universal Robots arm computes with, as a robot.
-
-    Parameters
-    ----------
-    file
-        ``calibration.conf`` of the controller, or the kinematics file of the ROS driver.
-    robot
-        The arm's type: a robot with the maker's table, or what :func:`truearm.load_robot` takes.
-    out
-        Robot file to write, which must not exist yet; None writes nothing.
-
-    Returns
-    -------
-    imported
-        The robot: its values are what the controller computes with. Its nominal values, masses, limits and tools are
-        those of the type, in frames beside the type's.
-
-    Raises
-    ------
-    InputError
-        If the file is no such file, is not whole, or is of an arm of another type; if the type is no arm of this kind;
-        or if `out` exists.
-    """
-    path = path_argument(file, "file")
-    target = None if out is None else new_file_for(out)
-    type_ = robot_argument(robot)
+def imported_kinematics(asked: ImportUrKinematics) -> ImportedKinematics:
+    """Read the kinematics of a controller, and write the robot that they are of."""
+    path = path_argument(asked.file, "file")
+    target = None if asked.out is None else new_file_for(asked.out)
+    type_ = robot_argument(asked.robot)
     with refusals_of("file"):
         found = read_kinematics(path)
     with refusals_of("robot"):

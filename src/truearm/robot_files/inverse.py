@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from truearm.engine.base.arrays import axes
-from truearm.engine.base.errors import InputError, Notice, refusals_of, wrong_kind
+from truearm.engine.base.errors import InputError, Notice, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import write_text
@@ -20,27 +20,28 @@ from truearm.engine.command.arguments import (
     array_argument,
     choice_argument,
     file_for,
-    gravity_argument,
     joints_argument,
-    payload_argument,
     pushed_argument,
     robot_argument,
     wrench_argument,
 )
 from truearm.engine.command.split import told_of
+from truearm.engine.command.texts import positions_of
 from truearm.engine.data.readers.configurations import read_poses
 from truearm.engine.diagnose.external_force import check_force
 from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import Controller, JointsOf
-from truearm.engine.robot.frames import FRAMES, Frame, frame_and_tip
+from truearm.engine.robot.frames import Frame, frame_and_tip
 from truearm.engine.robot.inverse.kinematics import inverse as inverse_kinematics
-from truearm.engine.robot.inverse.pose_solver import JointSolutions, Orientation, PoseStatus
-from truearm.engine.robot.parts import Joint, Payload
+from truearm.engine.robot.inverse.pose_solver import JointSolutions, PoseStatus
+from truearm.engine.robot.parts import Joint
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY, rotation_from_quaternion
 from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
-from truearm.engine.robot.wrench import Wrench, WrenchFrame
+
+if TYPE_CHECKING:
+    from truearm.robot_files.jobs import FindJoints
 
 
 def joints_csv(
@@ -111,6 +112,15 @@ class JointTable(Record):
         return self.solutions.complete
 
     @property
+    def finished(self) -> bool:
+        """Whether the robot can go to every pose."""
+        return self.complete
+
+    def written_at(self, out: str) -> str:
+        """Return the line that says where it was written."""
+        return f"Written to {out}"
+
+    @property
     def attention(self) -> tuple[dict[str, str], ...]:
         """Every pose that the robot cannot or should not just go to: its name, branch and status, and what to do."""
         found = self.solutions
@@ -152,102 +162,58 @@ class JointTable(Record):
         return text + joints_lines(self.joints_are) + notice_lines(self.warnings)
 
 
-def inverse(
-    robot: Robot | str | Path,
-    poses: Array | str | Path,
-    rotations: Array | None = None,
-    *,
-    out: str | Path | None = None,
-    branch: str | None = None,
-    seed: Array | Sequence[float] | None = None,
-    target: str | None = None,
-    frame: Frame = "base",
-    orientation: Orientation = "full",
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-    wrench: Wrench | Sequence[float] | str | None = None,
-    wrench_frame: WrenchFrame | None = None,
-    joints: JointsOf | None = None,
-) -> JointTable:
-    """Find the joints that bring a robot to poses, with its calibration and joint effects.
-
-    The arm is at rest; what depends on the way it came or on temperature is left out.
-
-    Parameters
-    ----------
-    robot
-        A robot, or what :func:`truearm.load_robot` takes.
-    poses
-        Positions [m], ``(n, 3)``, or a CSV file with the columns pose, x [mm], y [mm], z [mm], and qw, qx, qy, qz.
-    rotations
-        Rotation matrices, ``(n, 3, 3)``; None with a file, which has its own, or with ``orientation="free"``.
-    out
-        CSV file to write; None writes nothing.
-    branch
-        A branch by name, as ``front-up-noflip``; ``all``; or None for the one nearest to the seed within the limits.
-    seed
-        Joint positions of the model ``(joints,)`` or ``(n, joints)`` [rad; m for prismatic joints] near which the
-        answer shall lie; zero if None.
-    target
-        Name of the target that shall be there; the flange if None.
-    frame
-        What the poses are given in: ``base``, the robot's base; ``world``, the instrument's frame; or ``controller``,
-        the base frame of the robot's controller. There the flange is the controller's too, where a tool is all zeros.
-    orientation
-        ``full``; ``axis`` if only the direction of the z axis counts; ``free`` if only the position does.
-    payload, gravity
-        What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
-        [m/s^2]; None for what its file says.
-    wrench
-        External force and moment on what goes to the poses, the target or the flange: six numbers [N, N m], a text such
-        as ``0N,0N,80N,0Nm,0Nm,1.5Nm``, or an object; None for none.
-    wrench_frame
-        Whose axes it is given in: ``base`` (also for None), ``tool``, those of the target or the flange, ``world`` or
-        ``controller``.
-    joints
-        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
-        controller's where the robot file says that they differ.
-
-    Raises
-    ------
-    InputError
-        For anything that cannot be used, with a message that says what to do.
-    """
-    file = None if out is None else file_for(out, robot, poses)
-    choice_argument(frame, "frame", dict.fromkeys(FRAMES))
-    choice_argument(orientation, "orientation", dict.fromkeys(("full", "axis", "free")))
-    pushed = wrench_argument(wrench, wrench_frame)
-    arm = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
-    joints_are = joints_argument(joints, arm)
-    if target is not None:
-        choice_argument(target, "target", {known.name: known for known in arm.targets})
-    tip = frame_and_tip(arm, frame, None)[1] if target is None and frame == "controller" else arm.tool_place(target)
-    arm = pushed_argument(arm, pushed, tip)
-    if branch is not None and not isinstance(branch, str):
-        raise wrong_kind("the name of a branch belongs here", branch, "branch", "front-up-noflip, for example, or all")
-    labels, positions, turned = _poses(poses, rotations)
-    if turned is None and orientation != "free":
-        given = isinstance(poses, str | Path)
+def found_joints(asked: FindJoints) -> JointTable:
+    """Find the joint positions for poses, and write their table."""
+    file = None if asked.out is None else file_for(asked.out, asked.robot, asked.poses)
+    arm = _arm(asked)
+    joints_are = joints_argument(asked.joints, arm)
+    labels, positions, turned = _poses(asked.poses, asked.rotations)
+    if turned is None and asked.orientation != "free":
+        given = isinstance(asked.poses, str | Path)
         raise InputError(
             "the poses have no orientation",
             parameter="poses" if given else "rotations",
-            where=str(poses) if given else None,
+            where=str(asked.poses) if given else None,
             allowed="the columns qw, qx, qy, qz" if given else "rotation matrices, (n, 3, 3)",
             cure="Add them, or use `orientation=free`.",
         )
-    near = None
-    if seed is not None:
-        one = axes(seed) != 2
-        shape = (len(arm.joints),) if one else (len(positions), len(arm.joints))
-        near = array_argument(seed, "seed", shape, f"{len(arm.joints)} numbers, one for each joint of {arm.name}")
+    near = _near(asked, arm, joints_are, len(positions))
     with refusals_of("robot"):
         solutions = inverse_kinematics(
-            arm, positions, turned, target=target, frame=frame, branch=branch, seed=near, orientation=orientation
+            arm,
+            positions,
+            turned,
+            target=asked.target,
+            frame=asked.frame,
+            branch=asked.branch,
+            seed=near,
+            orientation=asked.orientation,
         )
     if file is not None:
         write_text(file, joints_csv(solutions, labels, arm.joints, counting(arm, joints_are)))
     told = (*told_of(arm), *check_force([(arm, solutions.joints[solutions.usable])]))
-    return JointTable(labels, solutions, (*told, *_other_frame(arm, frame, target)), joints_are, arm.simulated_from)
+    notices = (*told, *_other_frame(arm, asked.frame, asked.target))
+    return JointTable(labels, solutions, notices, joints_are, arm.simulated_from)
+
+
+def _arm(asked: FindJoints) -> Robot:
+    """Return the robot with what it carries, and with what acts on what goes to the poses."""
+    pushed = wrench_argument(asked.wrench, asked.wrench_frame)
+    arm, target = asked.loads.on(robot_argument(asked.robot)), asked.target
+    if target is not None:
+        choice_argument(target, "target", {known.name: known for known in arm.targets})
+    of_controller = target is None and asked.frame == "controller"
+    tip = frame_and_tip(arm, asked.frame, None)[1] if of_controller else arm.tool_place(target)
+    return pushed_argument(arm, pushed, tip)
+
+
+def _near(asked: FindJoints, arm: Robot, joints_are: JointsOf, poses: int) -> Array | None:
+    """Return the joint positions near which the answer shall lie; None for zeros."""
+    if asked.seed is None:
+        return None
+    seed = positions_of(asked.seed, arm, joints_are, "seed")
+    shape = (len(arm.joints),) if axes(seed) != 2 else (poses, len(arm.joints))
+    return array_argument(seed, "seed", shape, f"{len(arm.joints)} numbers, one for each joint of {arm.name}")
 
 
 def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]:

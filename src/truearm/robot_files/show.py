@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, nearest_names, wrong_kind
+from truearm.engine.base.errors import InputError, nearest_names
 from truearm.engine.base.units import SHOWN_AS, from_si, written
-from truearm.engine.command.arguments import array_argument, joints_argument, robot_argument, whole_argument
+from truearm.engine.command.arguments import array_argument, joints_argument, robot_argument
+from truearm.engine.command.texts import positions_of
 from truearm.engine.document.records import Record
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.controller import AS_THE_MODEL, JointsOf
+from truearm.engine.robot.controller import AS_THE_MODEL
 from truearm.engine.robot.frames import Frame
 from truearm.engine.robot.library import close_names, letters, library, load_robot
 from truearm.engine.robot.parts import GRAVITY
@@ -30,6 +30,9 @@ from truearm.engine.robot.transform import (
     Orientation,
 )
 from truearm.engine.twin.truths import truth_names
+
+if TYPE_CHECKING:
+    from truearm.robot_files.jobs import ListRobots, ShowRobot
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,38 +69,20 @@ class RobotList(Record):
         return ["  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
-def robots(text: str | None = None, *, maker: str | None = None, axes: int | None = None) -> RobotList:
-    """List the robots of the library: maker, joints, reach, and whether their controllers are known.
-
-    Parameters
-    ----------
-    text
-        Words that stand in the id or the full name; small letters, blanks, signs and accents are the same as others.
-        None for all.
-    maker
-        Whose robots; None for all.
-    axes
-        How many joints they have; None for any number.
-
-    Raises
-    ------
-    InputError
-        If the library has no such robot.
-    """
+def listed_robots(asked: ListRobots) -> RobotList:
+    """List the robots of the library."""
     found = [load_robot(robot_id) for robot_id in library()]
-    if maker is not None:
-        found = _of_maker(found, maker)
-    if axes is not None:
-        found = _with_axes(found, whole_argument(axes, "axes", 1))
-    if text is not None:
-        found = _named(found, text)
+    if asked.maker is not None:
+        found = _of_maker(found, asked.maker)
+    if asked.axes is not None:
+        found = _with_axes(found, asked.axes)
+    if asked.text is not None:
+        found = _named(found, asked.text)
     return RobotList(tuple(found))
 
 
-def _of_maker(robots: list[Robot], maker: object) -> list[Robot]:
+def _of_maker(robots: list[Robot], maker: str) -> list[Robot]:
     makers = sorted({robot.maker for robot in robots if robot.maker})
-    if not isinstance(maker, str):
-        raise wrong_kind("a maker belongs here", maker, "maker", ", ".join(makers))
     found = [robot for robot in robots if letters(maker) and _begins(robot.maker, maker)]
     if not found:
         near = nearest_names(maker, makers)
@@ -130,9 +115,7 @@ def _with_axes(robots: list[Robot], axes: int) -> list[Robot]:
     return found
 
 
-def _named(robots: list[Robot], text: object) -> list[Robot]:
-    if not isinstance(text, str):
-        raise wrong_kind("a part of a name belongs here", text, "text", "words such as 'UR' or 'IRB 1200'")
+def _named(robots: list[Robot], text: str) -> list[Robot]:
     words = [letters(word) for word in text.split()]
     # Words by themselves, as of one maker and type, or together, as a type is written with blanks.
     found = [robot for robot in robots if all(words) and words and _holds(robot, words, letters(text))]
@@ -386,31 +369,15 @@ def _share(value: float, name: str) -> str:
     return {1.0: name, -1.0: f"-{name}"}.get(value, f"{value:g} {name}")
 
 
-def show(
-    robot: Robot | str | Path, *, joints: Array | Sequence[float] | None = None, joints_are: JointsOf | None = None
-) -> RobotDescription:
-    """Say what is known about a robot, and where it stands at joint positions, to compare with its pendant.
-
-    Parameters
-    ----------
-    robot
-        A robot, or what :func:`truearm.load_robot` takes.
-    joints
-        Joint positions ``(joints,)`` [rad; m for prismatic joints]; None for the robot alone.
-    joints_are
-        Whose joint positions they are: the ``model``'s, or as the ``controller`` shows them; None for the controller's
-        where the robot file says that they differ.
-
-    Raises
-    ------
-    InputError
-        If the robot or the joints cannot be used.
-    """
-    arm = robot_argument(robot)
-    whose = joints_argument(joints_are, arm, "joints_are")
-    if joints is None:
+def described(asked: ShowRobot) -> RobotDescription:
+    """Say what is known about a robot, and where it stands at joint positions."""
+    arm = robot_argument(asked.robot)
+    whose = joints_argument(asked.joints_are, arm, "joints_are")
+    if asked.joints is None:
         return RobotDescription(arm)
     count = len(arm.joints)
+    joints = positions_of(asked.joints, arm, whose, "joints")
     given = array_argument(joints, "joints", (count,), f"{count} numbers, one for each joint of {arm.name}")
-    at = np.array(given) if whose == "model" else arm.controller.to_model(given[None])[0]
-    return RobotDescription(arm, ShownPose(arm, at))
+    if whose == "controller" and not isinstance(asked.joints, str):
+        given = arm.controller.to_model(given[None])[0]
+    return RobotDescription(arm, ShownPose(arm, np.array(given)))

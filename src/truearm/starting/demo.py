@@ -13,7 +13,7 @@ import numpy as np
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
-from truearm.compensation.compensate import compensate
+from truearm.compensation.jobs import compensate
 from truearm.compensation.program_correction import commanded
 from truearm.compensation.result import REPORT, ProgramCorrection, SimulatedRun
 from truearm.engine.base.errors import InputError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +15,7 @@ from truearm.engine.programs.program import Program
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.wrench import WrenchFrame
 from truearm.studio.corrected import CellPart, cell_parts
-from truearm.studio.tasks import Outcome, Progress, compensate_command
+from truearm.studio.tasks import Outcome, Progress
 
 #: So many moves are drawn at most.
 _MOVES: Final = 5000
@@ -75,7 +75,7 @@ def corrected_program(
     progress: Progress,
 ) -> DrawnProgram:
     """Correct a program and write it, :func:`truearm.compensate`, and find where the real robot goes with it."""
-    from truearm.compensation.compensate import compensate
+    from truearm.compensation.jobs import Compensate
     from truearm.compensation.program_correction import commanded
     from truearm.engine.programs.cell import Cell, read_frames, read_tools
     from truearm.engine.programs.correction import way_through
@@ -84,7 +84,7 @@ def corrected_program(
     os.chdir(folder)
     with confined_reads(folder):
         places: dict[CellPart, str] = {} if cell is None else dict.fromkeys(cell_parts(Path(cell)), cell)
-        made = compensate(
+        asked = Compensate(
             robot,
             [program],
             out=out,
@@ -96,11 +96,9 @@ def corrected_program(
             controller_kinematics=controller_kinematics,
             accept=accept,
             accept_correction=accept_correction,
-            command=compensate_command(
-                robot, program, places, wrench, wrench_frame, taught, controller_kinematics, accept, accept_correction
-            ),
             progress=progress,
         )
+        made = replace(asked, command=asked.as_command()).run()
         progress("drawing the program")
         tools, frames = (None if part not in places else Path(places[part]) for part in ("tools", "frames"))
         language = language_called(made.files[0].language)

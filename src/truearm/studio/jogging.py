@@ -21,7 +21,7 @@ from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import FIXED_XYZ_ANGLES, IDENTITY
 from truearm.engine.robot.urdf_writing import counting
-from truearm.robot_files.inverse import inverse
+from truearm.robot_files.jobs import inverse
 
 #: In whose axes a pose is given: those of the base, of the instrument, of the controller's base, or of the tip as it
 #: stands now.

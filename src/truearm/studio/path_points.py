@@ -134,7 +134,7 @@ def played_path(folder: Path, robot: Robot, file: str, seed: Array, progress: Pr
             positions.
         seed: Joint positions near which it begins ``(joints,)`` [rad or m].
     """
-    from truearm.compensation.path import path as job
+    from truearm.compensation.jobs import path as job
 
     os.chdir(folder)
     progress("following the path")

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -17,11 +16,8 @@ from typing import Any, Final
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.files import confined_reads
 from truearm.engine.command.request import Request
-from truearm.studio.corrected import CellPart
 
 Progress = Callable[[str], None]
-#: Options of `compensate` that have other names than the parameters.
-_PLACES: Final = {"tools": "tool", "frames": "frame"}
 #: What to do where a sound result stays, as the page Calibrate has it.
 _KEPT: Final = "To replace the sound result all the same, tick 'Replace a sound result' and calibrate again."
 
@@ -79,32 +75,3 @@ def option_words(options: Mapping[str, Any]) -> list[str]:
     for name, value in options.items():
         words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
     return words
-
-
-def compensate_command(
-    robot: str,
-    program: str,
-    places: Mapping[CellPart, str],
-    wrench: str | None,
-    wrench_frame: str | None,
-    taught: Sequence[str] | None,
-    controller_kinematics: str | None,
-    accept: Sequence[str],
-    accept_correction: str | None,
-) -> str:
-    """Return the command that does the same in the project's folder, as the report shows it.
-
-    Args:
-        places: The files that say where tools and frames are.
-        wrench, wrench_frame, taught, controller_kinematics, accept, accept_correction: As the job takes them.
-    """
-    words = ["truearm", "compensate", robot, program]
-    for part, file in places.items():
-        words += [f"--{_PLACES[part]}", file]
-    words += [] if wrench is None else ["--wrench", wrench]
-    words += [] if wrench_frame is None else ["--wrench-frame", wrench_frame]
-    words += [] if controller_kinematics is None else ["--controller-kinematics", controller_kinematics]
-    words += [] if taught is None else ["--taught", ",".join(taught)]
-    words += [word for name in accept for word in ("--accept", name)]
-    words += [] if accept_correction is None else ["--accept-correction", accept_correction]
-    return shlex.join([*words, "--out", "DIR"])

@@ -25,7 +25,7 @@ from truearm.engine.robot.transform import Transform
 from truearm.engine.robot.wrench import WRENCH_FRAMES, Wrench, WrenchFrame
 from truearm.engine.twin.twin import Twin, measure, with_wrench_read
 from truearm.engine.twin.twin_joint import JointTruth
-from truearm.robot_files.convert import export
+from truearm.robot_files.jobs import export
 
 FORCE, MOMENT = (11.0, -7.0, 5.0), (0.6, -0.8, 1.1)
 

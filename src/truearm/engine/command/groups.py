@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,11 +15,13 @@ from truearm.engine.command.kinds import (
     File,
     Given,
     Gravity,
+    Names,
     NotesKind,
     Number,
     NumberOr,
     Numbers,
     PayloadKind,
+    Positions,
     Text,
     Told,
     Whole,
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
     from truearm.engine.motion.constraints import Constraints
     from truearm.engine.motion.largest_cube import Direction
+    from truearm.engine.robot.chain import Array
     from truearm.engine.robot.controller import JointsOf
     from truearm.engine.robot.parts import Payload
     from truearm.engine.robot.robot import Robot
@@ -85,18 +88,12 @@ class Loads:
         return robot.with_payload(self.payload, self.gravity)
 
 
-class Loaded(Request):
-    """What the robot carried, and how it is mounted."""
+class Carrying(Request):
+    """What the robot carries."""
 
     payload: Payload | str | None = option(
         PayloadKind("MASS,X,Y,Z"),
         'What the flange carries, with its centre of gravity in the flange frame: "2.7kg,50mm,25mm,100mm".',
-        default=None,
-        shown="as the robot file says",
-    )
-    gravity: Sequence[float] | None = option(
-        Gravity("X,Y,Z"),
-        "Free fall in the robot's base frame, 0,0,9.81 for a robot that hangs.",
         default=None,
         shown="as the robot file says",
     )
@@ -105,16 +102,59 @@ class Loaded(Request):
     def loads(self) -> Loads:
         """What was given, checked."""
         payload: Any = self.payload
+        return Loads(payload, None)
+
+
+class Mounted(Request):
+    """How the robot is mounted."""
+
+    gravity: Sequence[float] | None = option(
+        Gravity("X,Y,Z"),
+        "Free fall in the robot's base frame, 0,0,9.81 for a robot that hangs.",
+        default=None,
+        shown="as the robot file says",
+    )
+
+
+class Loaded(Carrying, Mounted):
+    """What the robot carried, and how it is mounted."""
+
+    @property
+    def loads(self) -> Loads:
+        """What was given, checked."""
         gravity: Any = self.gravity
-        return Loads(payload, gravity)
+        return replace(super().loads, gravity=gravity)
 
 
-class AtTip(Request):
-    """What goes to poses."""
+class AtTarget(Request):
+    """Which target goes to poses."""
 
-    target: str | None = option(Text("NAME"), "What goes to the poses.", default=None, shown="the flange, or `tip`")
+    target: str | None = option(Text("NAME"), "What goes to the poses.", default=None, shown="the flange")
+
+
+class AtPlace(Request):
+    """Which place on the flange goes to poses."""
+
     tip: Sequence[float] | None = option(
         Numbers("X,Y,Z", "mm", 3), "What goes to the poses, in the flange frame.", default=None, shown="the flange"
+    )
+
+
+class AtTip(AtTarget, AtPlace):
+    """What goes to poses."""
+
+
+class Near(Request):
+    """Where the joints begin."""
+
+    seed: Array | Sequence[float] | str | None = option(
+        Positions("DEG,DEG,.."),
+        "Joint positions to stay near to (mm if sliding), of the kind that is written.",
+        default=None,
+        word="seed_joints",
+        shown="zeros",
+        more="That is a text; numbers are positions of the model, ``(joints,)`` or one row a pose [rad; m for "
+        "prismatic joints].",
     )
 
 
@@ -187,12 +227,16 @@ class Noted(Request):
     )
 
 
-class Repeatable(Request):
+class Commanded(Request):
     """What says how it was asked for, in its results."""
 
     command: str | None = option(
         Again(), "How to run it again, as results say it", default=None, word="", shown="this call", repeated=False
     )
+
+
+class Repeatable(Commanded):
+    """What says how it was asked for, in its results, and can be asked for that."""
 
     @property
     def again(self) -> str:
@@ -228,7 +272,19 @@ class Excluding(Request):
     )
 
 
-class Forced(Request):
+class ForceFrame(Request):
+    """Whose axes a force is given in."""
+
+    wrench_frame: WrenchFrame | None = option(
+        Choice(known=("base", "tool", "world", "controller")),
+        "Whose axes `wrench` is given in.",
+        default=None,
+        shown="base",
+        more="Of the tool are those of the target or the flange.",
+    )
+
+
+class Forced(ForceFrame):
     """What acts on the tool besides weight."""
 
     wrench: Wrench | Sequence[float] | str | None = option(
@@ -237,12 +293,6 @@ class Forced(Request):
         '"0N,0N,80N,0Nm,0Nm,1.5Nm".',
         default=None,
         shown="nothing",
-    )
-    wrench_frame: WrenchFrame | None = option(
-        Choice(known=("base", "tool", "world", "controller")),
-        "Whose axes `wrench` is given in.",
-        default=None,
-        shown="base",
     )
 
 
@@ -303,6 +353,42 @@ class Programmed(Request):
     )
 
 
+class OfController(Request):
+    """What a controller computes with."""
+
+    controller_kinematics: str | Path | None = option(
+        File("nominal|proprietary|unknown|FILE"),
+        "What the controller computes poses with: the robot file's table, a calibration of its maker that nobody can "
+        "read, unknown, or a kinematics file (calibration.conf).",
+        default=None,
+        shown="as the robot file says, else asked",
+        more="The file is one that :func:`truearm.import_ur_kinematics` reads.",
+    )
+
+
+class Accepting(Request):
+    """What is accepted of a correction."""
+
+    accept: Sequence[str] = option(
+        Names(example="names of notices", commas=False),
+        "Accept what speaks against the calibration, as rank-loss, or against a program: skipped, not-better-here, "
+        "maker.",
+        default=(),
+        more="Of the calibration: ``rank-loss``, ``not-converged``, ``implausible``, or a notice of the level error "
+        "that it ended with, such as ``wrong-robot``. Of a program: ``maker`` for the language of another maker; "
+        "``other-kinematics`` for kinematics of the controller that are not this arm's; ``skipped`` where some targets "
+        "cannot be corrected and stay as they are; ``numbers-read`` where it computes with numbers of corrected "
+        "targets; and ``not-better-here`` to correct also targets that would rather get worse.",
+    )
+    accept_correction: str | None = option(
+        Given("LENGTH,ANGLE"),
+        "How far targets may be moved and turned, for instance 95mm,3deg; a larger correction is refused.",
+        default=None,
+        shown="twice the robot's largest deviation",
+        more="See :mod:`truearm.compensation.limit`.",
+    )
+
+
 class InCell(Request):
     """What stands in the cell."""
 
@@ -330,6 +416,19 @@ class AlsoIntoFile(Request):
 
     out: str | Path | None = option(
         File("FILE"), "File to write.", default=None, shown="none is written", repeated=False
+    )
+
+
+class IntoNewFile(Request):
+    """What writes a file that does not exist yet."""
+
+    out: str | Path | None = option(
+        File("FILE"),
+        "File to write; nothing is overwritten.",
+        default=None,
+        shown="none is written",
+        needed=True,
+        repeated=False,
     )
 
 

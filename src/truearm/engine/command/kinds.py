@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -75,7 +75,7 @@ class File(Given):
         return value
 
 
-class Files(Given):
+class GivenFiles(Given):
     """A file or several, which the job itself reads."""
 
     typed = list[str]
@@ -87,6 +87,25 @@ class Files(Given):
     def typed_again(self, value: Any) -> list[str]:
         """Return each of them."""
         return [*map(str, value)] if isinstance(value, list | tuple) else [str(value)]
+
+
+@dataclass(frozen=True)
+class Files(Given):
+    """One or more files."""
+
+    what: str = "file"  #: What each of them is, for messages.
+
+    typed = list[str]
+
+    def check(self, value: Any, name: str) -> Any:
+        """Return their paths."""
+        from truearm.engine.command.arguments import paths_argument
+
+        return paths_argument(value, name, self.what)
+
+    def typed_again(self, value: Any) -> list[str]:
+        """Return each of them."""
+        return [*map(str, value)]
 
 
 class Flag(Given):
@@ -266,6 +285,13 @@ class Choice(Kind):
 
 
 @dataclass(frozen=True)
+class ByFlags(Choice):
+    """One of some names, for which the command has flags."""
+
+    flags: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: Word and help of each but the default.
+
+
+@dataclass(frozen=True)
 class Names(Kind):
     """Names."""
 
@@ -416,9 +442,17 @@ class WrenchKind(Given):
 
     def typed_again(self, value: Any) -> list[str]:
         """Return its text."""
-        if isinstance(value, str):
-            return [value]
+        if isinstance(value, str | Path):
+            return [str(value)]
         return [value.text] if hasattr(value, "text") else Numbers().typed_again(value)
+
+
+class Positions(Given):
+    """Joint positions as Python has them, or a text in deg and mm, which the job reads with the robot at hand."""
+
+    def typed_again(self, value: Any) -> list[str]:
+        """Return a text; numbers are typed in units that only the robot knows."""
+        return [value if isinstance(value, str) else self.metavar]
 
 
 class NamedFiles(Given):

@@ -18,6 +18,7 @@ import typer
 from typer.core import TyperArgument, TyperCommand
 
 from truearm.engine.base.errors import InputError, printable, with_parameters, with_short_words
+from truearm.engine.command.kinds import ByFlags
 from truearm.engine.command.request import Option, Request, flag_of
 
 if TYPE_CHECKING:
@@ -184,8 +185,10 @@ def print_record(record: Record, *, details: bool = True) -> None:
     """Print a result in words and figures: all of it, or what fits a first screen."""
     from truearm.engine.document.records import first_screen
 
-    for line in record.lines() if details else first_screen(record):
-        print_line(spelled(line))
+    lines = record.lines() if details else first_screen(record)
+    results = len(lines) - record.asides
+    for number, line in enumerate(lines):
+        print_line(spelled(line), err=number >= results)
 
 
 def print_line(line: str, *, err: bool = False) -> None:
@@ -204,30 +207,36 @@ def add(group: Commands, *requests: type[Request]) -> None:
 
 def command_of(request: type[Request]) -> Callable[..., None]:
     """Return the command of a request as Typer takes it: a function with an argument for each option."""
-    declared = dict(request.options())
+    declared, instead = dict(request.options()), request.instead
 
     def run(**typed: Any) -> None:
         as_json, details = typed.pop("json"), typed.pop("details")
-        given = {name: declared[name].kind.read(value, name) for name, value in typed.items() if value is not None}
+        wanted, given = request, _with_flags(typed, declared)
+        if instead is not None and given.pop(instead.job):
+            wanted, given = instead, _only_those(given, instead, declared)
+        options = dict(wanted.options())
+        given = {name: options[name].kind.read(value, name) for name, value in given.items() if value is not None}
         with (
-            progress() if "progress" in declared else nullcontext() as say,
+            progress() if "progress" in options else nullcontext() as say,
             _shown_if_kept(as_json=as_json, details=details),
         ):
-            asked = request(**given)
+            asked = wanted(**given)
             own = {"command": asked.as_command(), "progress": say}
-            result = replace(asked, **{name: value for name, value in own.items() if name in declared}).run()
+            result = replace(asked, **{name: value for name, value in own.items() if name in options}).run()
         _show(result, as_json=as_json, details=details)
-        if not as_json and result.written and "out" in given:
-            print_line(f"Written to {given['out']}: {', '.join(result.written)}")
+        written = result.written_at(given["out"]) if "out" in given else ""
+        if written and not as_json:
+            print_line(written)
         if not result.finished:
             raise typer.Exit(3)
 
-    asked = [_parameter(name, one, request.default(name), declared) for name, one in declared.items() if one.in_command]
-    shown = [
+    asked = [one for name in declared for one in _parameters(name, declared, request.default(name))]
+    flags = [] if instead is None else [_flag_parameter(instead.job, instead.job, _headline(instead))]
+    flags += [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in (("details", Details), ("json", Json))
     ]
-    every = [*sorted(asked, key=lambda one: one.default is not inspect.Parameter.empty), *shown]
+    every = [*sorted(asked, key=lambda one: one.default is not inspect.Parameter.empty), *flags]
     run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     run.__annotations__ = {one.name: one.annotation for one in every}
     run.__doc__ = spelled_by(inspect.cleandoc(request.__doc__ or ""), declared)
@@ -235,12 +244,56 @@ def command_of(request: type[Request]) -> Callable[..., None]:
     return run
 
 
+def _headline(request: type[Request]) -> str:
+    return inspect.cleandoc(request.__doc__ or "").partition("\n")[0]
+
+
+def _with_flags(typed: Mapping[str, Any], declared: Mapping[str, Option]) -> dict[str, Any]:
+    """Return what was typed, with the values of options that have flags for them."""
+    given = dict(typed)
+    for name, one in declared.items():
+        if isinstance(one.kind, ByFlags):
+            chosen = [value for value in one.kind.flags if given.pop(f"{name}_{value}")]
+            if len(chosen) > 1:
+                named = ", ".join(f"{name}_{value}" for value in chosen)
+                raise InputError("only one of them can hold", parameter=named, cure="Leave one out.")
+            if chosen:
+                given[name] = chosen[0]
+    return given
+
+
+def _only_those(given: Mapping[str, Any], instead: type[Request], declared: Mapping[str, Option]) -> dict[str, Any]:
+    """Return what was given of the options that another request takes, or refuse what it does not take."""
+    own, context = dict(instead.options()), _running.get()
+    for name in given:
+        if name not in own and not declared[name].is_argument and context is not None and _given(context, name):
+            raise InputError("only one of them can hold", parameter=f"{instead.job}, {name}", cure="Leave one out.")
+    return {name: value for name, value in given.items() if name in own}
+
+
+def _flag_parameter(name: str, word: str, help: str) -> inspect.Parameter:
+    annotation = Annotated[bool, typer.Option(f"--{word}", help=help)]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation)
+
+
+def _parameters(name: str, declared: Mapping[str, Option], default: Any) -> Iterator[inspect.Parameter]:
+    """Yield what the command takes of an option: nothing, the option, or a flag for each value."""
+    one = declared[name]
+    if not one.in_command:
+        return
+    if isinstance(one.kind, ByFlags):
+        for value, (word, text) in one.kind.flags.items():
+            yield _flag_parameter(f"{name}_{value}", word, text)
+    else:
+        yield _parameter(name, one, default, declared)
+
+
 def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, Option]) -> inspect.Parameter:
     """Return an option as an argument of a function that Typer reads."""
     kind, flag = declared.kind, flag_of(name, declared)
     metavar = declared.metavar or kind.metavar
     text = spelled_by(declared.help, others).replace("[", "\\[")
-    if typing.get_origin(kind.typed) is list:
+    if typing.get_origin(kind.typed) is list and not declared.is_argument:
         text = f"{text.removesuffix('.')}; repeatable."
     if kind.at_edges and kind.at_edges.upper() not in metavar:
         text = f"{text.removesuffix('.')} \\[{kind.at_edges}]."

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import Field, dataclass, field, fields
 from typing import Any, ClassVar, Final, ParamSpec, Protocol, TypeVar, dataclass_transform
 
-from truearm.engine.command.kinds import Kind
+from truearm.engine.command.kinds import ByFlags, Kind
 
 #: What a default is that is compared with what was given.
 _PLAIN: Final = (bool, int, float, str, tuple)
@@ -94,6 +94,8 @@ class Request:
     job: ClassVar[str] = ""
     #: Words of the command; None for the name of the job.
     words: ClassVar[str | None] = None
+    #: What is done where its job is a flag of the command; it takes some of the same options alone.
+    instead: ClassVar[type[Request] | None] = None
     #: What the docstring says under Raises.
     refuses: ClassVar[str] = "For anything that cannot be used, with a message that says what to do."
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -157,6 +159,8 @@ class Request:
             flag = flag_of(name, declared)
             if declared.is_argument:
                 arguments += declared.kind.typed_again(value)
+            elif isinstance(declared.kind, ByFlags):
+                words.append(f"--{declared.kind.flags[value][0]}")
             elif value is True:
                 words.append(flag)
             else:
@@ -178,9 +182,9 @@ def metavar_of(declared: Option) -> str:
 
 def flag_of(name: str, declared: Option) -> str:
     """Return how the command line calls an option, or an argument by its metavar."""
-    return (
-        metavar_of(declared).strip("[]") if declared.is_argument else f"--{(declared.word or name).replace('_', '-')}"
-    )
+    if declared.is_argument:
+        return metavar_of(declared).strip("[]")
+    return f"--{(declared.word or name).replace('_', '-')}"
 
 
 class Runs(Protocol[R]):
@@ -222,7 +226,7 @@ def docstring(request: type[Request]) -> str:
 
 
 def _indented(text: str) -> str:
-    return textwrap.fill(text, 116, initial_indent="    ", subsequent_indent="    ")
+    return textwrap.fill(text, 116, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
 
 
 def _entry(declared: Option, default: Any) -> str:

@@ -9,7 +9,7 @@ from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.robot.library import library
 from truearm.engine.robot.parts import Payload
 from truearm.planning.programs import load_notices
-from truearm.robot_files.show import show
+from truearm.robot_files.jobs import show
 from truearm.studio import words
 from truearm.studio.cell_rules import CellRules
 from truearm.studio.pages.cell_boxes import CellBoxes

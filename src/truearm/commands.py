@@ -22,14 +22,15 @@ from truearm.compensation.command import compensate, path
 from truearm.drawn_circle.command import circle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
-from truearm.engine.command.options import CommandError, Commands, add, by_device
+from truearm.engine.command.options import CommandError, Commands, add, by_device, command_of
 from truearm.fleets.command import fleet
 from truearm.hexapod.command import app as hexapod
 from truearm.importing.command import guess, matrices, robodk, sockets, table
-from truearm.inclinometers.command import plan_pairs, simulate_readings, tilting
+from truearm.inclinometers.jobs import FindTilting, PlanInclinometers, SimulateInclinometers
 from truearm.iso9283.command import app as iso9283
 from truearm.measuring.command import measure
-from truearm.planning.command import plan, poses
+from truearm.planning.plan import PlanPoses
+from truearm.planning.poses import PosesOfSet
 from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
 from truearm.simulation.command import devices, influence, simulate
 from truearm.starting.command import demo, example, new_robot, study, study_help
@@ -81,21 +82,21 @@ importing.command()(ros)
 
 app.command()(check)
 add(app, Calibrate)
-app.command()(tilting)
+add(app, FindTilting)
 app.command()(validate)
 app.command()(distances)
 app.command()(compensate)
 app.command()(ik)
-app.command()(by_device(plan, {"inclinometers": plan_pairs}))
+app.command()(command_of(PlanPoses, by_device={"inclinometers": PlanInclinometers}))
 app.command()(measure)
-app.command()(poses)
+add(app, PosesOfSet)
 app.command()(path)
 app.command()(axes)
 app.command()(tolerance)
 app.command()(lines)
 app.command()(influence)
 app.command()(sphere)
-app.command()(by_device(simulate, {"inclinometers": simulate_readings}))
+app.command()(by_device(simulate, {"inclinometers": command_of(SimulateInclinometers)}))
 app.command()(devices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")

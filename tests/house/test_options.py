@@ -84,7 +84,7 @@ def test_an_option_is_declared_once() -> None:
 
 
 #: Names that mean several things, still.
-TWICE = ("plan",)
+TWICE = ("constraints", "device", "floor", "frames", "joints", "model", "noise", "out", "plan", "poses", "seed", "truth")
 
 
 def test_units_are_those_at_the_edges() -> None:

@@ -12,6 +12,7 @@ from truearm.engine.command.kinds import (
     Again,
     Choice,
     File,
+    Flag,
     Given,
     Gravity,
     NotesKind,
@@ -19,8 +20,10 @@ from truearm.engine.command.kinds import (
     NumberOr,
     Numbers,
     PayloadKind,
+    Positions,
     Text,
     Told,
+    TruthKind,
     Whole,
     WrenchKind,
 )
@@ -72,8 +75,8 @@ class Loads:
         return robot.with_payload(self.payload, self.gravity)
 
 
-class Loaded(Request):
-    """What the robot carried, and how it is mounted."""
+class Carrying(Request):
+    """What the robot carries."""
 
     payload: Payload | str | None = option(
         PayloadKind("MASS,X,Y,Z"),
@@ -81,12 +84,21 @@ class Loaded(Request):
         default=None,
         shown="as the robot file says",
     )
+
+
+class Mounted(Request):
+    """How the robot is mounted."""
+
     gravity: Sequence[float] | None = option(
         Gravity("X,Y,Z"),
         "Free fall in the robot's base frame, 0,0,9.81 for a robot that hangs.",
         default=None,
         shown="as the robot file says",
     )
+
+
+class Loaded(Carrying, Mounted):
+    """What the robot carried, and how it is mounted."""
 
     @property
     def loads(self) -> Loads:
@@ -261,17 +273,82 @@ class Programmed(Request):
     )
 
 
-class InCell(Request):
-    """What stands in the cell."""
+class Constrained(Request):
+    """What configurations must keep."""
 
     constraints: Constraints | str | Path | None = option(
         Given("FILE"), "What a configuration must keep: boxes, limits of joints, a floor.", default=None, shown=False
     )
+
+
+class Clearing(Request):
+    """How much room is kept."""
+
     clearance: float | None = option(
         Number("mm", low=0.0),
         "Room that the arm keeps to floor, boxes and its own links, on the ways too.",
         default=None,
         shown="50 mm",
+    )
+
+
+class InCell(Constrained, Clearing):
+    """What stands in the cell."""
+
+
+class OnFloor(Request):
+    """Where the floor is."""
+
+    floor: float | None = option(
+        Number("mm"),
+        "Height of the floor in the base frame, kept clear.",
+        default=None,
+        shown="0; where the robot hangs, its mounting surface",
+        more="It is 0 or less. Where the robot's gravity says that it does not stand, only 0 is taken: the surface on "
+        "which it is mounted. With `clearance` it is kept by all that moves, as are boxes and the arm's own links: in "
+        "every configuration, and on the ways from the safe one to the first, on to each other and back.",
+    )
+    no_floor: bool = option(Flag(), "There is no floor and no mounting surface to keep clear.", default=False)
+
+
+class FromHome(Request):
+    """Where an arm starts and ends."""
+
+    home: Sequence[float] | str | None = option(
+        Positions("DEG,DEG,.."),
+        "The safe configuration to start and end in (mm if sliding), of the kind that is written.",
+        default=None,
+        shown="one is found",
+        more="That is a text; numbers are positions of the model [rad; m for prismatic joints].",
+    )
+
+
+class OfTruth(Request):
+    """What a simulated robot truly is, and whose joint positions its data hold."""
+
+    truth: Robot | str | Path = required(
+        TruthKind("NAME|FILE"),
+        "nominal, random, gear-errors, tooth-errors, a truth of the robot file ('truearm show'), or a file.",
+        kw_only=True,
+        word="truth",
+        more="``random``: geometry and joint zeros drawn from their priors; ``gear-errors``, ``tooth-errors``: the "
+        "same with errors of encoders and gears. A file, or a robot, has its own base, and its own targets if it has some.",
+    )
+    joints: JointsOf = option(
+        Choice(known=("controller", "model")),
+        "Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
+        default="model",
+    )
+
+
+class AmongCandidates(Request):
+    """Among what configurations are chosen."""
+
+    candidates: int = option(Whole(low=1, counts=True), "Random configurations to choose from.", default=5000)
+    noise: float = option(
+        Number("mm", low=0.0, above=True, deviation=True),
+        "Standard deviation of a coordinate about a well identified model.",
+        default=1e-4,
     )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import replace
-from functools import wraps
+from functools import partial, wraps
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
 import typer
 from typer.core import TyperArgument, TyperCommand
 
-from truearm.engine.base.errors import InputError, printable, with_parameters, with_short_words
+from truearm.engine.base.errors import InputError, listed, printable, with_parameters, with_short_words
 from truearm.engine.command.request import Option, Request, flag_of
 
 if TYPE_CHECKING:
@@ -224,24 +224,36 @@ def add(group: Commands, *requests: type[Request]) -> None:
         group.command(request.command_words().split()[-1])(command_of(request))
 
 
-def command_of(request: type[Request]) -> Callable[..., None]:
-    """Return the command of a request as Typer takes it: a function with an argument for each option."""
-    declared = dict(request.options())
+def command_of(request: type[Request], by_device: Mapping[str, type[Request]] | None = None) -> Callable[..., None]:
+    """Return the command of a request as Typer takes it: a function with an argument for each option.
+
+    Args:
+        by_device: Requests that are made instead for some devices, by their names. The command has the options of all.
+    """
+    others = by_device or {}
+    declared, owners = dict[str, Option](), dict[str, type[Request]]()
+    for one in (request, *others.values()):
+        for name, option in one.options():
+            declared.setdefault(name, option)
+            owners.setdefault(name, one)
 
     def run(**typed: Any) -> None:
-        as_json = typed.pop("json")
-        given = {name: declared[name].kind.read(value, name) for name, value in typed.items() if value is not None}
-        with progress() if "progress" in declared else nullcontext() as say, _shown_if_kept(as_json=as_json):
-            asked = request(**given)
-            own = {"command": asked.as_command(), "progress": say}
-            result = replace(asked, **{name: value for name, value in own.items() if name in declared}).run()
+        as_json = typed.pop("json", False)
+        wanted = others.get(typed.get("device", ""), request)
+        own = dict(wanted.options())
+        given = {name: own[name].kind.read(value, name) for name, value in _given_of(wanted, others, typed).items()}
+        with progress() if "progress" in own else nullcontext() as say, _shown_if_kept(as_json=as_json):
+            asked = wanted(**given)
+            said = {"command": asked.as_command(), "progress": say, "tell": partial(print_line, err=as_json)}
+            result = replace(asked, **{name: value for name, value in said.items() if name in own}).run()
         _show(result, as_json=as_json)
-        if not as_json and result.written:
-            print_line(f"Written to {given['out']}: {', '.join(result.written)}")
-        if not result.finished:
+        written = result.written_at(given["out"]) if "out" in given else ""
+        if written and not as_json:
+            print_line(written)
+        if wanted.judged and not result.finished:
             raise typer.Exit(3)
 
-    asked = [_parameter(name, one, request.default(name), declared) for name, one in declared.items() if one.in_command]
+    asked = [_parameter(n, one, owners[n].default(n), declared) for n, one in declared.items() if one.in_command]
     json_option = inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Json)
     every = [*sorted(asked, key=lambda one: one.default is not inspect.Parameter.empty), json_option]
     run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
@@ -249,6 +261,31 @@ def command_of(request: type[Request]) -> Callable[..., None]:
     run.__doc__ = spelled_by(inspect.cleandoc(request.__doc__ or ""), declared)
     run.__name__ = request.job
     return run
+
+
+def _given_of(request: type[Request], others: Mapping[str, type[Request]], typed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what was typed, by option; refuse options of the requests for other devices."""
+    context, own, device = _running.get(), dict(request.options()), typed.get("device")
+    given = {
+        name: value
+        for name, value in typed.items()
+        if value is not None and (context is None or _given(context, name)) and (name != "device" or name in own)
+    }
+    for name, value in given.items():
+        if name in own:
+            continue
+        if "device" not in own:
+            raise InputError(
+                f"this says nothing for {device}", parameter=name, came=value, cure=f"Leave `{name}` out."
+            )
+        of = [device for device, other in others.items() if name in dict(other.options())]
+        raise InputError(
+            f"this is said of {listed(of)} alone",
+            parameter=name,
+            came=value,
+            cure=f"Leave `{name}` out, or use `device={of[0]}`.",
+        )
+    return given
 
 
 def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, Option]) -> inspect.Parameter:
@@ -262,13 +299,15 @@ def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, O
         text = f"{text.removesuffix('.')} \\[{kind.at_edges}]."
     typed = kind.typed
     if declared.is_argument:
-        how = typer.Argument(metavar=metavar, help=text)
+        how = typer.Argument(
+            metavar=metavar, help=text, show_default=declared.shown if isinstance(declared.shown, str) else False
+        )
     else:
         told = isinstance(declared.shown, str) or (declared.shown and default not in (None, ()))
         shown: Any = declared.shown if told and not declared.needed else False
         shown = spelled_by(shown, others) if isinstance(shown, str) else shown
         only: dict[str, Any] = {} if typed is bool else {"metavar": metavar, "show_default": shown}
-        how = typer.Option(flag, help=text, **only)
+        how = typer.Option(flag, help=text, rich_help_panel=declared.panel, **only)
     given: Any
     if declared.needed:
         given = inspect.Parameter.empty

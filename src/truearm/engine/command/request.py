@@ -37,6 +37,7 @@ class Option:
     needed: bool  #: Whether the command needs it.
     is_argument: bool  #: Whether it is an argument of the command, and no option.
     repeated: bool  #: Whether it belongs to how a result was made, so that it is said again with the command.
+    panel: str | None = None  #: Heading under which the help shows it.
 
     @property
     def in_command(self) -> bool:
@@ -55,10 +56,17 @@ def option(
     more: str = "",
     needed: bool = False,
     repeated: bool = True,
+    kw_only: bool = True,
+    is_argument: bool = False,
+    panel: str | None = None,
 ) -> Any:
-    """Declare an option with a default; arguments as in :class:`Option`."""
-    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=False, repeated=repeated)
-    return field(default=default, kw_only=True, metadata={"option": made})
+    """Declare an option with a default; arguments as in :class:`Option`.
+
+    Args:
+        kw_only: Whether Python takes it by its name alone.
+    """
+    made = Option(kind, help, metavar, word, shown, more, needed, is_argument, repeated, panel)
+    return field(default=default, kw_only=kw_only, metadata={"option": made})
 
 
 def required(
@@ -81,6 +89,8 @@ class Request:
     job: ClassVar[str] = ""
     #: Words of the command; None for the name of the job.
     words: ClassVar[str | None] = None
+    #: Whether the command ends with exit code 3 where its result is not finished.
+    judged: ClassVar[bool] = True
     #: What the docstring says under Raises.
     refuses: ClassVar[str] = "For anything that cannot be used, with a message that says what to do."
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -142,6 +152,8 @@ class Request:
         arguments, words = list[str](), list[str]()
         for name, declared, value in self.given():
             flag = flag_of(name, declared)
+            if name == "out":
+                continue
             if declared.is_argument:
                 arguments += declared.kind.typed_again(value)
             elif value is True:
@@ -164,7 +176,9 @@ def metavar_of(declared: Option) -> str:
 
 def flag_of(name: str, declared: Option) -> str:
     """Return how the command line calls an option, or an argument by its metavar."""
-    return metavar_of(declared) if declared.is_argument else f"--{(declared.word or name).replace('_', '-')}"
+    if declared.is_argument:
+        return metavar_of(declared).strip("[]")
+    return f"--{(declared.word or name).replace('_', '-')}"
 
 
 class Runs(Protocol[R]):

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Literal
 from truearm.engine.base.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
+    from truearm.engine.robot.controller import JointsOf
     from truearm.engine.robot.robot import Robot
 
 
@@ -75,15 +77,24 @@ def read_seed(robot: str | Path, text: str | None, joints: str | None, parameter
     """Return the model's joint positions [rad or m] that a text in deg or mm names, of the kind that is written."""
     if text is None:
         return None
-    import numpy as np
-
     from truearm.engine.command.arguments import joints_argument, robot_argument
 
     loaded = robot_argument(robot)
-    given = np.array([read_joints(text, loaded, parameter)])
-    if joints_argument(joints, loaded) == "controller":
-        given = loaded.controller.to_model(given)
-    return [float(value) for value in given[0]]
+    return positions_of(text, loaded, joints_argument(joints, loaded), parameter)
+
+
+def positions_of(
+    given: Sequence[float] | str | None, robot: Robot, joints_are: JointsOf, parameter: str
+) -> list[float] | None:
+    """Return the model's joint positions [rad or m] of what a job was given: these, or a text in deg or mm."""
+    if not isinstance(given, str):
+        return given  # type: ignore[return-value]  # the job counts them
+    import numpy as np
+
+    at = np.array([read_joints(given, robot, parameter)])
+    if joints_are == "controller":
+        at = robot.controller.to_model(at)
+    return [float(value) for value in at[0]]
 
 
 def read_speed(text: str | None) -> list[float] | None:

@@ -43,6 +43,10 @@ class Record(ABC):
         """Names of the files that hold it, in the folder that was asked for."""
         return ()
 
+    def written_at(self, out: str) -> str:
+        """Return the line that says which files hold it, where they were asked for; empty for none."""
+        return f"Written to {out}: {', '.join(self.written)}" if self.written else ""
+
     @property
     def finished(self) -> bool:
         """Whether it can be used as it is: no notice is an error."""

@@ -28,7 +28,7 @@ from truearm.hexapod.command import app as hexapod
 from truearm.importing.command import guess, matrices, robodk, sockets, table
 from truearm.inclinometers.jobs import FindTilting, PlanInclinometers, SimulateInclinometers
 from truearm.iso9283.command import app as iso9283
-from truearm.measuring.command import measure
+from truearm.measuring.measure import Measure
 from truearm.planning.plan import PlanPoses
 from truearm.planning.poses import PosesOfSet
 from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
@@ -87,8 +87,8 @@ app.command()(validate)
 app.command()(distances)
 app.command()(compensate)
 app.command()(ik)
-app.command()(command_of(PlanPoses, by_device={"inclinometers": PlanInclinometers}))
-app.command()(measure)
+app.command()(command_of(PlanPoses, PlanInclinometers))
+add(app, Measure)
 add(app, PosesOfSet)
 app.command()(path)
 app.command()(axes)

@@ -41,9 +41,7 @@ def planned(folder: Path) -> Plan:
 
 def wanted(**given: Any) -> Any:
     asked = PlanPoses("irb120", poses=8, **{"program": "rapid", **given})
-    return program_wanted(
-        asked.program, approach=asked.approach, speed=asked.speed, dwell=asked.dwell, wait=asked.wait
-    )
+    return program_wanted(asked.program, approach=asked.approach, speed=asked.speed, dwell=asked.dwell, wait=asked.wait)
 
 
 def test_a_folder_has_the_plan_its_ways_the_sheet_and_the_program(planned: Plan, folder: Path) -> None:

@@ -90,7 +90,8 @@ class PlanInclinometers(
     """
 
     job = "plan_inclinometers"
-    words = "plan --device inclinometers"
+    words = "plan"
+    of_device = "inclinometers"
     out: str | Path | None = option(
         File("PLAN"),
         "CSV file to write, with its ways beside it.",
@@ -115,7 +116,8 @@ class SimulateInclinometers(InPairs, OfTruth, OfRobot, Drawn, Loaded, Long):
     """
 
     job = "simulate_inclinometers"
-    words = "simulate --device inclinometers"
+    words = "simulate"
+    of_device = "inclinometers"
     out: str | Path | None = option(
         File("DATA.csv"),
         "File of inclinations to write, and one that ends in -pushed for the poses beside it.",

@@ -57,6 +57,17 @@ class OfRobot(Request):
     robot: Robot | str | Path = required(Given("ROBOT"), "A library id, a robot file or a URDF.", kw_only=False)
 
 
+class OfPlan(Request):
+    """Which plan."""
+
+    plan: str | Path = required(
+        File("PLAN.csv"),
+        "Configurations, as 'truearm plan' writes them.",
+        kw_only=False,
+        more="In the order of measuring: ``configuration`` and ``joint_1 [deg]`` .. or ``axis_1 [deg]`` ..",
+    )
+
+
 class OfData(OfRobot):
     """Which robot, and what was measured on it."""
 
@@ -332,7 +343,8 @@ class OfTruth(Request):
         kw_only=True,
         word="truth",
         more="``random``: geometry and joint zeros drawn from their priors; ``gear-errors``, ``tooth-errors``: the "
-        "same with errors of encoders and gears. A file, or a robot, has its own base, and its own targets if it has some.",
+        "same with errors of encoders and gears. A file, or a robot, has its own base, and its own targets if it has "
+        "some.",
     )
     joints: JointsOf = option(
         Choice(known=("controller", "model")),

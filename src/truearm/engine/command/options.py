@@ -224,13 +224,13 @@ def add(group: Commands, *requests: type[Request]) -> None:
         group.command(request.command_words().split()[-1])(command_of(request))
 
 
-def command_of(request: type[Request], by_device: Mapping[str, type[Request]] | None = None) -> Callable[..., None]:
+def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[..., None]:
     """Return the command of a request as Typer takes it: a function with an argument for each option.
 
     Args:
-        by_device: Requests that are made instead for some devices, by their names. The command has the options of all.
+        of_devices: Requests that are made instead for their devices. The command has the options of all.
     """
-    others = by_device or {}
+    others = {one.of_device: one for one in of_devices}
     declared, owners = dict[str, Option](), dict[str, type[Request]]()
     for one in (request, *others.values()):
         for name, option in one.options():
@@ -275,9 +275,7 @@ def _given_of(request: type[Request], others: Mapping[str, type[Request]], typed
         if name in own:
             continue
         if "device" not in own:
-            raise InputError(
-                f"this says nothing for {device}", parameter=name, came=value, cure=f"Leave `{name}` out."
-            )
+            raise InputError(f"this says nothing for {device}", parameter=name, came=value, cure=f"Leave `{name}` out.")
         of = [device for device, other in others.items() if name in dict(other.options())]
         raise InputError(
             f"this is said of {listed(of)} alone",
@@ -475,17 +473,3 @@ def refuse_pull(pull: float | None) -> None:
             came=pull,
             cure="Leave `pull` out, or use `device=inclinometers`.",
         )
-
-
-Ahead = Annotated[str, typer.Option(metavar="+x|-x|+y|-y", help="Where the largest cube is searched.")]
-Nearest = Annotated[float, typer.Option(metavar="MM", help="How far ahead the largest cube begins.")]
-Floor = Annotated[float, typer.Option(metavar="MM", help="How high the largest cube begins.")]
-TargetName = Annotated[
-    str | None, typer.Option(metavar="NAME", help="What goes to the poses.", show_default="the flange")
-]
-TipText = Annotated[
-    str | None,
-    typer.Option(
-        metavar="X,Y,Z", help="What goes to the poses, in the flange frame \\[mm].", show_default="the flange"
-    ),
-]

@@ -89,6 +89,8 @@ class Request:
     job: ClassVar[str] = ""
     #: Words of the command; None for the name of the job.
     words: ClassVar[str | None] = None
+    #: The device for which this is asked instead of the request that the command has else; empty for none.
+    of_device: ClassVar[str] = ""
     #: Whether the command ends with exit code 3 where its result is not finished.
     judged: ClassVar[bool] = True
     #: What the docstring says under Raises.
@@ -163,7 +165,8 @@ class Request:
                     words += [flag, text]
         out = dict(self.options()).get("out")
         words += [] if out is None else [flag_of("out", out), metavar_of(out)]
-        return shlex.join(["truearm", *self.command_words().split(), *arguments, *words])
+        device = ["--device", self.of_device] if self.of_device else []
+        return shlex.join(["truearm", *self.command_words().split(), *arguments, *device, *words])
 
     def __repr__(self) -> str:
         return self.as_python()

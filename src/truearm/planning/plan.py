@@ -197,7 +197,8 @@ class PlanPoses(
         "The highest speed of the tip in the program, and of the joints.",
         default=None,
         shown="250,10",
-        more="In Python the higher one of targets and flange [m/s], and the largest share of the joints' speed.",
+        more="In Python the higher one of targets and flange [m/s], and the largest share of the joints' speed: "
+        "(0.25, 0.1).",
     )
     wait: str | None = option(
         Text("WAIT"),

@@ -292,7 +292,7 @@ def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, O
     metavar = declared.metavar or kind.metavar
     text = spelled_by(declared.help, others).replace("[", "\\[")
     if typing.get_origin(kind.typed) is list:
-        text = f"{text.removesuffix('.')}; repeatable."
+        text = f"{text if text.endswith('...') else text.removesuffix('.')}; repeatable."
     if kind.at_edges and kind.at_edges.upper() not in metavar:
         text = f"{text.removesuffix('.')} \\[{kind.at_edges}]."
     typed = kind.typed

@@ -227,9 +227,9 @@ def _indented(text: str) -> str:
 def _entry(declared: Option, default: Any) -> str:
     """Return what the docstring says of an option."""
     unit = f" [{declared.kind.unit}]" if declared.kind.unit else ""
-    text = f"{declared.help.rstrip('.')}{unit}."
-    if declared.kind.allowed:
-        text += f" {declared.kind.allowed}."
+    text = f"{declared.help.removesuffix('.')}{unit}."
+    if allowed := declared.kind.allowed:
+        text += f" {allowed[0].upper()}{allowed[1:]}."
     if default is None and isinstance(declared.shown, str):
         text += f" None: {declared.shown}."
     return f"{text} {declared.more}".strip()

@@ -138,6 +138,11 @@ class Study(Record):
         return ("data",)
 
     @property
+    def written(self) -> tuple[str, ...]:
+        """Names of the files that hold it."""
+        return (*STUDY_FILES, *self.files)
+
+    @property
     def rows(self) -> tuple[Row, ...]:
         """All rows."""
         return tuple(row for table in self.tables for row in table.rows)

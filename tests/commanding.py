@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from truearm.commands import main
-from truearm.starting.demo import Demonstration, demo
+from truearm.starting.demo import Demonstration
+from truearm.starting.jobs import demo
 
 
 @dataclass(frozen=True)

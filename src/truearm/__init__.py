@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from truearm.compensation.path import path as path
     from truearm.drawn_circle.import_circle import import_circle as import_circle
     from truearm.engine.base.errors import InputError as InputError
-    from truearm.engine.command.reading import load_data as load_data
-    from truearm.engine.command.reading import load_robot as load_robot
+    from truearm.engine.command.loading import load_data as load_data
+    from truearm.engine.command.loading import load_robot as load_robot
     from truearm.engine.data.dataset import Dataset as Dataset
     from truearm.engine.robot.parameters import Parameter as Parameter
     from truearm.engine.robot.parts import Payload as Payload
@@ -65,9 +65,9 @@ if TYPE_CHECKING:
     from truearm.simulation.influence import influence as influence
     from truearm.simulation.simulate import devices as devices
     from truearm.simulation.simulate import simulate as simulate
-    from truearm.starting.demo import demo as demo
-    from truearm.starting.example import example as example
-    from truearm.starting.example import new_robot as new_robot
+    from truearm.starting.jobs import demo as demo
+    from truearm.starting.jobs import example as example
+    from truearm.starting.jobs import new_robot as new_robot
     from truearm.starting.study import study as study
     from truearm.validation.distances import distances as distances
     from truearm.validation.lines import lines as lines
@@ -79,9 +79,9 @@ if TYPE_CHECKING:
 #: plain keywords, refuses what it cannot use with an :class:`InputError` that names the parameter, and returns a frozen
 #: record.
 JOBS: Final = {
-    "load_robot": "truearm.engine.command.reading",
+    "load_robot": "truearm.engine.command.loading",
     "show": "truearm.robot_files.show",
-    "load_data": "truearm.engine.command.reading",
+    "load_data": "truearm.engine.command.loading",
     "import_table": "truearm.importing.files",
     "import_guess": "truearm.importing.guess",
     "import_matrices": "truearm.importing.files",
@@ -126,9 +126,9 @@ JOBS: Final = {
     "export_robodk": "truearm.robot_files.convert",
     "study": "truearm.starting.study",
     "fleet": "truearm.fleets.fleet",
-    "new_robot": "truearm.starting.example",
-    "example": "truearm.starting.example",
-    "demo": "truearm.starting.demo",
+    "new_robot": "truearm.starting.jobs",
+    "example": "truearm.starting.jobs",
+    "demo": "truearm.starting.jobs",
 }
 _CLASSES: Final = {
     "Calibration": "truearm.calibration.result",

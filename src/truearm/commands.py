@@ -23,7 +23,7 @@ from truearm.drawn_circle.command import circle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
 from truearm.engine.command.options import CommandError, Commands, add, by_device, command_of
-from truearm.fleets.command import fleet
+from truearm.fleets.fleet import CalibrateFleet
 from truearm.hexapod.command import app as hexapod
 from truearm.importing.command import guess, matrices, robodk, sockets, table
 from truearm.inclinometers.jobs import FindTilting, PlanInclinometers, SimulateInclinometers
@@ -33,7 +33,9 @@ from truearm.planning.plan import PlanPoses
 from truearm.planning.poses import PosesOfSet
 from truearm.robot_files.command import convert, export, export_robodk, ik, robots, show, ur_kinematics
 from truearm.simulation.command import devices, influence, simulate
-from truearm.starting.command import demo, example, new_robot, study, study_help
+from truearm.starting.command import study_help
+from truearm.starting.jobs import Demonstrate, NewRobot, WriteExample
+from truearm.starting.study import MakeStudy
 from truearm.studio.command import studio
 from truearm.validation.command import distances, lines, sphere, tolerance, validate
 
@@ -106,11 +108,11 @@ app.command()(show)
 app.command()(convert)
 app.command()(export)
 app.command()(export_robodk)
-app.command("new-robot")(new_robot)
-app.command(help=study_help())(study)
-app.command()(fleet)
-app.command()(example)
-app.command()(demo)
+add(app, NewRobot)
+app.command(help=study_help())(command_of(MakeStudy))
+add(app, CalibrateFleet)
+add(app, WriteExample)
+add(app, Demonstrate)
 app.command()(studio)
 
 

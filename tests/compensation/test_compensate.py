@@ -20,7 +20,8 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.engine.robot.transform import quaternion_from_rotation
-from truearm.starting.demo import Demonstration, demo
+from truearm.starting.demo import Demonstration
+from truearm.starting.jobs import demo
 
 
 def worn() -> Robot:

@@ -21,7 +21,7 @@ from truearm.calibration.result import Calibration
 from truearm.commands import app
 from truearm.compensation.program_correction import corrected_programs
 from truearm.engine.base.errors import InputError
-from truearm.engine.command.reading import load_robot
+from truearm.engine.command.loading import load_robot
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.fit.fit import identify

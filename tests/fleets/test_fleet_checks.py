@@ -250,7 +250,7 @@ def test_where_ctrl_c_stops_a_fleet_the_command_says_how_many_parts_are_on_disk(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("truearm.fleets.fleet._computed", stop)
+    monkeypatch.setattr("truearm.fleets.running._computed", stop)
     path = manifest(folder, ROBOTS)
     monkeypatch.setattr("sys.argv", ["truearm", "fleet", str(path), "--out", str(folder / "out"), "--workers", "1"])
     with pytest.raises(SystemExit) as ended:

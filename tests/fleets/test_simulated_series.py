@@ -224,7 +224,7 @@ def test_a_part_that_is_not_as_it_was_written_is_named(
     part = out / "parts" / "0000" / "0000002.jsonl"
     part.write_text(DAMAGES[damage](part.read_text()))
     begun: list[object] = []
-    monkeypatch.setattr("truearm.fleets.fleet._computed", lambda *given: begun.append(given))
+    monkeypatch.setattr("truearm.fleets.running._computed", lambda *given: begun.append(given))
     told = refused(lambda: truearm.fleet(file, out=out, workers=1))
     assert (told.where, told.parameter, begun) == (str(part), "out", [])
 
@@ -314,7 +314,7 @@ def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
         plan.write_text(plan.read_text() + "\n")
         return experiment(asked, where)
 
-    monkeypatch.setattr("truearm.fleets.fleet.experiment", late)
+    monkeypatch.setattr("truearm.fleets.running.experiment", late)
     file = manifest(tmp_path, configurations="plan.csv")
     told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
     assert ("changed while it was read" in str(told), told.where) == (True, "plan.csv")

@@ -14,7 +14,7 @@ from truearm.board.import_hand_eye import read_hand_eye
 from truearm.drawn_circle.import_circle import Page, read_drawn_circles
 from truearm.engine.base.errors import InputError
 from truearm.engine.choosing.zones import boxes_of, read_zones
-from truearm.engine.command.reading import load_robot
+from truearm.engine.command.loading import load_robot
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.excluded import read_exclusions
 from truearm.engine.data.readers.canonical import csv_text, read_csv

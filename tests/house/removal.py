@@ -33,7 +33,7 @@ REGISTRIES: Final = ("truearm", "truearm.commands", "truearm.starting.command", 
 #: Parts of which single files may go, and what may not: without it the whole part goes.
 IN_PARTS: Final = {"truearm.studio": ("truearm.studio.command",), "papers": ("papers.study",)}
 #: What belongs to the papers and lies elsewhere: what runs them.
-OF_PAPERS: Final = ("truearm.starting.published", "truearm.starting.study")
+OF_PAPERS: Final = ("truearm.starting.published", "truearm.starting.study", "truearm.starting.studying")
 #: Files of tests whose lists name jobs.
 LISTS: Final = ("tests/house/", "tests/fuzz/", "tests/honesty/", "tests/kill_every_job.py")
 #: Tests that go through the registries, and are quick; and those of the whole tree, which is not what is here.

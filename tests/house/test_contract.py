@@ -268,7 +268,7 @@ def test_a_demo_that_does_not_converge_ends_like_a_calibration(
     data = read_csv(small / "data.csv").of_configurations([0, 1])
     run = package.calibrate("irb120", data, train=1)
     assert run.status.value == "rank-loss"
-    monkeypatch.setattr("truearm.starting.demo.demo", lambda out, **_: Demonstration(out, run, None))
+    monkeypatch.setattr("truearm.starting.demo.demonstrated", lambda asked: Demonstration(Path(asked.out), run, None))
     assert truearm("demo", "--out", tmp_path / "demo").code == 3
 
 

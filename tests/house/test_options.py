@@ -85,8 +85,8 @@ def test_an_option_is_declared_once() -> None:
 
 #: Names that mean several things, still.
 TWICE = (
-    *("--target", "constraints", "device", "floor", "frames", "joints", "model", "noise"),
-    *("out", "plan", "poses", "seed", "truth", "wait"),
+    *("--target", "constraints", "data", "device", "floor", "frames", "joints", "model", "noise"),
+    *("out", "plan", "poses", "robot", "seed", "truth", "wait", "workers"),
 )
 
 

@@ -13,7 +13,7 @@ from tests.house.examples import performance_files
 from tests.performance_plan import small_plan
 
 import truearm
-from truearm.engine.document.page import Drawing
+from truearm.engine.document.document import Picture, Section, Words
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.iso9283.evaluate.evaluate import RESULT, Iso9283Evaluation
 from truearm.iso9283.evaluate.figures import pose_pictures
@@ -37,17 +37,22 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Arguments:
     return arguments | {"compare": folder / "first" / RESULT}
 
 
-def pictures(found: Iso9283Evaluation) -> dict[str, Drawing]:
+def pictures(found: Iso9283Evaluation) -> dict[str, Section]:
     inside = found.evaluation
     drawn = [
         *pose_pictures(found.plan, inside.clouds, inside.drift, inside.settling, inside.pushes, found.comparison),
         *path_pictures(inside, found.comparison),
     ]
-    return {one.name: one for one in drawn}
+    return {block.name: one for one in drawn for block in one.blocks if isinstance(block, Picture)}
 
 
-def named(drawing: Drawing, name: str) -> list[dict[str, Any]]:
-    return [trace for trace in drawing.figure["data"] if trace["name"] == name]
+def named(drawing: Section, name: str) -> list[dict[str, Any]]:
+    traces = next(block.figure["data"] for block in drawing.blocks if isinstance(block, Picture))
+    return [trace for trace in traces if trace["name"] == name]
+
+
+def words(drawing: Section) -> str:
+    return "".join(block.text for block in drawing.blocks if isinstance(block, Words))
 
 
 def test_deviations_of_both_results_are_in_one_picture(given: Arguments) -> None:
@@ -58,7 +63,7 @@ def test_deviations_of_both_results_are_in_one_picture(given: Arguments) -> None
     for one, beside in zip(own, other, strict=True):  # it is beside itself
         assert beside["y"] == pytest.approx(one["y"], abs=1e-3)
         assert beside["line"]["dash"] == "dash"
-    assert "Dashed: the barycentre of the other result." in drawn["paths"].words
+    assert "Dashed: the barycentre of the other result." in words(drawn["paths"])
     arrows = named(drawn["accuracy"], "of the other result")
     assert len(arrows) == 1
     np.testing.assert_allclose(
@@ -66,14 +71,14 @@ def test_deviations_of_both_results_are_in_one_picture(given: Arguments) -> None
         np.array(named(drawn["accuracy"], "barycentre")[0]["z"], dtype=float),
         atol=0.05,
     )
-    assert "The pale ones are those of the other result." in drawn["accuracy"].words
+    assert "The pale ones are those of the other result." in words(drawn["accuracy"])
 
 
 def test_a_result_alone_has_no_other_one_in_its_pictures(given: Arguments) -> None:
     drawn = pictures(truearm.iso9283_evaluate(**{**given, "compare": None}))
     assert named(drawn["paths"], "other result") == []
     assert named(drawn["accuracy"], "of the other result") == []
-    assert "other" not in drawn["paths"].words + drawn["accuracy"].words
+    assert "other" not in words(drawn["paths"]) + words(drawn["accuracy"])
 
 
 def _older(result: dict[str, Any]) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from truearm.engine.document.document import Document, Section, answer, pictured, tabled
 from truearm.engine.document.drawing import HUES, Panel, line, panels, significant
-from truearm.engine.document.page import Drawing, Figures, picture_page
 
 if TYPE_CHECKING:
     from truearm.bags.import_ros import ImportedBag
@@ -27,16 +27,17 @@ def bag_html(imported: ImportedBag) -> str:
         "In the blue times the robot stands still: no joint moves more than allowed. The mean of what was seen of a "
         "target then is its reading. Where a target moves in them, the clocks of the two topics differ."
     )
-    drawing = Drawing("recording", "Joints and targets over time", words, _picture(found))
-    return picture_page(
+    drawing = pictured("recording", "Joints and targets over time", words, _picture(found))
+    return Document(
         "Standstills in a recording",
-        imported.data.source,
-        imported.lines(),
+        [
+            answer(imported.lines(), ()),
+            _table(found),
+            drawing,
+        ],
         imported.command,
-        imported,
-        pictures=[drawing],
-        tables=[_table(found)],
-    )
+        subtitle=imported.data.source,
+    ).html(imported)
 
 
 def _picture(found: Recording) -> Figure:
@@ -84,7 +85,7 @@ def _thin(count: int) -> Array:
     return np.unique(np.linspace(0, count - 1, min(count, _MOST)).round().astype(np.intp))
 
 
-def _table(found: Recording) -> Figures:
+def _table(found: Recording) -> Section:
     heading = (
         "configuration",
         "from [s]",
@@ -111,4 +112,4 @@ def _table(found: Recording) -> Figures:
         for number, still in enumerate(found.standstills, 1)
         for target, row in zip(found.targets, found.sightings, strict=True)
     ]
-    return Figures("Standstills", heading, tuple(rows))
+    return tabled("Standstills", heading, tuple(rows))

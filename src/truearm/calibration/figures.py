@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -20,6 +19,7 @@ from truearm.engine.choosing.zones import Box, shown_box
 from truearm.engine.diagnose.curves import FoundCurve
 from truearm.engine.diagnose.error_budget import ErrorBudget, Share, shown_shares
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
+from truearm.engine.document.document import Cell, Table
 from truearm.engine.document.drawing import (
     AFTER,
     BEFORE,
@@ -44,21 +44,10 @@ _BAR = 34
 _AROUND = 96
 
 
-@dataclass(frozen=True)
-class BudgetRow:
-    """One source of error as it is printed: its name, root [mm], part of the square, uncertainty and words."""
-
-    source: str
-    rms: str
-    part: str
-    square: str
-    words: str
-
-
-def budget_rows(budget: ErrorBudget) -> tuple[BudgetRow, ...]:
+def budget_table(budget: ErrorBudget) -> Table:
     """Return a row for each source, and one for what they add up to."""
     rows = [
-        BudgetRow(
+        (
             name_of(share),
             "–" if share.rms is None else _signed(share.rms * 1e3),
             "–" if share.square is None else _percent(share.square, budget.square),
@@ -69,10 +58,9 @@ def budget_rows(budget: ErrorBudget) -> tuple[BudgetRow, ...]:
     ]
     what = "all held-out readings together" if budget.held_out else "all together"
     words = "the uncertainty is that by the scatter of the configurations"
-    return (
-        *rows,
-        BudgetRow(what, significant(budget.rms * 1e3), "100 %", _squares(budget.square, budget.deviation), words),
-    )
+    rows.append((what, significant(budget.rms * 1e3), "100 %", _squares(budget.square, budget.deviation), words))
+    heading = ("source", "rms [mm]", "of the square", "square [mm²]", "how it is known")
+    return Table(heading, rows, texts=(4,), name="budget", wide=True)
 
 
 def budget_figure(budget: ErrorBudget) -> Figure:
@@ -147,23 +135,12 @@ _NORMAL_95: Final = 1.959964
 _ROOM: Final = 4.0
 
 
-@dataclass(frozen=True)
-class CurveRow:
-    """One joint's curve as it is printed."""
-
-    joint: str
-    rms: str
-    band: str
-    strongest: str
-    measured: str
-
-
 def curve_name(curve: FoundCurve) -> str:
     """Return the name of the place of its picture."""
     return f"joint-curve-{curve.number}"
 
 
-def curve_rows(curves: Sequence[FoundCurve]) -> tuple[CurveRow, ...]:
+def curves_table(curves: Sequence[FoundCurve]) -> Table:
     """Return a row for each curve; its band is the median one where it was measured."""
     rows = []
     for curve in curves:
@@ -172,7 +149,7 @@ def curve_rows(curves: Sequence[FoundCurve]) -> tuple[CurveRow, ...]:
         inside = _measured(curve)
         half = _NORMAL_95 * np.median(curve.at(curve.angles[inside])[1]) if inside.any() else np.nan
         rows.append(
-            CurveRow(
+            (
                 f"{curve.number}, {curve.name}",
                 significant(mdeg(curve.rms), 2, 1),
                 significant(mdeg(float(half)), 2, 1),
@@ -180,7 +157,8 @@ def curve_rows(curves: Sequence[FoundCurve]) -> tuple[CurveRow, ...]:
                 ", ".join(ranges) or "nowhere",
             )
         )
-    return tuple(rows)
+    heading = ("joint", "rms [mdeg]", "known to ± [mdeg]", "strongest periods in a turn", "measured [deg]")
+    return Table(heading, rows, texts=(3, 4), name="curve-table", wide=True)
 
 
 def curve_figure(curve: FoundCurve) -> Figure:
@@ -263,20 +241,7 @@ def _gaps(measured: Array, start: float, end: float) -> list[tuple[float, float]
 _CLAIMED = 0.95
 
 
-@dataclass(frozen=True)
-class IntervalRow:
-    """One parameter: its intervals of 95 % and its deviations, by Monte Carlo and by the covariance, as printed."""
-
-    name: str
-    unit: str
-    linear: str
-    simulated: str
-    linear_deviation: str
-    deviation: str
-    coverage: str
-
-
-def interval_rows(found: SimulatedCalibrations, robot: Robot) -> tuple[IntervalRow, ...]:
+def intervals_table(found: SimulatedCalibrations, robot: Robot) -> Table:
     """Return a row for each parameter that was free, in the order of the fit, but for terms of joint curves."""
     rows = []
     for i, name in enumerate(found.names):
@@ -289,18 +254,11 @@ def interval_rows(found: SimulatedCalibrations, robot: Robot) -> tuple[IntervalR
             " to ".join(f"{from_si(end, unit):.{places}f}" for end in interval[i].tolist())
             for interval in (found.linear_interval_95, found.interval_95)
         )
-        rows.append(
-            IntervalRow(
-                name,
-                unit,
-                of_linear,
-                of_trials,
-                significant(linear, 2, 6),
-                significant(deviation, 2, 6),
-                f"{100.0 * float(found.coverage[i]):.1f} %",
-            )
-        )
-    return tuple(rows)
+        deviations = (significant(linear, 2, 6), significant(deviation, 2, 6))
+        held = f"{100.0 * float(found.coverage[i]):.1f} %"
+        rows.append((Cell(name, code=True), unit, of_linear, of_trials, *deviations, held))
+    heading = ("parameter", "unit", "linear", "by Monte Carlo", "deviation, linear", "by Monte Carlo")
+    return Table((*heading, "linear interval held"), rows, texts=(1,), name="intervals", wide=True)
 
 
 def coverage_figure(found: SimulatedCalibrations, robot: Robot) -> Figure:
@@ -347,29 +305,6 @@ def coverage_figure(found: SimulatedCalibrations, robot: Robot) -> Figure:
 _SMALLEST: Final = 1e-4
 
 
-@dataclass(frozen=True)
-class CandidateRow:
-    """One joint effect as it is printed."""
-
-    effect: str
-    gain: str
-    error: str
-    verdict: str
-    taken: bool
-
-
-@dataclass(frozen=True)
-class ConfirmationRow:
-    """One comparison of fits in the folds as it is printed."""
-
-    model: str
-    error: str
-    smaller: str
-    smaller_error: str
-    gain: str
-    standard_error: str
-
-
 def choice_sentence(selection: Selection) -> str:
     """Return how the choice was made, in words."""
     held_out = (
@@ -389,24 +324,26 @@ def choice_sentence(selection: Selection) -> str:
     )
 
 
-def candidate_rows(selection: Selection) -> tuple[CandidateRow, ...]:
+def candidates_table(selection: Selection) -> Table:
     """Return a row for every joint effect that could be chosen."""
-    return tuple(
-        CandidateRow(
+    rows = [
+        (
             one.effect,
             "–" if one.gain is None else f"{one.gain.mean * 1e3:+.4f}",
             "–" if one.gain is None else f"{one.gain.error * 1e3:.4f}",
             "taken" if one.taken else f"left out: {one.reason}",
-            one.taken,
         )
         for one in selection.candidates
-    )
+    ]
+    taken = tuple("taken" if one.taken else "" for one in selection.candidates)
+    heading = ("joint effect", "gain [mm]", "standard error [mm]", "")
+    return Table(heading, rows, texts=(3,), name="selection", wide=True, marks=taken)
 
 
-def confirmation_rows(selection: Selection) -> tuple[ConfirmationRow, ...]:
+def confirmations_table(selection: Selection) -> Table:
     """Return a row for every model that was fitted in the folds."""
-    return tuple(
-        ConfirmationRow(
+    rows = [
+        (
             listed(one.effects) or "geometric",
             f"{one.error * 1e3:.4f}",
             listed(one.smaller) or "geometric",
@@ -415,7 +352,9 @@ def confirmation_rows(selection: Selection) -> tuple[ConfirmationRow, ...]:
             f"{one.gain.error * 1e3:.4f}",
         )
         for one in selection.confirmations
-    )
+    ]
+    heading = ("model", "error [mm]", "instead of", "error [mm]", "gain [mm]", "standard error [mm]")
+    return Table(heading, rows, texts=(2,), name="confirmations", wide=True)
 
 
 def candidates_figure(selection: Selection) -> Figure:
@@ -491,37 +430,25 @@ def _bent(gain: Array, linear: float) -> Array:
     return np.asarray(np.sign(gain) * np.log10(1.0 + np.abs(gain) / linear))
 
 
-@dataclass(frozen=True)
-class ZoneRow:
-    """One zone as it is printed."""
-
-    name: str
-    box: str
-    training: int
-    held_out: int
-    whole: str
-    zone: str
-    error: str
-    verdict: str
-    kept: bool
-
-
-def zone_rows(choice: ZoneChoice) -> tuple[ZoneRow, ...]:
+def zones_table(choice: ZoneChoice) -> Table:
     """Return a row for each zone that was tried."""
-    return tuple(
-        ZoneRow(
+    rows = [
+        (
             verdict.box.name,
             box_words(verdict.box),
-            verdict.training,
-            verdict.held_out,
+            str(verdict.training),
+            str(verdict.held_out),
             _mm(verdict.whole),
             _mm(verdict.zone),
             _mm(verdict.error),
             f"{'kept' if verdict.kept else 'not kept'}: {verdict.why}",
-            verdict.kept,
         )
         for verdict in choice.verdicts
-    )
+    ]
+    kept = tuple("taken" if verdict.kept else "" for verdict in choice.verdicts)
+    heading = ("zone", "x, y, z of the flange [mm]", "training", "held out", "one model [mm]", "own model [mm]")
+    more = ("difference good to", "verdict")
+    return Table((*heading, *more), rows, texts=(1, 7), name="zone-table", wide=True, marks=kept)
 
 
 def _mm(value: float | None) -> str:

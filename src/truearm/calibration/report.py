@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,35 +13,51 @@ from numpy.typing import NDArray
 
 from truearm.calibration.figures import (
     budget_figure,
-    budget_rows,
-    candidate_rows,
+    budget_table,
     candidates_figure,
+    candidates_table,
     choice_sentence,
-    confirmation_rows,
+    confirmations_table,
     coverage_figure,
     curve_figure,
     curve_name,
-    curve_rows,
-    interval_rows,
+    curves_table,
+    intervals_table,
     workspace_budget_figure,
-    zone_rows,
     zones_figure,
+    zones_table,
 )
 from truearm.calibration.parts import simulated_lines
 from truearm.engine.base.errors import worst_first
 from truearm.engine.diagnose.expected_error import expected_map
+from truearm.engine.document.document import (
+    Alert,
+    Block,
+    Document,
+    Facts,
+    Folded,
+    Lead,
+    Picture,
+    Points,
+    Section,
+    Table,
+    Warned,
+    Words,
+    pictured,
+)
 from truearm.engine.document.figures import correlation_map, expected_error_map, histogram, residuals, workspace
-from truearm.engine.document.page import page
 from truearm.engine.document.summaries import expected_of
 from truearm.engine.document.tables import (
     SpreadRow,
     expected_rows,
     noise_alone,
-    noise_rows,
     noise_sentence,
+    noise_table,
     parameter_rows,
     parameter_sentence,
+    parameters_table,
     spread_rows,
+    spread_table,
     strongest_pairs,
 )
 from truearm.engine.robot.parts import GRAVITY
@@ -49,10 +66,14 @@ if TYPE_CHECKING:
     from truearm.calibration.result import Calibration
     from truearm.engine.data.dataset import Dataset
     from truearm.engine.data.statistics import Errors
+    from truearm.engine.diagnose.next_step import NextStep
     from truearm.engine.document.drawing import Figure
+    from truearm.engine.fit.fit import Fit
     from truearm.engine.robot.chain import Array
 
 _FRAMES: Final = ("base", "target", "fixture")
+#: Notes that every certificate has a line for, and what it is called.
+_NOTED: Final = {"serial": "Serial number", "date": "Date", "instrument": "Instrument", "operator": "Operator"}
 #: A reading is down-weighted if its weight is less than this share of the median weight.
 _DOWN_WEIGHTED: Final = 0.5
 #: Positions of the map of the error to expect.
@@ -161,42 +182,337 @@ class Report:
 
 def report_html(calibration: Calibration) -> str:
     """Return the report as one HTML page that holds its scripts and data."""
-    report, fit = Report(calibration), calibration.fit
-    rows = parameter_rows(fit)
-    return page(
-        Path(__file__).with_name("report.html.jinja"),
-        report.figures(),
-        calibration,
-        report=report,
-        run=calibration,
-        expected=calibration.expected,
-        budget=calibration.budget,
-        zone_lines=[] if calibration.zones is None else calibration.zones.lines(),
-        choice_sentence="" if calibration.selection is None else choice_sentence(calibration.selection),
-        candidate_rows=() if calibration.selection is None else candidate_rows(calibration.selection),
-        confirmation_rows=() if calibration.selection is None else confirmation_rows(calibration.selection),
-        zone_rows=() if calibration.zones is None else zone_rows(calibration.zones),
-        simulated=calibration.monte_carlo,
-        simulated_line="".join(simulated_lines(calibration.monte_carlo, fit.robot)),
-        interval_rows=() if calibration.monte_carlo is None else interval_rows(calibration.monte_carlo, fit.robot),
-        curve_rows=curve_rows(calibration.curves),
-        curve_names=[curve_name(curve) for curve in calibration.curves],
-        budget_rows=() if calibration.budget is None else budget_rows(calibration.budget),
-        expected_of=expected_of(calibration.expected),
-        expected_rows=expected_rows(calibration.expected),
-        notices=worst_first(calibration.warnings),
-        fit=fit,
-        source=Path(calibration.data.source).name,
-        robot_rows=[row for row in rows if row.group not in _FRAMES],
-        frame_rows=[row for row in rows if row.group in _FRAMES],
-        parameter_sentence=parameter_sentence(rows),
-        pairs=strongest_pairs(fit),
-        noise_rows=noise_rows(fit),
-        noise_alone={kind: noise_alone(fit, kind) for kind in ("position", "orientation", "length")},
-        noise_sentence=noise_sentence(fit),
-        down_weighted=int(report._down_weighted().sum()),
-        default_gravity=GRAVITY,
+    run, fit = calibration, calibration.fit
+    report = Report(run)
+    drawn = report.figures()
+    source = Path(run.data.source).name
+    return Document(
+        f"Calibration of {fit.robot.title} – {source}",
+        [
+            _warnings(run),
+            _before_and_after(report, drawn),
+            *_limits(run, drawn),
+            _expected(run, drawn),
+            *_workspace(run, drawn),
+            _residuals(report, drawn),
+            *_curves(run, drawn),
+            *_zones(run, drawn),
+            *_choice(run, drawn),
+            _parameters(fit),
+            *_monte_carlo(run, drawn),
+            _correlations(fit, drawn),
+            Section("Noise", [noise_table(fit), Words(noise_sentence(fit))], "noise"),
+        ],
+        run.command,
+        headline=f"Calibration of {fit.robot.title}",
+        subtitle=f"Data: {source}",
+        history=(
+            run.history,
+            *(f"Earlier: {line}" for line in fit.robot.history),
+            f"The solver took {fit.steps} steps.",
+        ),
+        cover=[Facts(_certified(run), "certified"), _result(report)],
+    ).html(run)
+
+
+def _certified(run: Calibration) -> list[tuple[str, str | Sequence[NextStep]]]:
+    """Return what the first page says of robot, data and model; what nobody noted is filled in by hand."""
+    robot = run.fit.robot
+    facts: list[tuple[str, str | Sequence[NextStep]]] = [("Robot", f"{robot.title} (`{robot.name}`)")]
+    facts += [(shown, run.notes.get(name, "")) for name, shown in _NOTED.items()]
+    facts += [(name.capitalize(), said) for name, said in run.notes.items() if name not in _NOTED]
+    facts.append(("Status", run.status.value))
+    if run.advice:
+        facts.append(("What to do", run.advice))
+    if run.next:
+        facts.append(("Next", run.next))
+    facts.append(("Model", f"{run.fit.model.name}: {run.fit.model.summary}"))
+    if robot.payload.mass:
+        place = ", ".join(f"{v * 1000:g}" for v in robot.payload.cog)
+        facts.append(("Payload", f"{robot.payload.mass:g} kg at ({place}) mm on the flange"))
+    if robot.gravity != GRAVITY:
+        fall = ", ".join(f"{v:g}" for v in robot.gravity)
+        facts.append(("Free fall", f"({fall}) m/s² in the robot's base frame"))
+    facts.append(("Configurations", f"{len(run.training)} for training, {len(run.held_out)} held out"))
+    if run.without:
+        facts.append(("Left out", ", ".join(run.without)))
+    if run.excluded:
+        rows = (f"{one.row.configuration}/{one.row.target} ({one.part}): {one.row.reason}" for one in run.excluded)
+        facts.append(("Excluded", "; ".join(rows)))
+    facts.append(("Targets", ", ".join(run.data.targets)))
+    if run.data.fixtures:
+        facts.append(("Measured against", ", ".join(f"{one.name} ({one.kind})" for one in robot.fixtures)))
+    return facts
+
+
+def _result(report: Report) -> Section:
+    """Return the answer: errors before and after, and the error to expect elsewhere."""
+    run = report.calibration
+    held = run.validation is not None
+    blocks: list[Block] = []
+    if not held:
+        words = (
+            "Every error below is one of the training readings: it says how well the model follows the data it was "
+            "made from, not how accurate the robot is elsewhere."
+        )
+        blocks.append(Alert("Nothing was held out.", words))
+    spreads = [
+        (rows, kind, unit, words)
+        for rows, kind, unit, words in (
+            (report.position, "position", "mm", "Position"),
+            (report.orientation, "orientation", "mrad", "Orientation"),
+            (report.length, "length", "mm", "Length (distance or height)"),
+        )
+        if rows
+    ]
+    leads = [_lead(run, rows, kind, unit, held=held) for rows, kind, unit, _ in spreads if rows[0].robot == "before"]
+    part = "held-out" if held else "training"
+    blocks += leads or [Alert("", f"The {part} part holds no reading to compare with.")]
+    blocks.append(_lead_elsewhere(run))
+    blocks += [spread_table(rows, words, unit) for rows, _, unit, words in spreads]
+    blocks.append(
+        Words(
+            "Before is the nominal robot with base and targets fitted to the training part; after is the calibrated "
+            "robot. Both are compared with the same readings.",
+            quiet=True,
+        )
     )
+    notices = worst_first(run.warnings)
+    blocks += [Warned(notice) for notice in notices if notice.level == "error"]
+    others = [notice.code for notice in notices if notice.level != "error"]
+    if others:
+        blocks.append(Words(f"Warnings and notes, explained below: {', '.join(others)}.", quiet=True))
+    return Section("", blocks, "result")
+
+
+def _lead(run: Calibration, rows: Sequence[SpreadRow], kind: str, unit: str, *, held: bool) -> Lead:
+    before, after = rows[:2]
+    judged = (
+        f"{after.configurations} {'configurations that the fit has not seen' if held else 'training configurations'}"
+    )
+    words = ""
+    if after.interval:
+        low, high = after.interval
+        words += f"Of configurations drawn alike the mean lies between {low} and {high} {unit} with 95 %. "
+    alone = noise_alone(run.fit, kind)
+    if alone:
+        known = "as the data declare it" if run.fit.declared else "estimated from the residuals"
+        words += f"The noise of a reading alone would make {alone} {unit} ({known}). "
+    words += (
+        f"95 % of the readings are below {after.texts[2]} {unit} (before: {before.texts[2]} {unit}); the largest is "
+        f"{after.texts[3]} {unit} (before: {before.texts[3]} {unit})."
+    )
+    said = [Words(f"Mean {kind} error on the {judged}, before → after."), Words(words, quiet=True)]
+    return Lead(said, after.texts[0], before.texts[0], unit, kind)
+
+
+def _lead_elsewhere(run: Calibration) -> Lead:
+    expected = run.expected
+    _, mean, low, high, p95 = expected_rows(expected)[0]
+    span = f"{low} mm or more" if expected.lower_bound else f"between {low} and {high} mm"
+    of = expected_of(expected)
+    quantile = (
+        f"The 95 % quantile of the positions is {p95} mm, by what is known."
+        if expected.lower_bound
+        else f"95 % of the positions are expected below {p95} mm."
+    )
+    larger = f" The errors may be larger: {'; '.join(expected.omissions)}." if expected.lower_bound else ""
+    return Lead(
+        [
+            Words(
+                "Mean position error to expect over the whole workspace; with a probability of 90 % this robot's is "
+                f"{span}."
+            ),
+            Words(
+                f"{quantile} {of[0].upper()}{of[1:]}; joint positions anywhere within their limits; without the noise "
+                f"and the systematic errors of the instrument.{larger}",
+                quiet=True,
+            ),
+        ],
+        mean,
+        unit="mm",
+        name="expected",
+    )
+
+
+def _warnings(run: Calibration) -> Section:
+    notices = worst_first(run.warnings)
+    grave = sum(notice.level == "error" for notice in notices)
+    blocks: list[Block] = []
+    if grave:
+        blocks.append(Words(f"{grave} {'error stands' if grave == 1 else 'errors stand'} on the first page."))
+    blocks += [Warned(notice) for notice in notices[grave:]]
+    return Section("Errors, warnings and notes", blocks or [Words("None.")], "warnings")
+
+
+def _before_and_after(report: Report, drawn: dict[str, Figure]) -> Section:
+    part = "Training" if report.calibration.validation is None else "Held-out"
+    names = ("position-histogram", "orientation-histogram", "length-histogram")
+    pictures = [Picture(name, drawn[name]) for name in names if name in drawn]
+    return Section(f"{part} error before and after", pictures or [Words("There is no reading to show.")])
+
+
+def _limits(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
+    budget = run.budget
+    if budget is None:
+        return []
+    together = (
+        f"Together they are the mean square of the held-out {budget.kind} errors. All shares but the remainder are "
+        "known without the held-out readings; the remainder is what these differ by."
+    )
+    if not budget.held_out:
+        together = (
+            "Nothing was held out, so together they are what to expect of readings at configurations like the training "
+            "ones."
+        )
+    words = (
+        "Squares of errors from independent sources add up: each bar begins where the one before ends. "
+        f"{together} A share that came out negative is drawn back, in red."
+    )
+    picture = Picture("limits-of-accuracy", drawn["limits-of-accuracy"])
+    blocks: list[Block] = [Words(words), picture, budget_table(budget)]
+    if "limits-over-the-workspace" in drawn:
+        over = "Over the whole workspace, without the noise of a reading, the same sources make the error to expect:"
+        blocks += [Words(over), Picture("limits-over-the-workspace", drawn["limits-over-the-workspace"])]
+    return [Section("What limits the accuracy", blocks, "limits")]
+
+
+def _expected(run: Calibration, drawn: dict[str, Figure]) -> Section:
+    shared = " and from what readings of an arrival share" if run.expected.remainder else ""
+    words = (
+        "Error of the targets' positions to expect, in the robot's base frame, mean over the joint positions that "
+        f"bring them into a cell. It follows from the covariance of the parameters{shared}, without the noise of a "
+        "reading. The dots are where the training readings were taken: far from them the model may be known less well. "
+        "Values beyond the end of the scale have its last colour."
+    )
+    rows = expected_rows(run.expected)
+    heading = ("target", "mean [mm]", "90 % from", "to [mm]", "95 % below [mm]")
+    targets = [Table(heading, rows, name="expected-targets")] if len(rows) > 1 else []
+    picture = Picture("expected-error", drawn["expected-error"])
+    return Section("Expected error over the workspace", [Words(words), picture, *targets], "expected")
+
+
+def _workspace(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
+    if "workspace" not in drawn:
+        return []
+    words = (
+        f"Where the {'training' if run.validation is None else 'held-out'} readings were taken, in the robot's base "
+        "frame, coloured by their error. Errors beyond the end of the scale have its last colour."
+    )
+    return [pictured("workspace", "Errors over the workspace", words, drawn["workspace"])]
+
+
+def _residuals(report: Report, drawn: dict[str, Figure]) -> Section:
+    words = (
+        "Error of the calibrated robot at each configuration, mean over its "
+        f"{'targets' if report.position else 'readings'}. A trend or a step is a sign that something moved or warmed "
+        "up during the measurement."
+    )
+    light = int(report._down_weighted().sum())
+    if light:
+        readings = "reading" if light == 1 else "readings"
+        words += f" The robust loss gave {light} training {readings} less than half the weight of a typical one."
+    return pictured("residuals", "Residuals, configuration by configuration", words, drawn["residuals"])
+
+
+def _curves(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
+    if not run.curves:
+        return []
+    words = (
+        "What each joint turns beyond its position, over its range or over one turn: the errors of its gear and of its "
+        "encoder. The band is what the fit knows of it, with 95 %. On simulated robots it held 97 % of the true curve, "
+        "91 % where teeth are worn, and 84 % where all joints were measured through 90° only. Short lines at the "
+        "bottom are the training configurations. Where the ground is grey there are none; the band may end beyond the "
+        "picture."
+    )
+    pictures = [Picture(name, drawn[name]) for name in map(curve_name, run.curves)]
+    return [Section("Curves of the joints", [Words(words), *pictures, curves_table(run.curves)], "curves")]
+
+
+def _zones(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
+    if run.zones is None:
+        return []
+    words = (
+        f"{run.zones.lines()[0]} A zone has a model of its own that starts at the values of the whole, and is kept "
+        "where it is better on its held-out readings by more than two standard errors of the difference. The nominal "
+        "flange says in which zone a configuration is."
+    )
+    pictures = [Picture("zone-errors", drawn["zone-errors"])] if "zone-errors" in drawn else []
+    return [Section("Zones of the workspace", [Words(words), *pictures, zones_table(run.zones)], "zones")]
+
+
+def _choice(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
+    chosen = run.selection
+    if chosen is None:
+        return []
+    picture = Picture("candidates", drawn["candidates"])
+    blocks: list[Block] = [Words(choice_sentence(chosen)), picture, candidates_table(chosen)]
+    if chosen.confirmations:
+        words = "Fitted in every fold, with weights, penalties and periods found from the other folds alone:"
+        blocks += [Words(words), confirmations_table(chosen)]
+    return [Section("How the model was chosen", blocks, "choice")]
+
+
+def _parameters(fit: Fit) -> Section:
+    rows = parameter_rows(fit)
+    own, frames = ([row for row in rows if (row.group in _FRAMES) is of_frames] for of_frames in (False, True))
+    words = (
+        f"{parameter_sentence(rows)} Deviation is one standard deviation of the estimate. Informed is the share of the "
+        "prior's variance that the readings removed: near 0 %, the value is its prior and was not measured (grey). "
+        "Click a heading to sort."
+    )
+    blocks: list[Block] = [Words(words)]
+    if fit.redundancies:
+        combined = (
+            "Moving the parameters together along these directions hardly changes any predicted reading, so the first "
+            "one of each is held at its nominal value. At configurations like the measured ones predictions hardly "
+            "depend on them."
+        )
+        entries = [f"`{one.dropped}` held: `{one.combination}`" for one in fit.redundancies]
+        blocks.append(Points("Redundant combinations", combined, entries, "redundancies"))
+    turn = ", ".join(f"{number:.6f}" for number in fit.robot.base_quaternion)
+    base = (
+        "The base stands in the instrument's frame at `base_x`, `base_y`, `base_z`, turned by the quaternion (w, x, y, "
+        f"z) = ({turn}) and then by the small angles `base_rx`, `base_ry`, `base_rz`. Their start is the closed-form "
+        "placement of the nominal robot."
+    )
+    summary = f"Base, targets and fixtures ({len(frames)} parameters)"
+    blocks += [parameters_table(own), Folded(summary, [Words(base, quiet=True), parameters_table(frames)])]
+    return Section("Parameters", blocks, "parameters")
+
+
+def _monte_carlo(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
+    simulated = run.monte_carlo
+    if simulated is None or "coverage" not in drawn:
+        return []
+    words = (
+        f"{''.join(simulated_lines(simulated, run.fit.robot))}. Each simulated calibration measures the calibrated "
+        "robot again, with noise and joint errors as they were found, and begins from a nominal robot that is off as "
+        f"the priors say (seed {simulated.seed}). A dot is the share of them in which the linear interval of a "
+        "parameter held the truth; where the intervals are right, 95 of 100 dots lie between the dotted lines."
+    )
+    table = intervals_table(simulated, run.fit.robot)
+    summary = f"Intervals of 95 %, linear and by Monte Carlo ({len(table.rows)} parameters)"
+    picture = Picture("coverage", drawn["coverage"])
+    return [Section("Intervals by Monte Carlo", [Words(words), picture, Folded(summary, [table])], "monte-carlo")]
+
+
+def _correlations(fit: Fit, drawn: dict[str, Figure]) -> Section:
+    which = (
+        "free parameters"
+        if fit.model.name == "frames"
+        else "arm's free parameters, without base and targets, which go with the arm's ends in every calibration"
+    )
+    words = (
+        f"Between the estimates of the {which}. Strongly correlated parameters are known well only together; more "
+        "varied configurations separate them."
+    )
+    blocks: list[Block] = [Words(words), Picture("correlations", drawn["correlations"])]
+    pairs = strongest_pairs(fit)
+    if pairs:
+        caption = "The strongest pairs, without those that move the arm alike everywhere"
+        blocks.append(Table(("parameter", "parameter", "correlation"), pairs, texts=(1,), caption=caption))
+    return Section("Correlations", blocks, "correlation")
 
 
 def _millimetres(errors: Errors) -> Array:

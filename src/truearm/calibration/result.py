@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -53,8 +53,10 @@ from truearm.engine.document.summaries import (
     selection_lines,
     selection_summary,
 )
+from truearm.engine.document.tables import parameter_lines
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.effects.joint_curve import JointCurve
+from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.proof import Proof
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import sealed
@@ -105,6 +107,15 @@ class Calibration(Record):
         proof = proof_of(self.fit, self.status, self.warnings, self.expected, training, self.known_before)
         found = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
         return sealed(found, proof)
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """The identified parameters by their names, in SI units, each with its deviation."""
+        return self.robot.parameters
+
+    def __str__(self) -> str:
+        """Return the report of the fit: its figures, and every parameter with what it is worth."""
+        return "\n".join([*self.lines(), "", *parameter_lines(self.fit)])
 
     @cached_property
     def repeatability(self) -> Repeatability | None:

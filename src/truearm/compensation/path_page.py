@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from truearm.compensation.corrected_path import STAGES
+from truearm.engine.document.document import Document, Section, answer, pictured, tabled
 from truearm.engine.document.drawing import (
     AFTER,
     BEFORE,
@@ -20,7 +21,6 @@ from truearm.engine.document.drawing import (
     rounded_to,
     scene_axis,
 )
-from truearm.engine.document.page import Drawing, Figures, picture_page
 from truearm.engine.document.planning_figures import joint_trajectories
 
 if TYPE_CHECKING:
@@ -49,9 +49,9 @@ def path_page(followed: FollowedPath) -> str:
             (STAGES[name], f"{path.errors[name].mean() * 1e3:.3f}", f"{path.errors[name].max() * 1e3:.3f}")
             for name in followed.stages
         )
-        tables.append(Figures("Distance from the path", ("correction", "mean [mm]", "largest [mm]"), rows))
+        tables.append(tabled("Distance from the path", ("correction", "mean [mm]", "largest [mm]"), rows))
         pictures.append(
-            Drawing(
+            pictured(
                 "errors",
                 "Distance from the path",
                 "As the calibrated robot predicts it in motion, for corrections that know more and more.",
@@ -60,7 +60,7 @@ def path_page(followed: FollowedPath) -> str:
         )
     pictures.append(_space(followed))
     pictures.append(
-        Drawing(
+        pictured(
             "joints",
             "Joint motion",
             "Joint positions, velocities and accelerations of the controller's robot.",
@@ -69,23 +69,23 @@ def path_page(followed: FollowedPath) -> str:
     )
     if path.loads is not None:
         pictures.append(
-            Drawing(
+            pictured(
                 "loads",
                 "Moments about the joints' axes",
                 "Of the load, in motion: weight and inertia of all that lies beyond each joint.",
                 _moments(followed),
             )
         )
-    return picture_page(
+    return Document(
         f"A path of {followed.robot.title}",
-        f"{', '.join(path.planned.kinds)}; {path.planned.source}.",
-        followed.answer,
+        [
+            answer(followed.answer, followed.warnings),
+            *tables,
+            *pictures,
+        ],
         followed.command,
-        followed,
-        pictures=pictures,
-        tables=tables,
-        notices=followed.warnings,
-    )
+        subtitle=f"{', '.join(path.planned.kinds)}; {path.planned.source}.",
+    ).html(followed)
 
 
 def _errors(followed: FollowedPath) -> Figure:
@@ -107,7 +107,7 @@ def _errors(followed: FollowedPath) -> Figure:
     return figure(traces, 380, xaxis=axis("along the path [mm]"), yaxis=axis("distance from the path [mm]"))
 
 
-def _space(followed: FollowedPath) -> Drawing:
+def _space(followed: FollowedPath) -> Section:
     """Draw the path, and how far beside it the robot goes, enlarged."""
     path = followed.path
     kept = _thinned(len(path.motion.time))
@@ -125,7 +125,7 @@ def _space(followed: FollowedPath) -> Drawing:
     drawn = figure(
         traces, 560, scene={**scene, "aspectmode": "data", "camera": CAMERA}, margin={"l": 0, "r": 0, "t": 40, "b": 0}
     )
-    return Drawing("space", "The path", words, drawn)
+    return pictured("space", "The path", words, drawn)
 
 
 def _curve(name: str, points: np.ndarray, colour: str, width: int) -> Figure:

@@ -6,14 +6,25 @@ import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import worst_first
 from truearm.engine.base.units import from_si
+from truearm.engine.document.document import (
+    Block,
+    Cell,
+    Document,
+    Facts,
+    Lead,
+    Picture,
+    Section,
+    Table,
+    Words,
+    pictured,
+    warned,
+)
 from truearm.engine.document.drawing import (
     AFTER,
     BEFORE,
@@ -27,7 +38,6 @@ from truearm.engine.document.drawing import (
     scene_axis,
 )
 from truearm.engine.document.figures import histogram
-from truearm.engine.document.page import page
 from truearm.engine.programs.correction import Correction, way_through
 
 if TYPE_CHECKING:
@@ -37,6 +47,8 @@ if TYPE_CHECKING:
 
 #: Targets in a picture: more slow a browser down and show no more.
 _DRAWN: Final = 5000
+#: Files that the head of the page counts.
+_COUNTED: Final = 5
 #: Rows in a table of targets that were skipped.
 _LISTED: Final = 500
 #: Thickness of a program whose targets lie in a plane [mm].
@@ -52,41 +64,160 @@ _ARROW: Final = 0.08
 
 def program_html(correction: ProgramCorrection) -> str:
     """Return the page of corrected programs."""
+    counts = [Words(f"{file.name}: {file.count_words}.", quiet=True) for file in correction.files]
+    if len(counts) > _COUNTED:
+        counts = [*counts[:_COUNTED], Words(f"And {len(counts) - _COUNTED} more files.", quiet=True)]
+    notes = [("Serial number" if key == "serial" else key.capitalize(), said) for key, said in correction.notes.items()]
+    told = [notice for notice in correction.warnings if notice.code not in ("frames-assumed", "tools-assumed")]
+    refers = [Words(sentence) for sentence in correction.frame_words]
+    return Document(
+        f"Corrected programs for {correction.robot.title}",
+        [
+            *counts,
+            *([Facts(notes)] if notes else []),
+            Section("", [_lead(correction), *warned(told)], "result"),
+            *_simulated(correction),
+            _files(correction),
+            Section("What the correction refers to", refers, "frames"),
+            *_pictures(correction),
+            *_not_better(correction.files),
+            *_skipped(correction.files),
+            *_joints(correction),
+        ],
+        correction.command,
+    ).html(correction)
+
+
+def _lead(correction: ProgramCorrection) -> Lead:
+    """Return what the real robot misses before and now, as far as it is known, and how far targets were moved."""
+    corrections = correction.result.corrections
+    moved = _spread(np.concatenate([c.moved[c.corrected] for c in corrections]) * 1e3)
+    turned = _spread(np.degrees(np.concatenate([c.turned[c.corrected] for c in corrections])))
+    shifts = [
+        Words(
+            f"Targets were moved by {moved[0]} mm on average, {moved[1]} mm at most, and turned by up to "
+            f"{turned[1]} deg."
+        )
+    ]
+    if correction.result.frames.frames != "assumed":
+        shifts += [Words(f"{file.shared_words}.") for file in correction.files if file.shared_words]
+    if correction.simulated is not None:
+        seen = correction.simulated
+        before, now = _spread(seen.original * 1e3), _spread(seen.corrected * 1e3)
+        words = (
+            f"Mean distance of {seen.robot} from where the program meant it to be, with the original and with the "
+            f"corrected program; at most {before[1]} and {now[1]} mm."
+        )
+        return Lead([Words(words), *shifts], now[0], before[0], "mm")
+    expected = _expected(correction.files)
+    if expected is None:
+        words = (
+            f"Targets were moved by that much on average, {moved[1]} mm at most, and turned by {turned[0]} deg on "
+            f"average, {turned[1]} deg at most. That is no error: what the robot misses now is not known."
+        )
+        return Lead([Words(words)], moved[0], unit="mm")
+    words = (
+        f"Mean {'relative ' if correction.relative else ''}error to expect of the real robot at the targets, with the "
+        f"original and with the corrected program. Largest expected, not a bound: {expected[1]} and {expected[3]} mm."
+    )
+    only = correction.files[0] if len(correction.files) == 1 else None
+    if only is not None and only.intervals:
+        low, high = (f"{end * 1e3:.3f}" for end in only.intervals[1])
+        span = f"{low} mm or more" if correction.lower_bound else f"{low} to {high} mm"
+        words += f" With a probability of 90 % the mean is {span} now."
+    words += f" {correction.relative}" if correction.relative else ""
+    return Lead([Words(words + _larger(correction)), *shifts], expected[2], expected[0], "mm")
+
+
+def _larger(correction: ProgramCorrection) -> str:
+    more = " They may be larger: the calibration cannot know all errors of the robot."
+    return more if correction.lower_bound else ""
+
+
+def _simulated(correction: ProgramCorrection) -> list[Section]:
+    seen = correction.simulated
+    if seen is None:
+        return []
+    before, now = seen.original * 1e3, seen.corrected * 1e3
+    drawn = histogram(before, now, "mm", "distance from the programmed path", "targets")
+    return [Section("Before and after", [Picture("simulated", drawn)])]
+
+
+def _files(correction: ProgramCorrection) -> Section:
+    rows: list[tuple[str | Cell, ...]] = [
+        (
+            Cell(file.name, code=True),
+            *map(str, (file.targets, file.corrected, file.kept.total(), len(file.skipped))),
+            *("–" if values is None else f"{values.mean() * 1e3:.3f}" for values in file.expected or (None, None)),
+            f"{file.mean_shift * 1e3:.3f}",
+            f"{file.largest_shift * 1e3:.3f}",
+        )
+        for file in correction.files
+    ]
+    words = (
+        "Mean error to expect with the original program and now; mean and largest shift of the corrected targets. "
+        f"Programs in {correction.files[0].language}."
+    )
+    heading = ("targets", "corrected", "kept", "unchanged", "expected [mm]", "now", "shift [mm]", "largest")
+    blocks: list[Block] = [Words(words), Table(("file", *heading), rows, look="spread", wide=True)]
+    if correction.splits:
+        moves, added = (sum(getattr(one, what) for one in correction.splits) for what in ("moves", "added"))
+        blocks.append(Words(f"{moves} straight or circular moves were split by {added} more targets."))
+    return Section("Files", blocks, "files")
+
+
+def _pictures(correction: ProgramCorrection) -> list[Section]:
     corrections = correction.result.corrections
     shown = [c for c in corrections if c.corrected.any()]
-    figures: dict[str, Figure] = {}
-    if shown:
-        figures = {"path": path_figure(shown), "along": along_figure(shown)}
-    if correction.simulated is not None:
-        figures["simulated"] = histogram(
-            correction.simulated.original * 1e3,
-            correction.simulated.corrected * 1e3,
-            "mm",
-            "distance from the programmed path",
-            "targets",
-        )
     known = [c for c in corrections if c.expected is not None and np.isfinite(c.expected.before).any()]
+    sections = []
+    if shown:
+        along = "By how much each target was moved and turned, in the order in which the program goes to them."
+        sections.append(pictured("along", "Along the path", along, along_figure(shown)))
+        path = path_figure(shown)
+        flat = "scene" not in path["layout"]
+        words = (
+            f"Targets where the program means them, in the frame of the controller's base"
+            f"{', which all lie in a plane' if flat else ''}, with the correction drawn longer than it is."
+        )
+        sections.append(pictured("path", "In their plane" if flat else "In space", words, path))
     if known:
-        figures["expected"] = expected_figure(known)
-    not_better = [_not_better(file, row) for file in correction.files for row in file.not_better]
-    every = [(file.name, one) for file in correction.files for one in file.skipped]
-    return page(
-        Path(__file__).with_name("program.html.jinja"),
-        figures,
-        correction,
-        correction=correction,
-        notices=worst_first(correction.warnings),
-        in_plane="path" in figures and "scene" not in figures["path"]["layout"],
-        joints=_joint_rows(correction.robot.joints, corrections),
-        not_better=not_better[:_LISTED],
-        not_better_unlisted=max(len(not_better) - _LISTED, 0),
-        skipped=every[:_LISTED],
-        unlisted=max(len(every) - _LISTED, 0),
-        counts=[f"{file.name}: {file.count_words}" for file in correction.files],
-        expected=_expected(correction.files),
-        moved=_spread(np.concatenate([c.moved[c.corrected] for c in corrections]) * 1e3),
-        turned=_spread(np.degrees(np.concatenate([c.turned[c.corrected] for c in corrections]))),
-    )
+        words = (
+            "How far the real robot is expected to be from each target, by what its calibration leaves uncertain: with "
+            f"the original program and with this one.{_larger(correction)}"
+        )
+        sections.append(pictured("expected", "Expected error", words, expected_figure(known)))
+    return sections
+
+
+def _not_better(files: Sequence[FileCorrection]) -> list[Section]:
+    rows = [_not_better_row(file, row) for file in files for row in file.not_better]
+    heading = ("file", "line", "expected before [mm]", "expected after [mm]", "gets worse with probability", "it is")
+    return _listed("Not better for their correction", "not-better", heading, rows, texts=(5,))
+
+
+def _skipped(files: Sequence[FileCorrection]) -> list[Section]:
+    rows = [(Cell(file.name, code=True), str(one.line), one.reason) for file in files for one in file.skipped]
+    return _listed("Left as they are", "skipped", ("file", "line", "reason"), rows, texts=(2,))
+
+
+def _listed(
+    title: str, name: str, heading: tuple[str, ...], rows: Sequence[Sequence[str | Cell]], texts: tuple[int, ...]
+) -> list[Section]:
+    """Return a section of a long table, none of an empty one."""
+    if not rows:
+        return []
+    blocks: list[Block] = [Table(heading, rows[:_LISTED], texts, wide=True)]
+    if len(rows) > _LISTED:
+        blocks.append(Words(f"And {len(rows) - _LISTED} more; the JSON summary lists all."))
+    return [Section(title, blocks, name)]
+
+
+def _joints(correction: ProgramCorrection) -> list[Section]:
+    rows = _joint_rows(correction.robot.joints, correction.result.corrections)
+    words = Words("Where the joints go in the corrected programs, as the model counts them.")
+    table = Table(("joint", "from", "to", "unit"), rows, texts=(3,))
+    return [Section("Joints", [words, table], "joints")] if rows else []
 
 
 def path_figure(corrections: Sequence[Correction]) -> Figure:
@@ -290,13 +421,14 @@ def _expected(files: Sequence[FileCorrection]) -> tuple[str, str, str, str] | No
     return (*_spread(before), *_spread(now))
 
 
-def _not_better(file: FileCorrection, row: int) -> tuple[str, int, str, str, str, str]:
+def _not_better_row(file: FileCorrection, row: int) -> tuple[str | Cell, ...]:
     """Return the row of a table: file, line, expected distances [mm] before and after, probability, what became."""
     known = file.correction.expected
     before, after, worse = (known.before[row], known.after[row], known.worse[row]) if known else (np.nan,) * 3
     said = "corrected" if file.correction.corrected[row] else "kept"
     line = file.correction.program.targets[row].line
-    return file.name, line, f"{before * 1e3:.3f}", f"{after * 1e3:.3f}", f"{worse:.0%}".replace("%", " %"), said
+    share = f"{worse:.0%}".replace("%", " %")
+    return Cell(file.name, code=True), str(line), f"{before * 1e3:.3f}", f"{after * 1e3:.3f}", share, said
 
 
 def _order(correction: Correction) -> NDArray[np.intp]:

@@ -13,21 +13,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
-from typing import Annotated, Any, Final, get_args
+from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, BeforeValidator
 
+from truearm.calibration.calibrate import Calibrate
 from truearm.engine.base.errors import InputError, did_you_mean, is_one_line, nearest_names, refusals_at
 from truearm.engine.base.files import exists, noted_reads, read_bytes, read_text
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.base.schemas import validated
-from truearm.engine.choosing.selection import AUTO
+from truearm.engine.command.kinds import Gravity, Kind, Names, NumberOr, PayloadKind, Whole
+from truearm.engine.command.request import Option, metavar_of
 from truearm.engine.data.readers.cells import Layout, read_cells
-from truearm.engine.fit.losses import LOSSES
-from truearm.engine.fit.models import FRAMES, MODELS
-from truearm.engine.fit.rounds import Redundant
-from truearm.engine.robot.effects import EFFECTS
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot_file.entries import NAME, NAME_IN_WORDS, STRICT
 
 _WHOLE: Final = re.compile(r"[0-9]{1,18}")
@@ -35,66 +32,45 @@ _WHOLE: Final = re.compile(r"[0-9]{1,18}")
 _SEPARATORS: Final = re.compile(r"[;,\s]+")
 
 
-def _text(cell: str) -> str:
-    return cell
+#: What may be said of a robot, by its name: what :func:`truearm.calibrate` is asked for that makes its result another.
+#: The entry itself says robot, data and notes.
+OPTIONS: Final[Mapping[str, Option]] = {
+    name: one for name, one in Calibrate.options() if one.repeated and not one.is_argument and name != "notes"
+}
+#: Those that name a file, from the manifest's folder.
+FILES: Final = tuple(name for name, one in OPTIONS.items() if metavar_of(one).endswith("FILE"))
 
 
-def _whole(cell: str) -> int | str:
-    return int(cell) if _WHOLE.fullmatch(cell) else cell
-
-
-def _names(cell: str) -> list[str]:
-    return [name for name in _SEPARATORS.split(cell) if name]
-
-
-def _numbers(cell: str) -> list[float]:
+def _of_cell(kind: Kind, cell: str) -> Any:
+    """Return what the cell of a table says."""
+    if isinstance(kind, Whole | NumberOr):
+        return int(cell) if _WHOLE.fullmatch(cell) else cell
+    if not isinstance(kind, Names | Gravity):
+        return cell
+    found = [name for name in _SEPARATORS.split(cell) if name]
+    if isinstance(kind, Names):
+        return found
     try:
-        return [float(number) for number in _names(cell)]
+        return [float(number) for number in found]
     except ValueError as error:
         raise InputError("numbers belong here", came=cell, allowed="0,0,-9.81") from error
 
 
-#: Every option by its name, a keyword of :func:`truearm.calibrate`, with what makes it of a cell of a table.
-OPTIONS: Final[Mapping[str, Callable[[str], Any]]] = {
-    "model": _text,
-    "train": _whole,
-    "seed": _whole,
-    "loss": _text,
-    "redundancy": _text,
-    "bounds": _text,
-    "hold": _names,
-    "frames": _text,
-    "exclude": _text,
-    "bootstrap": _whole,
-    "effects": _names,
-    "payload": _text,
-    "gravity": _numbers,
-    "base_changes": _names,
-    "without": _names,
-    "monte_carlo": _whole,
-    "zones": _whole,
-}
-#: Those that name a file, from the manifest's folder.
-FILES: Final = ("bounds", "exclude", "frames", "zones")
+def _other(kind: NumberOr) -> str:
+    """Return what is allowed beside a number."""
+    other = kind.metavar.partition("|")[2]
+    return "a file" if other == "FILE" else other
 
-_KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
-    "model": (*(model.name for model in (FRAMES, *MODELS)), AUTO),
-    "loss": tuple(LOSSES),
-    "redundancy": get_args(Redundant),
-    "effects": tuple(effect.name for effect in EFFECTS),
-}
-_KINDS: Final[Mapping[str, tuple[tuple[type, ...], str]]] = {
-    "train": ((int, str), "a whole number, or all"),
-    "seed": ((int,), "a whole number"),
-    "bootstrap": ((int,), "a whole number"),
-    "monte_carlo": ((int,), "a whole number"),
-    "zones": ((int, str), "a whole number, or a file of zones"),
-    "hold": ((list,), "a list of names"),
-    "effects": ((list,), "a list of names"),
-    "base_changes": ((list,), "a list of names"),
-    "without": ((list,), "a list of names"),
-    "gravity": ((list,), "three numbers"),
-}
+
+def _types(kind: Kind) -> tuple[tuple[type, ...], str]:
+    """Return the types that a value of YAML has, and what they are called."""
+    if isinstance(kind, NumberOr):
+        return (int, str), f"a whole number, or {_other(kind)}"
+    if isinstance(kind, Whole):
+        return (int,), "a whole number"
+    if isinstance(kind, Names):
+        return (list,), "a list of names"
+    return ((list,), "three numbers") if isinstance(kind, Gravity) else ((str,), "a text")
 
 
 def of_cells(cells: Mapping[str, str], place: Callable[[str], str]) -> dict[str, Any]:
@@ -107,7 +83,7 @@ def of_cells(cells: Mapping[str, str], place: Callable[[str], str]) -> dict[str,
     for name, cell in cells.items():
         if cell:
             with refusals_at(place(name)):
-                found[name] = OPTIONS[name](cell)
+                found[name] = _of_cell(OPTIONS[name].kind, cell)
     return found
 
 
@@ -133,19 +109,20 @@ def _checked(name: str, value: Any, folder: Path, where: str) -> Any:
             allowed=", ".join(OPTIONS),
             cure=did_you_mean(name, OPTIONS),
         )
-    kinds, words = _KINDS.get(name, ((str,), "a text"))
-    if not isinstance(value, kinds) or isinstance(value, bool):
-        raise InputError("this is no value of this option", where=where, came=value, allowed=words)
-    if name == "train" and isinstance(value, str) and value != "all":
+    kind = OPTIONS[name].kind
+    types, words = _types(kind)
+    wrong = isinstance(value, str) and isinstance(kind, NumberOr) and name not in FILES and value != _other(kind)
+    if not isinstance(value, types) or isinstance(value, bool) or wrong:
         raise InputError("this is no value of this option", where=where, came=value, allowed=words)
     if name in FILES and isinstance(value, str):
         if not exists(folder / value):
             raise InputError("there is no such file", where=where, came=value, cure="Check the path.")
         return str(folder / value)
-    if name == "payload":
+    if isinstance(kind, PayloadKind):
         with refusals_at(where):
-            Payload.of(value, name)
-    known = _KNOWN.get(name, ())
+            kind.check(value, name)
+    known = getattr(kind, "known", None) or ()
+    known = known() if callable(known) else known
     for one in value if isinstance(value, list) else [value]:
         if known and one not in known:
             raise InputError(

@@ -1,311 +1,74 @@
-"""Many robots: those of a series that were measured, or a whole series simulated."""
+"""What the calibration of many robots is asked for."""
 
 from __future__ import annotations
 
-import json
-import os
-import pickle
-import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import TYPE_CHECKING
 
-from truearm.calibration.calibrate import calibrate
-from truearm.calibration.calibrating import ACCEPTED
-from truearm.calibration.result import RESULT_FILES
-from truearm.engine.base.errors import InputError, Words, counted, kind_of, refusals_of, with_parameters
-from truearm.engine.base.files import noted_reads, path_argument
-from truearm.engine.base.parts import done_parts
-from truearm.engine.base.version import __version__
-from truearm.engine.base.workers import Given, ThisProcess, Workers, processes, with_workers
-from truearm.engine.command.arguments import (
-    command_argument,
-    count_argument,
-    executor_argument,
-    flag_argument,
-    folder_for,
-    name_argument,
-    progress_argument,
-    python_call,
-    robot_argument,
-    whole_argument,
-)
-from truearm.fleets.entries import OPTIONS, RobotEntry
-from truearm.fleets.manifest import Manifest, experiment, read_manifest
-from truearm.fleets.parts import Finished, Task, finished
-from truearm.fleets.recorded import RECORD, ROBOTS, Known, Recorded
-from truearm.fleets.result import FLEET_FILES, Fleet, Run
+from truearm.engine.base.errors import InputError
+from truearm.engine.command.groups import InParts, Long, Repeatable
+from truearm.engine.command.kinds import File, Flag, Text, Whole
+from truearm.engine.command.request import job, option, required
 
-#: Robots with the same options of which these are tried.
-_MOST_TRIED: Final = 50
-#: No result of the options depends on it before the fit.
-_OF_THE_SPLIT: Final = "seed"
+if TYPE_CHECKING:
+    from truearm.fleets.result import Fleet
 
 
-class _AcceptedError(Exception):
-    """A calibration has taken everything that it was given."""
+class CalibrateFleet(InParts, Repeatable, Long):
+    """Calibrate many robots of a series, measured or simulated; run again, it goes on where it stopped.
 
-
-def check_options(asked: Manifest) -> None:
-    """Refuse options that no robot can be calibrated with, by the checks of the calibration itself.
-
-    Robots with the same options are tried one after the other until one can be calibrated: data of a single robot may
-    be wrong, and that is its own failure.
-
-    Raises:
-        InputError: Naming where the option stands, or the robot that is not known.
+    What is done is written into the folder part by part, and the result is the same to the last digit, whoever does how
+    many parts. Whoever stops the work is told how many parts are on disk.
     """
-    groups: dict[str, list[RobotEntry]] = {}
-    for robot in asked.robots:
-        if not Path(robot.robot).suffix:
-            with _refusals_at(robot.places["robot"]):
-                robot_argument(robot.robot)
-        if _OF_THE_SPLIT in robot.options:
-            with _refusals_at(robot.places[_OF_THE_SPLIT]):
-                whole_argument(robot.options[_OF_THE_SPLIT], _OF_THE_SPLIT)
-        own = {name: value for name, value in robot.options.items() if name != _OF_THE_SPLIT}
-        groups.setdefault(json.dumps(own, sort_keys=True, default=str), []).append(robot)
-    for robots in groups.values():
-        _try(robots[:_MOST_TRIED])
 
-
-def _try(robots: list[RobotEntry]) -> None:
-    refused: InputError | None = None
-    for robot in robots:
-        try:
-            calibrate(robot.robot, robot.data, **robot.options, progress=_stop)
-        except _AcceptedError:
-            return
-        except InputError as error:
-            if refused is None and (place := _place_of(error, robot)) is not None:
-                refused = _in_the_manifest(error, place)
-        except (ArithmeticError, ValueError, LookupError):  # of this robot: its row will say so
-            continue
-    if refused is not None:
-        raise refused
-
-
-@contextmanager
-def _refusals_at(place: str) -> Iterator[None]:
-    try:
-        yield
-    except InputError as error:
-        raise _in_the_manifest(error, place) from error
-
-
-def _in_the_manifest(error: InputError, place: str) -> InputError:
-    """Return a refusal of an option as the manifest spells options."""
-
-    def spelled(name: str, value: str | None) -> str:
-        return f"'{name}'" if value is None else f"'{name}: {value}'"
-
-    came = error.came
-    return InputError(
-        with_parameters(error.what, spelled),
-        where=place,
-        came=Words(with_parameters(came, spelled)) if isinstance(came, str) and "`" in came else came,
-        allowed=None if error.allowed is None else with_parameters(error.allowed, spelled),
-        cure=None if error.cure is None else with_parameters(error.cure, spelled),
+    job = "fleet"
+    refuses = "If the manifest, a file that it names, the folder, the executor or the scheduler cannot be used."
+    manifest: str | Path = required(
+        File("MANIFEST.yaml"),
+        "Which robots, or which experiment.",
+        kw_only=False,
+        more="See :mod:`truearm.fleets.manifest`.",
+    )
+    out: str | Path = required(
+        File("DIR"),
+        "Folder for the parts and the result.",
+        kw_only=True,
+        word="out",
+        more="It gets record.json, fleet.json, robots.csv and report.html.",
+        repeated=False,
+    )
+    workers: int | None = option(
+        Whole(low=1, counts=True),
+        "Processes of this machine.",
+        default=None,
+        shown="one a processor",
+        more="One is this process itself.",
+    )
+    scheduler: str | None = option(
+        Text("ADDRESS"),
+        "Dask scheduler whose workers do the parts.",
+        default=None,
+        shown=False,
+        more="Such as ``tcp://127.0.0.1:8786``; it needs the extra ``truearm[fleet]``.",
+    )
+    insecure: bool = option(
+        Flag(),
+        "Reach a scheduler on another machine without TLS.",
+        default=False,
+        more="Whoever can reach it can run programs there.",
     )
 
+    def check(self) -> None:
+        """Refuse several who do the parts."""
+        several = [name for name in ("workers", "scheduler", "executor") if getattr(self, name) is not None]
+        if len(several) > 1:
+            raise InputError("one of them does the parts", parameter=", ".join(several), cure="Leave the others out.")
 
-def _stop(words: str) -> None:
-    if words == ACCEPTED:
-        raise _AcceptedError
+    def run(self) -> Fleet:
+        """Calibrate them."""
+        from truearm.fleets.running import calibrated_fleet
 
-
-def _place_of(error: InputError, robot: RobotEntry) -> str | None:
-    """Return where the option stands that is refused; None where nothing but the robot's files is wrong."""
-    named = [name for name in (error.parameter or "").split(", ") if name in OPTIONS]
-    return next((robot.places[name] for name in named if name in robot.places), None)
-
-
-def check_folders(asked: Manifest, folder: Path) -> None:
-    """Refuse folders of robots that hold what is not truearm's, and files in them that this fleet reads.
-
-    Raises:
-        InputError: Naming the file.
-    """
-    within = folder / ROBOTS
-    for robot in asked.robots:
-        own = within / robot.name
-        if own.is_symlink():
-            raise InputError(
-                "this is a link, and the folder itself belongs here",
-                parameter="out",
-                where=str(own),
-                cure="Remove the link, or choose another `out`.",
-            )
-        if own.exists():
-            folder_for(RESULT_FILES, own, ours=True)
-    place = within.resolve()
-    for path in asked.inputs:
-        if path.resolve().is_relative_to(place):
-            _refuse_own(path)
+        return calibrated_fleet(self)
 
 
-def _refuse_own(path: Path) -> NoReturn:
-    raise InputError(
-        "this file is read, and stands where the fleet writes",
-        parameter="out",
-        where=str(path),
-        cure="Choose another `out`, or copy the file.",
-    )
-
-
-def fleet(
-    manifest: str | Path,
-    *,
-    out: str | Path,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    insecure: bool = False,
-    executor: Executor | None = None,
-    command: str | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-) -> Fleet:
-    """Calibrate many robots, those of a series that were measured or simulated ones, and judge the series.
-
-    What is done is written into the folder part by part. Whatever stops the work, the same call goes on where it
-    stopped; the result is the same to the last digit, whoever does how many parts.
-
-    Parameters
-    ----------
-    manifest
-        File that says which robots, or which experiment, see :mod:`truearm.fleets.manifest`.
-    out
-        Folder for the parts, record.json, fleet.json and robots.csv.
-    workers
-        Processes of this machine that do the parts; None for one a processor. One is this process itself.
-    scheduler
-        Address of a Dask scheduler whose workers do the parts instead, such as ``tcp://127.0.0.1:8786``. It needs the
-        extra ``truearm[fleet]``.
-    insecure
-        Whether a scheduler on another machine may be reached without TLS: whoever can reach it can run programs there.
-    executor
-        Or an executor that does them, which stays open.
-    command
-        How to run it again, for the folder's manifest; None writes the call in Python.
-    progress
-        Called with a few words at each step.
-
-    Raises
-    ------
-    InputError
-        If the manifest, a file that it names, the folder, the executor or the scheduler cannot be used.
-    KeyboardInterrupt
-        Where somebody stops it, with how many parts are on disk.
-    """
-    progress_argument(progress)
-    path = path_argument(manifest, "manifest")
-    count = None if workers is None else count_argument(workers, "workers")
-    address = None if scheduler is None else name_argument(scheduler, "scheduler")
-    insecure = flag_argument(insecure, "insecure")
-    executor = executor_argument(executor)
-    given = {"workers": count, "scheduler": address, "executor": executor}
-    several = [name for name, value in given.items() if value is not None]
-    if len(several) > 1:
-        raise InputError("one of them does the parts", parameter=", ".join(several), cure="Leave the others out.")
-    call = command_argument(command) or python_call("fleet", manifest, workers=count, scheduler=address)
-    folder = folder_for((RECORD, *FLEET_FILES), out, path)
-    with refusals_of("manifest"):
-        asked = read_manifest(path)
-    folder_for(FLEET_FILES, out, *asked.inputs, ours=True)
-    with refusals_of("manifest"):
-        make = _tasks(asked, folder.absolute())
-    recorded = Recorded(folder, asked)
-    missing = recorded.missing()
-    if asked.experiment is None and missing:
-        check_folders(asked, folder)
-        progress("checking the options")
-        with refusals_of("manifest"):
-            check_options(asked)
-    chosen = _workers(count, address, insecure, executor, missing) if missing else ThisProcess()
-    try:
-        with with_workers(chosen), recorded.alone() as known:
-            run = _computed(recorded, known, make, chosen, progress)
-            progress("reading the parts")
-            found = Fleet(recorded, run, call)
-            found.write()
-    except KeyboardInterrupt as stop:
-        done = len(recorded.on_disk())
-        words = f"{done} of {counted(asked.parts, 'part')} {'are' if asked.parts > 1 else 'is'} on disk"
-        raise KeyboardInterrupt(f"Stopped: {words}; run it again to go on.") from stop
-    return found
-
-
-def _workers(
-    count: int | None, scheduler: str | None, insecure: bool, executor: Executor | None, parts: int
-) -> Workers:
-    """Return who does the parts."""
-    if executor is not None:
-        return Given(executor)
-    if scheduler is not None:
-        from truearm.engine.base.parts import Cluster
-
-        return Cluster(scheduler, insecure=insecure)
-    return processes(min(count or os.cpu_count() or 1, parts))
-
-
-def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
-    """Return what makes the task of a part."""
-    if asked.experiment is None:
-        robots = asked.robots
-        return lambda part: Task(part, __version__, robots=tuple(robots[n] for n in asked.numbers(part)), folder=folder)
-    with noted_reads() as noted:
-        made = pickle.dumps(experiment(asked.experiment, f"{asked.file}, experiment"))
-    for name, known in asked.hashes.items():
-        if {*noted.get((asked.file.parent / name).absolute(), ())} - {known}:
-            raise InputError("this file changed while it was read", where=name, cure="Run this again.")
-    return lambda part: Task(part, __version__, made, tuple(asked.numbers(part)))
-
-
-def _computed(
-    recorded: Recorded, known: Known, make: Callable[[int], Task], workers: Workers, progress: Callable[[str], None]
-) -> Run:
-    """Let workers do what is missing, and write each part as it comes."""
-    asked, before = recorded.manifest, len(known.done)
-    tasks = (make(part) for part in range(asked.parts) if part not in known.done)
-    told, lost = [*known.again], list[int]()
-    done, failed, began = before, 0, time.perf_counter()
-
-    def tell(words: str) -> None:
-        told.append(words)
-        progress(words)
-
-    progress(f"part {done} of {asked.parts}")
-    for one in done_parts(finished, tasks, workers, tell):
-        done += 1
-        if one.lost:
-            lost.append(one.part.part)
-            continue
-        failed += _written(recorded, one.part.part, one.result, workers)
-        left = (time.perf_counter() - began) / (done - before) * (asked.parts - done)
-        words = f", {counted(failed, 'robot')} failed" if failed else ""
-        progress(f"part {done} of {asked.parts}{words}, about {left:.0f} s left")
-    names = [name for part in sorted(lost) for name in asked.names(part)]
-    return Run(asked.parts, before, tuple(told), tuple(names))
-
-
-def _written(recorded: Recorded, part: int, result: object, workers: Workers) -> int:
-    """Write what came back of a part, and return how many of its robots failed; what belongs to no part is refused."""
-    try:
-        if not (isinstance(result, Finished) and isinstance(result.text, str) and type(result.failed) is int):
-            raise TypeError(f"an object of type {kind_of(result)} came back")
-        recorded.write(part, result.text)
-    except InputError:
-        raise
-    except (TypeError, ValueError) as error:
-        if not isinstance(workers, Given):
-            raise
-        raise InputError(
-            "the executor has returned something else than what was found of the robots that it was given",
-            parameter="executor",
-            where=f"part {part + 1}",
-            came=Words(str(error) if isinstance(error, TypeError) else "a result of another part, or a changed one"),
-            cure="Give one whose futures hold what the function returned. Run this again with it: what is on disk is "
-            "not computed twice.",
-        ) from error
-    return result.failed
+fleet = job(CalibrateFleet)

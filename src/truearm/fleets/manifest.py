@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import numpy as np
 from pydantic import BaseModel, Field, PlainValidator
 
+from truearm.calibration.calibrate import Calibrate
 from truearm.engine.base.errors import InputError, name_parameter, name_place, refusals_at
 from truearm.engine.base.files import read_bytes, read_yaml
 from truearm.engine.base.limits import refuse_beyond
@@ -125,10 +126,10 @@ class ExperimentFile(BaseModel):
     count: Count
     configurations: Configurations = 20
     targets: Annotated[int, Field(ge=1, le=8, strict=True)] = 1
-    model: str = "geometric"
+    model: str = Calibrate.default("model")
     noise: NotNegative
     held_out: Count = 50
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    seed: Annotated[int, Field(ge=0, strict=True)] = Calibrate.default("seed")
 
 
 class ManifestFile(BaseModel):

@@ -149,6 +149,11 @@ class Fleet(Record):
         """Names of the files that are written beside the parts."""
         return FLEET_FILES if self.proposed is not None else tuple(n for n in FLEET_FILES if n != PRIORS_FILE)
 
+    @property
+    def written(self) -> tuple[str, ...]:
+        """The files, and that the parts are beside them."""
+        return (*self.files, "and the parts")
+
     def content(self) -> dict[str, Any]:
         """Return what ``fleet.json`` holds, in mm: the same however the parts were computed."""
         found = self.analysis

@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truearm.engine.base.errors import worst_first
+from truearm.engine.document.document import (
+    Block,
+    Cell,
+    Document,
+    Facts,
+    Lead,
+    Picture,
+    Section,
+    Table,
+    Words,
+    pictured,
+    warned,
+)
 from truearm.engine.document.drawing import (
     AFTER,
     BEFORE,
@@ -21,7 +33,6 @@ from truearm.engine.document.drawing import (
     rounded,
     significant,
 )
-from truearm.engine.document.page import page
 
 if TYPE_CHECKING:
     from truearm.engine.data.statistics import Errors
@@ -37,49 +48,122 @@ _WORDS = {
 
 def tilting_html(found: Tilting) -> str:
     """Return the report of both stages."""
-    rows = found.constants()
-    figures = {"angles": angles_figure(rows), "compliances": compliances_figure(rows), "changes": changes_figure(found)}
-    spread = []
-    if found.geometry is not None and found.geometry_alone is not None:
-        figures["errors"] = errors_figure(found)
-        spread = [
-            {"robot": name, "figures": _figures(errors)}
-            for name, errors in _errors(found).items()
-            if errors.position is not None
-        ]
-    changed, left = (math.degrees(size) for size in found.sizes)
-    return page(
-        Path(__file__).with_name("tilting.html.jinja"),
-        figures,
-        found,
-        found=found,
-        rows=[_shown(row) for row in rows],
-        words=_WORDS,
-        spread=spread,
-        held=found.geometry is not None and found.geometry.validation is not None,
-        changed=significant(changed, 3),
-        left=significant(left, 2, 6),
-        seats=[
-            {
-                "name": seat["name"],
-                "turned": f"{seat['turned_deg']:.2f}",
-                "zeros": ", ".join(f"{axis} {zero:+.3f}" for axis, zero in seat["zero_deg"].items()),
-            }
-            for seat in found.seats()
-        ],
-        notices=worst_first(found.warnings),
-        source=Path(found.read.source).name,
+    source, rows = Path(found.read.source).name, found.constants()
+    geometry = found.geometry
+    with_geometry = "" if geometry is None else f", {Path(geometry.data.source.replace(chr(92), '/')).name}"
+    pushed = f"; {found.pushed} configurations of poses under loads" if found.pushed else ""
+    facts = [
+        ("Robot", f"{found.robot.title} (`{found.robot.name}`)"),
+        *((name.capitalize(), said) for name, said in found.notes.items()),
+        ("Inclinometers", "; ".join(found.read.instruments.names)),
+        (
+            "Compared",
+            f"{len(found.read.pairs)} pairs of configurations, {found.used} changes of inclination{pushed}",
+        ),
+    ]
+    dots = (
+        "Each dot is the change of one axis of one instrument from the first configuration of a pair to the second. "
+        "Axes too steep to see small turns, and links before which a joint may lean to either side, are left out."
     )
+    bars = "Bars reach two standard deviations to either side. A joint that no load told is left out."
+    return Document(
+        f"Tilting joints of {found.robot.title} – {source}",
+        [
+            Facts(facts),
+            Section("", [*_accuracy(found), _inclinations(found), *warned(found.warnings)], "result"),
+            pictured("angles", "Tilt and backlash of each joint", bars, angles_figure(rows)),
+            Section("Compliance of each joint", [Picture("compliances", compliances_figure(rows))]),
+            _constants(rows),
+            pictured("changes", "Changes of inclination, pair by pair", dots, changes_figure(found)),
+            *(
+                [pictured("errors", "Errors of poses", f"On the {_judged(found)}.", errors_figure(found))]
+                if geometry
+                else []
+            ),
+            _seats(found),
+        ],
+        found.command,
+        headline=f"Tilting joints of {found.robot.title}",
+        subtitle=f"Data: {source}{with_geometry}",
+        history=found.robot.history,
+    ).html(found)
 
 
-def _shown(row: dict[str, Any]) -> dict[str, Any]:
-    """Return a constant with its figures as they are printed."""
-    texts = {
-        "value": deserved(row["value"], row["deviation"]),
-        "deviation": significant(row["deviation"], 2, 7),
-        "informed": f"{100 * (row['informed'] or 0.0):.0f}",
-    }
-    return row | {"words": _WORDS[row["effect"]], "texts": texts}
+def _judged(found: Tilting) -> str:
+    held = found.geometry is not None and found.geometry.validation is not None
+    return "configurations that no fit has seen" if held else "training configurations"
+
+
+def _accuracy(found: Tilting) -> list[Block]:
+    """Return what becomes of the errors of poses, where they were read."""
+    spread = [(name, *_figures(errors)) for name, errors in _errors(found).items() if errors.position is not None]
+    if not spread:
+        return []
+    (_, nominal, *_), (_, alone, *_), (_, first, *_) = spread
+    words = [
+        Words(f"Mean position error on the {_judged(found)}: geometry alone → tilting first."),
+        Words(
+            f"Nominal robot: {nominal} mm. The full report of the geometry is geometry.html beside this page.",
+            quiet=True,
+        ),
+    ]
+    heading = ("robot", "mean [mm]", "RMS", "95 % below", "maximum")
+    return [Lead(words, first, alone, "mm", "position"), Table(heading, spread, look="spread")]
+
+
+def _inclinations(found: Tilting) -> Lead:
+    changed, left = (math.degrees(size) for size in found.sizes)
+    wider = ", by which the deviations below are widened" if found.fit.excess > 1 else ""
+    words = [
+        Words(
+            "Changes of inclination that were read, root mean square → what tilt, backlash and compliance leave of "
+            "them."
+        ),
+        Words(f"What is left is {found.fit.excess:.2f} times as large as the declared deviations{wider}.", quiet=True),
+    ]
+    return Lead(words, significant(left, 2, 6), significant(changed, 3), "deg", "inclination")
+
+
+def _constants(rows: list[dict[str, Any]]) -> Section:
+    table = Table(
+        ("parameter", "what it is", "unit", "value", "deviation", "informed"),
+        [
+            (
+                Cell(row["name"], code=True),
+                _WORDS[row["effect"]],
+                row["unit"],
+                Cell(deserved(row["value"], row["deviation"]), row["value"]),
+                Cell(significant(row["deviation"], 2, 7), row["deviation"]),
+                f"{100 * (row['informed'] or 0.0):.0f} %",
+            )
+            for row in rows
+        ],
+        texts=(1, 2),
+        look="parameters sortable",
+        marks=tuple("" if row["seen"] else "uninformed" for row in rows),
+    )
+    words = (
+        "Informed is the share of the prior's variance that the readings removed: near 0 %, the value was believed and "
+        "not measured (grey)."
+    )
+    return Section("", [table, Words(words)], "constants")
+
+
+def _seats(found: Tilting) -> Section:
+    words = (
+        "Found from the angles themselves. Only changes of inclination are used, so zeros do not matter; a turn of the "
+        "instrument on its link is taken into account."
+    )
+    rows = [
+        (
+            seat["name"],
+            f"{seat['turned_deg']:.2f}",
+            ", ".join(f"{axis} {zero:+.3f}" for axis, zero in seat["zero_deg"].items()),
+        )
+        for seat in found.seats()
+    ]
+    table = Table(("instrument", "turned [deg]", "zeros [deg]"), rows, texts=(2,))
+    return Section("How the instruments sit", [Words(words), table], "instruments")
 
 
 def _errors(found: Tilting) -> dict[str, Errors]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from truearm.engine.document.document import Document, answer, pictured, tabled
 from truearm.engine.document.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure, rounded_to
-from truearm.engine.document.page import Drawing, Figures, picture_page
 from truearm.engine.document.records import notice_lines
 from truearm.engine.robot.chain import Array
 from truearm.measuring.campaign import nest_drift
@@ -111,11 +111,11 @@ def measure_report(measured: Measured) -> str:
         ("samples, at least", str(quality.samples)),
     ]
     tables = [
-        Figures("Readings", ("state", "count", "why"), tuple(states), (2,)),
-        Figures(
+        tabled("Readings", ("state", "count", "why"), tuple(states), (2,)),
+        tabled(
             "Measured with", ("what", "value"), (("readings from", measured.instrument), *measured.about.rows()), (1,)
         ),
-        Figures("Asked of a reading", ("what", "limit"), tuple(asked), (1,)),
+        tabled("Asked of a reading", ("what", "limit"), tuple(asked), (1,)),
     ]
     aside = [
         (str(entry.number), entry.label, entry.name, session.reason_of(entry), entry.words)
@@ -128,31 +128,31 @@ def measure_report(measured: Measured) -> str:
         for label, name in session.left_out:
             places.setdefault(name, []).append(label)
         rows = [(name, str(len(labels)), ", ".join(labels)) for name, labels in places.items()]
-        details.append(Figures("Left out", ("target", "count", "at the configurations"), tuple(rows), (2,)))
+        details.append(tabled("Left out", ("target", "count", "at the configurations"), tuple(rows), (2,)))
     if aside:
         heading = ("number", "configuration", "point", "reason", "words")
-        details.append(Figures("Set aside, one by one", heading, tuple(aside), (1, 2, 3, 4)))
+        details.append(tabled("Set aside, one by one", heading, tuple(aside), (1, 2, 3, 4)))
     pictures = []
     if (drift := drift_figure(session)) is not None:
         words = (
             "How far each fixed nest is from where it was read first, and what all of them share: instrument or floor, "
             "not the robot. It is shown alone: no reading is corrected for it."
         )
-        pictures.append(Drawing("drift", "Nests", words, drift))
+        pictures.append(pictured("drift", "Nests", words, drift))
     if (scatter := quality_figure(session)) is not None:
         words = (
             "Scatter of the samples while the arm stood, reading by reading. It does not say how well a reading fits."
         )
-        pictures.append(Drawing("dwell", "Dwells", words, scatter))
+        pictures.append(pictured("dwell", "Dwells", words, scatter))
     said = notice_lines(measured.warnings)
-    return picture_page(
+    return Document(
         f"Measured: {measured.title}",
-        f"The plan {measured.plan}. No reading was kept or set aside for how well it fits a model.",
-        [line for line in measured.lines() if line not in said],
+        [
+            answer([line for line in measured.lines() if line not in said], measured.warnings),
+            *tables,
+            *pictures,
+            *details,
+        ],
         measured.command,
-        measured,
-        pictures=pictures,
-        tables=tables,
-        details=details,
-        notices=measured.warnings,
-    )
+        subtitle=f"The plan {measured.plan}. No reading was kept or set aside for how well it fits a model.",
+    ).html(measured)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truearm.engine.document.document import Document, answer, pictured
 from truearm.engine.document.drawing import AFTER, CAMERA, Figure, base_axes, figure, rounded_to, scene_axis
-from truearm.engine.document.page import Drawing, picture_page
 from truearm.engine.document.planning_figures import pose_cube
 from truearm.engine.motion.largest_cube import PosePlan
 
@@ -24,15 +24,15 @@ def pose_set_page(poses: PlannedPoses) -> str:
         approach = made.rotation[:, :, 2]
         drawn = pose_cube(PosePlan(cube, made.position, approach, made.planes, made.joints, made.target))
         words = "The cube with its diagonal planes. Tails show from where the tip's z axis comes."
-    return picture_page(
+    return Document(
         f"Poses of {poses.robot.title}",
-        f"{len(made.labels)} poses of the set {made.name}.",
-        poses.answer,
+        [
+            answer(poses.answer, poses.warnings),
+            pictured("poses", "Where the poses are", words, drawn),
+        ],
         poses.command,
-        poses,
-        pictures=[Drawing("poses", "Where the poses are", words, drawn)],
-        notices=poses.warnings,
-    )
+        subtitle=f"{len(made.labels)} poses of the set {made.name}.",
+    ).html(poses)
 
 
 def _points(poses: PlannedPoses) -> Figure:

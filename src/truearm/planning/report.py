@@ -12,6 +12,7 @@ import numpy as np
 from truearm.engine.base.errors import worst_first
 from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.units import from_si
+from truearm.engine.document.document import Block, Document, Section, Table, Words, answer, pictured
 from truearm.engine.document.drawing import (
     AFTER,
     BEFORE,
@@ -48,18 +49,53 @@ _INDEX_WORDS: Final = {
 def plan_html(planned: Plan) -> str:
     """Return the page of a plan."""
     plan = planned.made
-    figures = {"number": number_figure(plan.prediction, len(plan.joints)), "workspace": workspace_figure(plan)}
-    return page(
-        Path(__file__).with_name("plan.html.jinja"),
-        figures,
-        planned,
-        plan=plan,
-        chosen_by=planned.chosen_by,
-        command=planned.command,
-        words=(*planned.answer, *planned.driving),
-        notices=worst_first(planned.warnings),
-        indices=[(name, _INDEX_WORDS[name], f"{value:.4g}") for name, value in plan.indices.items()],
+    number = (
+        "Predicted mean error of readings that were not measured, elsewhere in the workspace. The dotted line is the "
+        "noise of these readings."
     )
+    space = "Predicted mean error of the calibrated model itself at random configurations, at the place of the flange."
+    if plan.prediction.there:
+        space += " The red diamonds are where it shall be accurate."
+    return Document(
+        f"Measurements of {plan.robot.title}",
+        [
+            answer((*planned.answer, *planned.driving), planned.warnings),
+            pictured("number", "How many poses", number, number_figure(plan.prediction, len(plan.joints))),
+            pictured("workspace", "Where the robot will be accurate", space, workspace_figure(plan)),
+            _observability(plan),
+            _candidates(plan),
+        ],
+        planned.command,
+        headline=f"Where to measure {plan.robot.title}",
+        subtitle=f"{len(plan.joints)} configurations for the {plan.model.name} model, chosen by {planned.chosen_by} "
+        f"from {plan.usable} usable ones of {plan.candidates} candidates.",
+    ).html(planned)
+
+
+def _observability(plan: MeasurementPlan) -> Section:
+    rows = [(name, _INDEX_WORDS[name], f"{value:.4g}") for name, value in plan.indices.items()]
+    words = (
+        "Columns are parameters in their physical size (1 mm, 0.1 deg), rows are readings in their deviation; priors "
+        "count as measurements. All indices depend on these units. The choice by O1 does not."
+    )
+    blocks: list[Block] = [Table(("index", "what it is", "value"), rows, texts=(1,)), Words(words)]
+    if plan.left_out:
+        without = ", ".join(plan.left_out)
+        blocks.append(Words(f"Left out, because the candidates can hardly tell them from the others: {without}."))
+    return Section("Observability", blocks, "indices")
+
+
+def _candidates(plan: MeasurementPlan) -> Section:
+    rows = [(name, str(count)) for name, count in plan.rejected.items()]
+    blocks: list[Block] = [
+        Table(("constraint", "configurations that break it"), rows),
+        Words(f"{plan.usable} of {plan.candidates} candidates break none."),
+    ]
+    if plan.drawn:
+        near = f" Too near to something, each counted once: {plan.drawn.words}." if plan.drawn.words else ""
+        taken = f"{len(plan.drawn.joints)} of those that keep clear were taken."
+        blocks.append(Words(f"{plan.drawn.tried} were drawn within the limits, {taken}{near}"))
+    return Section("Candidates", blocks, "constraints")
 
 
 def number_figure(prediction: Prediction, planned: int) -> Figure:

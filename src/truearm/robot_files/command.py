@@ -212,7 +212,7 @@ def show(
     json: Json = False,
 ) -> None:
     """Show a robot: its joints, its reach at zero, what is known about it, and where it stands at joint positions."""
-    from truearm.engine.command.reading import load_robot
+    from truearm.engine.command.loading import load_robot
     from truearm.robot_files.show import show as run
 
     loaded = load_robot(robot)

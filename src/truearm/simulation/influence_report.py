@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import html
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truearm.engine.base.errors import worst_first
+from truearm.engine.document.document import Cell, Document, Lead, Picture, Section, Table, Words, pictured, warned
 from truearm.engine.document.drawing import AFTER, BEFORE, Figure, axis, figure, rounded, rounded_to, significant
-from truearm.engine.document.page import page
 from truearm.simulation.influences import WAYS, Influence
 
 if TYPE_CHECKING:
@@ -57,40 +55,103 @@ _COLOURS = (BEFORE, "#8a6d1d", "#b3261e", AFTER, "#3b7d3b")
 
 def influence_html(found: InfluenceResult) -> str:
     """Return the page."""
-    figures = {"influence": influence_figure(found.made), "map": map_figure(found)}
-    spread: list[dict[str, Any]] = []
-    if found.identified is not None:
-        figures["errors"] = errors_figure(found.identified)
-        spread = [
-            {"words": WAYS[way], "figures": [significant(v * 1e3, 3) for v in (s.mean, s.rms, s.p95, s.max)]}
-            for way, errors in found.identified.errors.items()
-            if (s := errors.position) is not None
-        ]
-    return page(
-        Path(__file__).with_name("influence.html.jinja"),
-        figures,
-        found,
-        found=found,
-        rows=[
-            row
-            | {
-                "texts": {key: significant(row[key], 3, 5) for key in row if key.endswith(("_mm", "_deg"))},
-                "by": significant(row["change"], 3, 6),
-            }
-            for row in found.rows()
+    rows, tip = found.rows(), found.tip
+    first = rows[0]
+    moves = (
+        f"On average {tip} moves so far if `{first['name']}`, the most influential parameter, is off by "
+        f"{significant(first['change'], 3, 6)} {first['unit']}."
+    )
+    by_pose = (
+        f"How far the same change moves {tip} at each configuration. The influence of angles depends on the posture, "
+        "that of lengths hardly does."
+    )
+    lead = Lead([Words(moves)], now=significant(first["mean_mm"], 3, 5), unit="mm")
+    return Document(
+        f"Influence of the parameters of {found.robot.title}",
+        [
+            Section("", [lead, *warned(found.notices)], "result"),
+            pictured(
+                "influence",
+                "Influence of each parameter",
+                "Average over the configurations, and range.",
+                influence_figure(found.made),
+            ),
+            pictured("map", "Pose by pose", by_pose, map_figure(found)),
+            Section("", [_every_parameter(rows)], "table"),
+            *_identified(found),
         ],
-        parameters=[_texts(row) for row in found.found()],
-        ways=WAYS,
-        spread=spread,
-        notices=worst_first(found.notices),
+        found.command,
+        headline=f"What each parameter of {found.robot.title} does to {tip}",
+        subtitle=f"{len(found.labels)} configurations. Every parameter is changed alone, by what the table says.",
+    ).html(found)
+
+
+def _every_parameter(rows: list[dict[str, Any]]) -> Table:
+    keys = ("mean_mm", "least_mm", "greatest_mm", "mean_deg", "greatest_deg")
+    heading = ("mean [mm]", "least [mm]", "greatest [mm]", "turned, mean [deg]", "turned, greatest [deg]")
+    return Table(
+        ("parameter", "change", "unit", *heading),
+        [
+            (
+                Cell(row["name"], code=True),
+                significant(row["change"], 3, 6),
+                row["unit"],
+                *(significant(row[key], 3, 5) for key in keys),
+            )
+            for row in rows
+        ],
+        texts=(2,),
+        look="parameters sortable",
     )
 
 
-def _texts(row: dict[str, Any]) -> dict[str, Any]:
-    return row | {
-        "texts": {way: f"{round(row[way], 4) + 0.0:.4f}" for way in WAYS},
-        "known": significant(row["deviation"] or 0.0, 2, 6),
-    }
+def _identified(found: InfluenceResult) -> list[Section]:
+    """Return what identification by influence is worth, where it was tried."""
+    tried = found.identified
+    if tried is None:
+        return []
+    judged = "configurations that none of them has seen" if tried.held_out else "the same ones"
+    where = (
+        "are those that fit the nominal robot best" if tried.frames == "placed" else "are where the robot file has them"
+    )
+    words = (
+        f"From {tried.training} configurations; judged on {judged}. Bars are means, lines reach to where 95 % of the "
+        "errors are below. Pose by pose, each pose is explained alone and one set is made of those of all poses. Base "
+        f"and targets {where}, except in the last way."
+    )
+    spread = [
+        (WAYS[way], *(significant(v * 1e3, 3) for v in (s.mean, s.rms, s.p95, s.max)))
+        for way, errors in tried.errors.items()
+        if (s := errors.position) is not None
+    ]
+    ways = [
+        (
+            Cell(row["name"], code=True),
+            row["unit"],
+            *(f"{round(row[way], 4) + 0.0:.4f}" for way in WAYS),
+            significant(row["deviation"] or 0.0, 2, 6),
+        )
+        for row in found.found()
+    ]
+    return [
+        Section(
+            "Identification by influence, beside the standard one",
+            [
+                Words(words),
+                Picture("errors", errors_figure(tried)),
+                Table(("identified by", "mean [mm]", "RMS", "95 % below", "maximum"), spread, look="spread"),
+                Table(
+                    ("parameter", "unit", *WAYS, "deviation of the last"),
+                    ways,
+                    texts=(1,),
+                    caption="What each way found",
+                    look="parameters",
+                    wide=True,
+                ),
+            ],
+            "identified",
+        )
+    ]
 
 
 def map_figure(found: InfluenceResult) -> Figure:

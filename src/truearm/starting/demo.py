@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from truearm.compensation.result import REPORT, ProgramCorrection, SimulatedRun
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.base.writing import write_files
-from truearm.engine.command.arguments import folder_for, progress_argument
+from truearm.engine.command.arguments import folder_for
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import Status
@@ -29,6 +29,9 @@ from truearm.engine.robot.transform import Transform
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
 from truearm.engine.twin.twin_joint import PERFECT
+
+if TYPE_CHECKING:
+    from truearm.starting.jobs import Demonstrate
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,6 +46,11 @@ class Demonstration(Record):
     def corrected_folder(self) -> Path:
         """Where the corrected program is."""
         return self.folder / "corrected"
+
+    @property
+    def finished(self) -> bool:
+        """Whether the calibration can be used as it is."""
+        return self.calibration.finished
 
     def summary(self) -> dict[str, Any]:
         """Return both results as JSON holds them."""
@@ -67,33 +75,16 @@ _PLATE_FRAME: Final = Transform((0.31, -0.11, 0.06))
 _REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
 
 
-def demo(out: str | Path = "truearm-demo", *, progress: Callable[[str], None] = lambda _: None) -> Demonstration:
-    """Calibrate a digital twin of an IRB 120 and correct a program with it.
-
-    The truth is the robot that Nubiola's thesis identified (Tables 2.6 and 2.7), with its compliance, and with gears
-    that err by 0.01 deg two hundred times in a turn: those are beyond the elastic model, so the report has a remainder.
-
-    Parameters
-    ----------
-    out
-        Folder for data and results.
-    progress
-        Called with a few words at each step.
-
-    Raises
-    ------
-    InputError
-        If the folder holds other measurements or another program: they are not overwritten.
-    """
-    progress_argument(progress)
-    folder = folder_for((), out)
+def demonstrated(asked: Demonstrate) -> Demonstration:
+    """Calibrate a digital twin of an IRB 120 and correct a program with it."""
+    folder = folder_for((), asked.out)
     rng = np.random.default_rng(20240)
     robot = load_robot("irb120")
     twin = truth_twin(robot, "tracker-triangular", rng)
     gears = {2: ((240, math.radians(0.01), 0.4),), 3: ((200, math.radians(0.01), 1.9),)}
     geared = {number: replace(twin.joints.get(number, PERFECT), gear=gear) for number, gear in gears.items()}
     twin = replace(twin, joints={**twin.joints, **geared})
-    progress("measuring the twin with a simulated laser tracker")
+    asked.progress("measuring the twin with a simulated laser tracker")
     low, high = np.radians(_REGION)
     data = measure(twin, rng.uniform(low, high, (200, 6)), 0.03e-3, rng)
     path = folder / "measurements.csv"
@@ -108,12 +99,14 @@ def demo(out: str | Path = "truearm-demo", *, progress: Callable[[str], None] = 
                 cure="Choose another `out`.",
             )
     write_files(folder, {path.name: text, _PLATE: plate})
-    calibration = calibrate("irb120", path, out=folder, model="elastic", payload=twin.robot.payload, progress=progress)
+    calibration = calibrate(
+        "irb120", path, out=folder, model="elastic", payload=twin.robot.payload, progress=asked.progress
+    )
     shown = Demonstration(folder, calibration, None)
     if calibration.status is not Status.CONVERGED:
         return shown
-    correction = _corrected_plate(calibration, twin, folder, rng, progress)
-    correction.save(shown.corrected_folder, progress)
+    correction = _corrected_plate(calibration, twin, folder, rng, asked.progress)
+    correction.save(shown.corrected_folder, asked.progress)
     return replace(shown, correction=correction)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from truearm.engine.robot.robot_file.reading import robot_from_file
 from truearm.engine.robot.robot_file.schema import RobotFile
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import measure
+
+if TYPE_CHECKING:
+    from truearm.starting.jobs import NewRobot, WriteExample
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,20 +60,9 @@ class RobotTemplate(Record):
         return [f"{self.file}: fill it in, then look at it with 'truearm show {self.file}'."]
 
 
-def new_robot(file: str | Path) -> RobotTemplate:
-    """Write a commented robot file to fill in.
-
-    Parameters
-    ----------
-    file
-        The file to write, which must not exist yet.
-
-    Raises
-    ------
-    InputError
-        If the file exists or cannot be written.
-    """
-    path = new_file_for(file, "file")
+def new_file(asked: NewRobot) -> RobotTemplate:
+    """Write the commented robot file."""
+    path = new_file_for(asked.file, "file")
     write_new_text(path, robot_template())
     return RobotTemplate(path)
 
@@ -83,20 +75,9 @@ def robot_template() -> str:
 _FILES: Final = ("my_robot.yaml", "measurements.csv", "check.csv", "session.sh")
 
 
-def example(folder: str | Path) -> ExampleSession:
-    """Write a small complete session to imitate: a robot, its data, data to check with, the commands.
-
-    Parameters
-    ----------
-    folder
-        Folder to write into; nothing in it is overwritten.
-
-    Raises
-    ------
-    InputError
-        If one of the files exists.
-    """
-    place = folder_for(_FILES, folder, parameter="folder")
+def session(asked: WriteExample) -> ExampleSession:
+    """Write the session."""
+    place = folder_for(_FILES, asked.folder, parameter="folder")
     for name in _FILES:
         if exists(place / name):
             raise InputError(

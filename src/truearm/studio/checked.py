@@ -53,7 +53,7 @@ class Checked:
 def checked(folder: Path, robot: str, data: str, exclude: str | None, progress: Progress) -> Checked:
     """Say what is wrong with measurements: :func:`truearm.check`."""
     from truearm.checking.check import check
-    from truearm.engine.command.reading import load_data
+    from truearm.engine.command.loading import load_data
 
     os.chdir(folder)
     progress("comparing the readings with the robot")

@@ -87,7 +87,7 @@ def serve(
         project: Project = open_project(folder, DEMONSTRATION if demo else None)
         # Where it was filled before, it is opened as it is now: what was changed since stays.
         if demo and not exists(project.folder / DEMONSTRATION["cell"]):
-            from truearm.starting.demo import demo as job
+            from truearm.starting.jobs import demo as job
 
             job(project.folder, progress=progress)
             project.look()

@@ -6,11 +6,21 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from truearm.calibration.calibrate import Calibrate
+from truearm.engine.command.request import Request
 from truearm.engine.robot.wrench import WrenchFrame
+from truearm.iso9283.jobs import EvaluateTests
 from truearm.studio.measure_fields import MeasureFields
 from truearm.studio.plan_fields import PlanFields
 
 _Name = Annotated[str, Field(min_length=1)]
+_Above0 = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+def typed_default(request: type[Request], name: str) -> str:
+    """Return the default of an option as it is typed."""
+    (text,) = dict(request.options())[name].kind.typed_again(request.default(name))
+    return text
 
 
 class TestedFiles(BaseModel):
@@ -25,8 +35,9 @@ class TestedFiles(BaseModel):
     forces: _Name | None = None
     alignment: _Name | None = None
     compare: _Name | None = None
-    noise_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.01  #: noise_mm, noise_rot_deg: of the instrument.
-    noise_rot_deg: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.005
+    #: noise_mm, noise_rot_deg: of the instrument.
+    noise_mm: _Above0 = float(typed_default(EvaluateTests, "noise"))
+    noise_rot_deg: _Above0 = float(typed_default(EvaluateTests, "noise_rot"))
     result: _Name = "iso9283/result"  #: Folder of the evaluation.
 
 
@@ -39,10 +50,10 @@ class Settings(BaseModel):
     data: _Name | None = None  #: File of measurements; None for none yet.
     exclude: _Name | None = None  #: File of readings that are excluded; None for none.
     payload: _Name | None = None  #: What the robot carried, as a text such as ``2.7kg,50mm,25mm,100mm``.
-    model: _Name = "geometric"  #: model, train, loss, seed: as for :func:`truearm.calibrate`.
+    model: _Name = Calibrate.default("model")  #: model, train, loss, seed: as for :func:`truearm.calibrate`.
     train: Annotated[int, Field(strict=True, ge=1)] | Literal["all"] | None = None
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
-    loss: _Name = "linear"
+    seed: Annotated[int, Field(strict=True, ge=0)] = Calibrate.default("seed")
+    loss: _Name = Calibrate.default("loss")
     result: _Name = "result"  #: Folder of the calibration's results, in the project's.
     program: _Name | None = None  #: File of a robot program.
     cell: _Name | None = None  #: File that says where tools and frames are; None for what the program says.

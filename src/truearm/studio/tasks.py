@@ -6,6 +6,7 @@ folder is the project's. So what they write is, to the byte, what the command wr
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import shlex
 from collections.abc import Callable, Mapping, Sequence
@@ -15,6 +16,7 @@ from typing import Any, Final
 
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.files import confined_reads
+from truearm.engine.command.request import Request
 from truearm.studio.corrected import CellPart
 
 Progress = Callable[[str], None]
@@ -47,15 +49,13 @@ def calibrate(
     options
         Of the job, by its names of parameters; None where nothing is said.
     """
-    from truearm.calibration.calibrate import calibrate as job
+    from truearm.calibration.calibrate import Calibrate
     from truearm.calibration.parts import ResultKeptError
 
     os.chdir(folder)
-    given = {name: value for name, value in options.items() if value is not None}
-    command = calibrate_command(robot, data, given)
     with confined_reads(folder):
         try:
-            found = job(robot, data, out=out, replace=replace, command=command, progress=progress, **given)
+            found = done(Calibrate(robot, data, out=out, replace=replace, progress=progress, **given(options)))
         except ResultKeptError as kept:
             found = kept.result
             refused = InputError(kept.what, where=out, came=kept.came, cure=_KEPT)
@@ -63,9 +63,14 @@ def calibrate(
     return Outcome(tuple(found.lines()), found.warnings, found.written, found.finished)
 
 
-def calibrate_command(robot: str, data: str, options: dict[str, Any]) -> str:
-    """Return the command that does the same in the project's folder, as the report shows it."""
-    return shlex.join(["truearm", "calibrate", robot, data, *option_words(options), "--out", "DIR"])
+def given(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is said of options."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def done(asked: Request) -> Any:
+    """Do what is asked for; the result names the command that does the same in the project's folder."""
+    return dataclasses.replace(asked, command=asked.as_command()).run()
 
 
 def option_words(options: Mapping[str, Any]) -> list[str]:

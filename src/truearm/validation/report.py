@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import html
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import worst_first
+from truearm.engine.document.document import (
+    Block,
+    Document,
+    Facts,
+    Picture,
+    Section,
+    Table,
+    Words,
+    pictured,
+    warned,
+)
 from truearm.engine.document.drawing import AFTER, COLOURS, Figure, axis, figure, rounded, significant
 from truearm.engine.document.figures import residuals
-from truearm.engine.document.page import page
 from truearm.validation.region import orientation_summary
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
+    from truearm.engine.diagnose.next_step import NextStep
     from truearm.engine.robot.chain import Array
     from truearm.validation.region import OrientationErrors, RegionDistances, Span
     from truearm.validation.validate import Validation
@@ -31,32 +41,83 @@ _DISTANCES: Final = (
 _ANGLES: Final = {"rx": "rx", "ry": "ry", "rz": "rz", "phi": "Φ", "theta": "Θ", "psi": "Ψ"}
 
 
-@dataclass(frozen=True)
-class Figures:
-    """A row of a table of errors, as printed."""
-
-    name: str
-    readings: int
-    texts: tuple[str, ...]
-
-
 def validation_html(found: Validation) -> str:
     """Return the page of a validation."""
-    distances, orientations = found.distances, found.orientations
-    return page(
-        Path(__file__).with_name("validation.html.jinja"),
-        validation_figures(found),
-        found,
-        run=found,
-        source=Path(found.source).name,
-        title=found.source if found.robot is None else found.robot.title,
-        notices=worst_first(found.warnings),
-        spreads=_spreads(found),
-        parts=[] if orientations is None else _parts(orientations),
-        left_out=0 if orientations is None else orientations.locked,
-        spans=[] if distances is None else _span_tables(distances),
-        training=0 if distances is None else distances.training,
+    title = found.source if found.robot is None else found.robot.title
+    source = Path(found.source).name
+    heading = ("error", "readings", "mean", "RMS", "95 % below", "maximum")
+    errors = Table(heading, _spreads(found), caption="Errors of single readings", name="errors")
+    refit = []
+    if found.refit:
+        refit = [
+            Words(
+                f"The {found.refit.moved} was found anew from these readings; each configuration is judged by what is "
+                "found without it."
+            )
+        ]
+    facts: list[tuple[str, str | Sequence[NextStep]]] = [(key.capitalize(), said) for key, said in found.notes.items()]
+    if found.next:
+        facts.append(("Next", found.next))
+    drawn = validation_figures(found)
+    over_time = (
+        "Mean over the readings of each configuration. A trend or a step is a sign that something moved or warmed up "
+        "during the measurement."
     )
+    return Document(
+        f"Validation of {title} – {source}",
+        [
+            *([Facts(facts)] if facts else []),
+            Section("", [*warned(found.warnings), errors, *refit], "result"),
+            _over_distance(found, drawn),
+            *_orientations(found, drawn),
+            *(
+                [pictured("residuals", "Errors, configuration by configuration", over_time, drawn["residuals"])]
+                if "residuals" in drawn
+                else []
+            ),
+        ],
+        found.command,
+        headline=f"Validation of {title}",
+        subtitle=f"Data: {source}, {found.errors.configurations} configurations",
+    ).html(found)
+
+
+def _over_distance(found: Validation, drawn: dict[str, Figure]) -> Block:
+    if found.distances is None:
+        return Words(
+            "The robot does not know where it was calibrated, so errors are not shown over the distance from there.",
+            quiet=True,
+        )
+    words = (
+        f"The robot knows {found.distances.training} training configurations. The distance of a tip is that to the "
+        "nearest place at which its target was in training, by the calibrated robot; that of the joints is the largest "
+        "difference of a joint to the training configuration where this is least; the middle is the mean of the "
+        "target's places in training. An error that grows says that the calibration should reach farther."
+    )
+    blocks: list[Block] = [Words(words)]
+    for name, what, unit, scale in _DISTANCES:
+        distance = getattr(found.distances, name)
+        if np.isfinite(distance).any():
+            rows = [_span_row(span, scale) for span in found.distances.spans(distance)]
+            heading = (f"{what} [{unit}]", "readings", "mean error [mm]", "maximum [mm]")
+            blocks += [Picture(f"error-over-{name}", drawn[f"error-over-{name}"]), Table(heading, rows)]
+    return Section("Errors over the distance from where the robot was calibrated", blocks, "distance")
+
+
+def _orientations(found: Validation, drawn: dict[str, Figure]) -> list[Section]:
+    if found.orientations is None:
+        return []
+    words = (
+        "In the robot's base frame, predicted minus measured [deg]. The rotation vector (rx, ry, rz) turns the "
+        "measured into the predicted orientation. The ZXZ angles are Rz(Φ) Rx(Θ) Rz(Ψ) of the target; their errors are "
+        "differences of angles, and small turns may change Φ and Ψ much where Θ is small."
+    )
+    if found.orientations.locked:
+        words += f" {found.orientations.locked} readings with Θ within 3 deg of 0 or 180 are left out of Φ and Ψ."
+    heading = ("part", "readings", "mean [deg]", "mean size", "RMS", "largest")
+    table = Table(heading, _parts(found.orientations), name="orientation-table")
+    picture = Picture("orientation-parts", drawn["orientation-parts"])
+    return [Section("Orientation errors by their parts", [Words(words), picture, table], "orientations")]
 
 
 def validation_figures(found: Validation) -> dict[str, Figure]:
@@ -154,7 +215,7 @@ def _labels(data: Dataset | None, found: RegionDistances) -> list[str]:
     ]
 
 
-def _spreads(found: Validation) -> list[Figures]:
+def _spreads(found: Validation) -> list[tuple[str, ...]]:
     rows = []
     for name, spread, count in (
         ("position [mm]", found.position, len(found.errors.position_norms)),
@@ -162,12 +223,12 @@ def _spreads(found: Validation) -> list[Figures]:
         ("distance or height [mm]", found.length, len(found.errors.length_norms)),
     ):
         if spread is not None:
-            texts = tuple(significant(1e3 * value) for value in (spread.mean, spread.rms, spread.p95, spread.max))
-            rows.append(Figures(name, count, texts))
+            texts = (significant(1e3 * value) for value in (spread.mean, spread.rms, spread.p95, spread.max))
+            rows.append((name, str(count), *texts))
     return rows
 
 
-def _parts(found: OrientationErrors) -> list[Figures]:
+def _parts(found: OrientationErrors) -> list[tuple[str, ...]]:
     summary = orientation_summary(found)
     rows = []
     for name, part in {**summary["rotation_vector"], **summary["zxz"]}.items():
@@ -175,19 +236,10 @@ def _parts(found: OrientationErrors) -> list[Figures]:
         texts: tuple[str, ...] = ("–",) * 4
         if part is not None:
             texts = (f"{part['mean']:+.4f}", *(f"{part[key]:.4f}" for key in ("mean_size", "rms", "max")))
-        rows.append(Figures(_ANGLES[name], count, texts))
+        rows.append((_ANGLES[name], str(count), *texts))
     return rows
 
 
-def _span_tables(found: RegionDistances) -> list[tuple[str, str, list[Figures]]]:
-    tables = []
-    for name, what, unit, scale in _DISTANCES:
-        distance = getattr(found, name)
-        if np.isfinite(distance).any():
-            tables.append((name, f"{what} [{unit}]", [_span_row(span, scale) for span in found.spans(distance)]))
-    return tables
-
-
-def _span_row(span: Span, scale: float) -> Figures:
+def _span_row(span: Span, scale: float) -> tuple[str, ...]:
     name = f"{significant(span.low * scale, 3, 1)} to {significant(span.high * scale, 3, 1)}"
-    return Figures(name, span.readings, (significant(span.mean * 1e3), significant(span.largest * 1e3)))
+    return name, str(span.readings), significant(span.mean * 1e3), significant(span.largest * 1e3)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truearm.engine.base.units import without_mark
+from truearm.engine.document.document import Document, answer, pictured, tabled
 from truearm.engine.document.drawing import AFTER, BEFORE, Figure, axis, figure, rounded
-from truearm.engine.document.page import Drawing, Figures, picture_page
 
 if TYPE_CHECKING:
     from truearm.validation.sphere import OneSphere, SphereTest, SphereTests
@@ -24,24 +24,24 @@ def sphere_page(tests: SphereTests) -> str:
                 figures = (f"{value * 1e3:.3f}" for value in (test.mean, test.deviation, test.largest))
                 rows.append((f"{one.target} about {one.fixture}, {name}", str(len(one.lengths)), *figures))
     heading = ("sphere", "readings", "mean [mm]", "deviation [mm]", "largest [mm]")
-    return picture_page(
+    return Document(
         f"Ballbar on a sphere: {tests.robot.title}",
-        f"Measurements of {tests.source}.",
-        [without_mark(tests.lines())[0].replace(":", ".")],
-        tests.command,
-        tests,
-        tables=[Figures("Errors of the distance", heading, tuple(rows))],
-        pictures=[
-            Drawing(
-                f"sphere{number}",
-                f"{one.target} about {one.fixture}",
-                "Measured less predicted distance of each reading, in the order of the file.",
-                _errors(one),
-            )
-            for number, one in enumerate(tests.spheres)
+        [
+            answer([without_mark(tests.lines())[0].replace(":", ".")], tests.warnings),
+            tabled("Errors of the distance", heading, tuple(rows)),
+            *[
+                pictured(
+                    f"sphere{number}",
+                    f"{one.target} about {one.fixture}",
+                    "Measured less predicted distance of each reading, in the order of the file.",
+                    _errors(one),
+                )
+                for number, one in enumerate(tests.spheres)
+            ],
         ],
-        notices=tests.warnings,
-    )
+        tests.command,
+        subtitle=f"Measurements of {tests.source}.",
+    ).html(tests)
 
 
 def _errors(one: OneSphere) -> Figure:

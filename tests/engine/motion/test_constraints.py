@@ -56,6 +56,12 @@ def test_the_sign_of_the_moment_is_the_twins(arm: Robot, postures: Postures) -> 
     assert 0 < found["moment_2"].sum() < COUNT
 
 
+def test_a_box_for_targets_of_a_robot_without_any_is_refused(arm: Robot, postures: Postures) -> None:
+    rules = Constraints(truearm="truearm-constraints/1", units={"length": "mm", "angle": "deg"}, box={"of": "targets"})  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="the box is for targets, and the robot has none"):
+        allowed(arm.with_frames(arm.base, {}), postures, rules, "rules", seen_from_the_origin=True)
+
+
 def test_box_and_floor_in_the_base_frame(arm: Robot, postures: Postures) -> None:
     twin = truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0))
     world_base = np.eye(4)

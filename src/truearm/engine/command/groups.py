@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from truearm.engine.command.kinds import (
     Again,
     Choice,
+    Doing,
     File,
     Flag,
     Given,
@@ -30,6 +31,8 @@ from truearm.engine.command.kinds import (
 from truearm.engine.command.request import Request, option, required
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from truearm.engine.data.dataset import Dataset
     from truearm.engine.motion.constraints import Constraints
     from truearm.engine.motion.largest_cube import Direction
@@ -68,10 +71,14 @@ class OfPlan(Request):
     )
 
 
-class OfData(OfRobot):
-    """Which robot, and what was measured on it."""
+class Measured(Request):
+    """What was measured."""
 
     data: Dataset | str | Path = required(Given("DATA.csv"), "Measurements in the canonical CSV.", kw_only=False)
+
+
+class OfData(Measured, OfRobot):
+    """Which robot, and what was measured on it."""
 
 
 @dataclass(frozen=True)
@@ -204,6 +211,14 @@ class Long(Request):
 
     progress: Callable[[str], None] = option(
         Told(), "Called with a few words at each step", default=_silent, word="", repeated=False
+    )
+
+
+class InParts(Request):
+    """What is done in parts, by whoever can do them."""
+
+    executor: Executor | None = option(
+        Doing(), "An executor that does the parts, which stays open", default=None, word="", repeated=False
     )
 
 

@@ -446,6 +446,16 @@ class Told(Given):
         return value
 
 
+class Doing(Given):
+    """An executor that does parts of the work; it is no part of what is asked for."""
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse what is no executor."""
+        from truearm.engine.command.arguments import executor_argument
+
+        return executor_argument(value)
+
+
 class Again(Given):
     """How the caller would run a job again."""
 

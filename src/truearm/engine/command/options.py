@@ -43,7 +43,7 @@ C = TypeVar("C", bound=Callable[..., Any])
 _running: ContextVar[typer.Context | None] = ContextVar("_running", default=None)
 
 #: Parameters that say where results go or how they are printed: running again elsewhere is the same run.
-_OUTPUT = ("out", "replace", "json", "token")
+_OUTPUT = ("out", "replace", "details", "json", "token")
 
 
 class CommandError(Exception):
@@ -176,6 +176,8 @@ def by_device(command: C, others: Mapping[str, Callable[..., None]]) -> C:
 # What commands print: results on standard output, progress on standard error.
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")]
 
+Details = Annotated[bool, typer.Option("--details", help="Print all that is to be known, not only the gravest.")]
+
 
 def print_json(content: Any) -> None:
     """Print one JSON object."""
@@ -204,9 +206,11 @@ def end_on_error(notices: Iterable[Notice]) -> None:
         raise typer.Exit(3)
 
 
-def print_record(record: Record) -> None:
-    """Print a result in words and figures."""
-    for line in record.lines():
+def print_record(record: Record, *, details: bool = True) -> None:
+    """Print a result in words and figures: all of it, or what fits a first screen."""
+    from truearm.engine.document.records import first_screen
+
+    for line in record.lines() if details else first_screen(record):
         print_line(spelled(line))
 
 
@@ -238,15 +242,18 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
             owners.setdefault(name, one)
 
     def run(**typed: Any) -> None:
-        as_json = typed.pop("json", False)
+        as_json, details = typed.pop("json", False), typed.pop("details", True)
         wanted = others.get(typed.get("device", ""), request)
         own = dict(wanted.options())
         given = {name: own[name].kind.read(value, name) for name, value in _given_of(wanted, others, typed).items()}
-        with progress() if "progress" in own else nullcontext() as say, _shown_if_kept(as_json=as_json):
+        with (
+            progress() if "progress" in own else nullcontext() as say,
+            _shown_if_kept(as_json=as_json, details=details),
+        ):
             asked = wanted(**given)
             said = {"command": asked.as_command(), "progress": say, "tell": partial(print_line, err=as_json)}
             result = replace(asked, **{name: value for name, value in said.items() if name in own}).run()
-        _show(result, as_json=as_json)
+        _show(result, as_json=as_json, details=details)
         written = result.written_at(given["out"]) if "out" in given else ""
         if written and not as_json:
             print_line(written)
@@ -254,8 +261,11 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
             raise typer.Exit(3)
 
     asked = [_parameter(n, one, owners[n].default(n), declared) for n, one in declared.items() if one.in_command]
-    json_option = inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Json)
-    every = [*sorted(asked, key=lambda one: one.default is not inspect.Parameter.empty), json_option]
+    shown = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+        for name, kind in (("details", Details), ("json", Json))
+    ]
+    every = [*sorted(asked, key=lambda one: one.default is not inspect.Parameter.empty), *shown]
     run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     run.__annotations__ = {one.name: one.annotation for one in every}
     run.__doc__ = spelled_by(inspect.cleandoc(request.__doc__ or ""), declared)
@@ -328,21 +338,21 @@ def spelled_by(text: str, declared: Mapping[str, Option]) -> str:
 
 
 @contextmanager
-def _shown_if_kept(*, as_json: bool) -> Iterator[None]:
+def _shown_if_kept(*, as_json: bool, details: bool) -> Iterator[None]:
     """Show a result also where it is not written, because a better one stays."""
     try:
         yield
     except InputError as refusal:
         if refusal.result is not None:
-            _show(refusal.result, as_json=as_json)
+            _show(refusal.result, as_json=as_json, details=details)
         raise
 
 
-def _show(result: Any, *, as_json: bool) -> None:
+def _show(result: Any, *, as_json: bool, details: bool) -> None:
     if as_json:
         print_json(result.summary())
     else:
-        print_record(result)
+        print_record(result, details=details)
 
 
 # Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), and notes.

@@ -1,4 +1,4 @@
-"""Robots and measurements that jobs load, and readings that are excluded."""
+"""Readings that are excluded."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Final, Literal
 
 from truearm.engine.base.errors import Notice, counted, refusals_of
 from truearm.engine.base.files import path_argument
-from truearm.engine.command.arguments import data_argument, readings_argument, robot_argument
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.excluded import Exclusion, read_exclusions, without_readings
 from truearm.engine.data.statistics import Errors, errors_of, without_table_motion
@@ -153,39 +152,3 @@ def check_excluded(
             f"{reasons(mine)}.{told} {_RULE}",
         )
     ]
-
-
-def load_robot(robot: Robot | str | Path) -> Robot:
-    """Return a robot.
-
-    Parameters
-    ----------
-    robot
-        The id of a library robot (``irb120``), a robot file (``my.yaml``), or a URDF (``my.urdf``, or
-        ``my.urdf#tool0`` to name the link at the end of the chain). A robot is returned as it is.
-
-    Raises
-    ------
-    InputError
-        If there is no such robot, or its file cannot be used; the message names the entry.
-    """
-    return robot_argument(robot)
-
-
-def load_data(data: Dataset | str | Path, robot: Robot | str | Path | None = None) -> Dataset:
-    """Return the measurements in a canonical CSV file.
-
-    Parameters
-    ----------
-    data
-        The file. A dataset is returned as it is.
-    robot
-        The robot that was measured, or what :func:`truearm.load_robot` takes: joint positions that its controller
-        shows become its model's. None leaves them as they are.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be used; the message names the line and the column.
-    """
-    return data_argument(data) if robot is None else readings_argument(robot_argument(robot), data)

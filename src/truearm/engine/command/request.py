@@ -70,14 +70,21 @@ def option(
 
 
 def required(
-    kind: Kind, help: str, metavar: str | None = None, *, kw_only: bool, word: str | None = None, more: str = ""
+    kind: Kind,
+    help: str,
+    metavar: str | None = None,
+    *,
+    kw_only: bool,
+    word: str | None = None,
+    more: str = "",
+    repeated: bool = True,
 ) -> Any:
     """Declare what a job needs: the command has it as an argument, or as an option if it has a word.
 
     Args:
         kw_only: Whether Python takes it by its name alone.
     """
-    made = Option(kind, help, metavar, word, shown=False, more=more, needed=True, is_argument=not word, repeated=True)
+    made = Option(kind, help, metavar, word, False, more, needed=True, is_argument=not word, repeated=repeated)
     return field(kw_only=kw_only, metadata={"option": made})
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.engine.base.arrays import axes, number_array
+from truearm.engine.base.arrays import axes, finite_number, number_array
 from truearm.engine.base.errors import InputError, as_html, counted, listed, short_text
 from truearm.engine.base.units import Marked, said_of
 from truearm.engine.data.dataset_fields import (
@@ -322,6 +322,37 @@ class Dataset:
             repeated becomes a configuration of its own each time, called ``7``, ``7#2``, ``7#3``: a bootstrap.
         """
         return self._at(checked_selection(chosen, self.configurations, "chosen", "configurations"))
+
+    def split(self, train: float = 0.7, *, seed: int = 0) -> tuple[Dataset, Dataset]:
+        """Return the configurations to train on, and those that judge.
+
+        They are those of :func:`truearm.calibrate` with the same seed: ``calibrate(robot, training, train="all")`` and
+        ``validate(robot, judging)`` find what ``calibrate(robot, data, train=...)`` finds at once.
+
+        Parameters
+        ----------
+        train
+            The share to train on, above 0 and below 1, or how many: 1 to all but one.
+        seed
+            Of the split: training is the first part of ``numpy.random.default_rng(seed).permutation(n)``.
+
+        Raises
+        ------
+        InputError
+            If one part would have no configuration.
+        """
+        n = self.configurations
+        share = finite_number(train, "train")
+        count = round(share * n) if 0.0 < share < 1.0 else int(share)
+        if not 1 <= count < n or (share >= 1.0 and share != count):
+            raise InputError(
+                "each part needs a configuration",
+                parameter="train",
+                came=train,
+                allowed=f"a share above 0 and below 1, or 1 to {n - 1} configurations",
+            )
+        order = np.random.default_rng(seed).permutation(n)
+        return self.of_configurations(order[:count]), self.of_configurations(order[count:])
 
     def _at(self, indices: IntArray) -> Dataset:
         times = np.bincount(indices, minlength=self.configurations)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version as installed_version
 from importlib.resources import files
@@ -20,13 +19,11 @@ from markupsafe import Markup, escape
 from truearm.engine.base.errors import (
     LONGEST_WORD,
     TURNING,
-    Notice,
     printable,
     shortened,
     with_short_words,
-    worst_first,
 )
-from truearm.engine.base.units import parts_of, said_of, without_mark
+from truearm.engine.base.units import parts_of, said_of
 from truearm.engine.base.version import __version__
 from truearm.engine.document.drawing import AFTER, BEFORE, DARK, Figure
 
@@ -107,61 +104,3 @@ def json_for_script(value: object) -> str:
 def _plotly() -> str:
     """Return Plotly's own script, which its package brings along."""
     return (files("plotly") / "package_data" / "plotly.min.js").read_text("utf-8")
-
-
-@dataclass(frozen=True, eq=False)
-class Drawing:
-    """A picture on a page."""
-
-    name: str  #: Of its place on the page.
-    title: str  #: title, words: above it.
-    words: str
-    figure: Figure  #: What is drawn.
-
-
-@dataclass(frozen=True)
-class Figures:
-    """A table on a page."""
-
-    title: str  #: Above it.
-    heading: tuple[str, ...]  #: Names of the columns; those after the first are numbers, if they are not in `texts`.
-    rows: tuple[tuple[str, ...], ...]  #: Its cells, row by row.
-    texts: tuple[int, ...] = ()  #: Columns of words, from 0, whose cells go on in another line where there is no room.
-
-
-def picture_page(
-    title: str,
-    subtitle: str,
-    words: Sequence[str],
-    command: str,
-    of: object,
-    *,
-    pictures: Sequence[Drawing],
-    tables: Sequence[Figures] = (),
-    details: Sequence[Figures] = (),
-    notices: Sequence[Notice] = (),
-) -> str:
-    """Return the page.
-
-    Args:
-        title, subtitle: At its head.
-        words: What was found, a sentence each.
-        command: How to run it again.
-        of: The record that it tells about.
-        pictures, tables: What is shown.
-        details: Tables below the pictures.
-        notices: What to know about the result.
-    """
-    return page(
-        Path(__file__).with_name("pictures.html.jinja"),
-        {picture.name: picture.figure for picture in pictures},
-        of,
-        title=title,
-        subtitle=subtitle,
-        words=without_mark(words),
-        command=command,
-        pictures=pictures,
-        tables=tables,
-        details=details,
-        notices=worst_first(notices),
-    )

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice, as_html, counted, has_error, short_text, worst_first
+from truearm.engine.base.errors import Notice, as_html, counted, has_error, listed, short_text, worst_first
 from truearm.engine.base.units import Marked, parts_of, with_mark
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
+
+#: So many notices are on the first screen.
+_FIRST: Final = 3
 
 
 class Record(ABC):
@@ -97,6 +101,18 @@ def joints_lines(joints_are: JointsOf) -> list[str]:
 def notice_lines(notices: Sequence[Notice]) -> list[str]:
     """Return what to know about a result, one line each, the worst first."""
     return [f"{notice.level.capitalize()} ({notice.code}): {notice.message}" for notice in worst_first(notices)]
+
+
+def first_screen(record: Record) -> list[str]:
+    """Return the lines of a result with its three gravest notices, and a line that counts the others."""
+    notices = worst_first(getattr(record, "warnings", ()))
+    rest = notices[_FIRST:]
+    if not rest:
+        return record.lines()
+    hidden = notice_lines(rest)
+    levels = Counter(notice.level for notice in rest)
+    more = listed([counted(count, level) for level, count in levels.items()])
+    return [*(line for line in record.lines() if line not in hidden), f"And {more} more, which `details` shows."]
 
 
 def notice_summaries(notices: Sequence[Notice]) -> list[dict[str, str]]:

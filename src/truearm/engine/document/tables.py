@@ -15,6 +15,7 @@ from truearm.engine.data.dataset import IntArray
 from truearm.engine.data.statistics import Errors, Spread
 from truearm.engine.diagnose.expected_error import ExpectedError
 from truearm.engine.diagnose.narrow_data import own_parameters, same_motion
+from truearm.engine.document.document import Cell, Table
 from truearm.engine.document.drawing import decimals_of, deserved, significant, student_975
 from truearm.engine.document.summaries import BOOTSTRAPPED, joint_error_text
 from truearm.engine.fit.fit import Fit, ParameterStatus
@@ -102,19 +103,8 @@ def standard_error(values: Array, configuration: IntArray) -> float | None:
     return float(np.sqrt(count / (count - 1) * np.sum(sums**2)) / len(values))
 
 
-@dataclass(frozen=True)
-class ExpectedRow:
-    """The error to expect over the workspace, as printed [mm]."""
-
-    targets: str
-    mean: str
-    low: str
-    high: str
-    p95: str
-
-
-def expected_rows(expected: ExpectedError) -> tuple[ExpectedRow, ...]:
-    """Return a row for all targets together, then one for each where there are several."""
+def expected_rows(expected: ExpectedError) -> list[tuple[str, str, str, str, str]]:
+    """Return target, mean, ends of the interval and 95 % [mm], for all together, then for each if there are several."""
     parts = {"all": expected.overall, **(expected.targets if len(expected.targets) > 1 else {})}
     rows = []
     for name, of in parts.items():
@@ -122,8 +112,47 @@ def expected_rows(expected: ExpectedError) -> tuple[ExpectedRow, ...]:
             deserved(1e3 * figure, 1e3 * (of.interval_90[1] - of.interval_90[0]) / _WIDTH_90)
             for figure in (of.mean, *of.interval_90, of.p95)
         )
-        rows.append(ExpectedRow(name, mean, low, "or more" if expected.lower_bound else high, p95))
-    return tuple(rows)
+        rows.append((name, mean, low, "or more" if expected.lower_bound else high, p95))
+    return rows
+
+
+def parameters_table(rows: Sequence[ParameterRow]) -> Table:
+    """Return the table of parameters of a page, which can be sorted."""
+    heading = ("parameter", "group", "unit", "start", "estimate", "change", "deviation", "informed", "status")
+    cells: list[tuple[str | Cell, ...]] = []
+    for row in rows:
+        share = None if row.informed is None else f"{100 * row.informed:.0f}"
+        cells.append(
+            (
+                Cell(row.name, code=True),
+                row.group,
+                row.unit,
+                Cell(row.fixed(row.start), row.start),
+                Cell(row.known(row.estimate), row.estimate),
+                Cell(row.change_text, row.change),
+                Cell(row.deviation_text, -1 if row.deviation is None else row.deviation),
+                Cell("" if share is None else f"{share} %", -1 if row.informed is None else row.informed, share=share),
+                row.status,
+            )
+        )
+    marks = tuple(row.status.replace(" ", "-").replace(":", "") for row in rows)
+    return Table(heading, cells, texts=(1, 2, 8), look="parameters sortable", wide=True, marks=marks)
+
+
+def spread_table(rows: Sequence[SpreadRow], kind: str, unit: str) -> Table:
+    """Return the table of the errors of one kind, before and after."""
+    cells: list[tuple[str | Cell, ...]] = [
+        (
+            row.part,
+            Cell("nominal, before" if row.robot == "before" else "calibrated, after", chip=row.robot),
+            str(row.configurations),
+            str(row.readings),
+            *(Cell(text, figure) for text, figure in zip(row.texts, row.figures, strict=True)),
+        )
+        for row in rows
+    ]
+    heading = ("part", "robot", "configurations", "readings", "mean", "RMS", "95 % below", "maximum")
+    return Table(heading, cells, texts=(1,), caption=f"{kind} error of single readings [{unit}]", look="spread")
 
 
 @dataclass(frozen=True)
@@ -201,17 +230,25 @@ def parameter_rows(fit: Fit) -> tuple[ParameterRow, ...]:
     return tuple(rows)
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Two parameters and their correlation."""
+def parameter_lines(fit: Fit) -> list[str]:
+    """Return the parameters in columns: name, nominal, value, deviation, unit, and what the value is worth."""
+    worth = {"identified": "", "at-bound": "at a bound", "uninformed": "not told by the data"}
+    rows = [("parameter", "nominal", "value", "deviation", "unit", "")]
+    for row in parameter_rows(fit):
+        nominal = from_si(fit.robot.parameters[row.name].nominal, row.unit)
+        said = worth.get(row.fit_status, row.fit_status.replace("-", " "))
+        rows.append((row.name, row.fixed(nominal), row.known(row.estimate), row.deviation_text, row.unit, said))
+    wide = [max(len(row[k]) for row in rows) for k in range(5)]
+    return [
+        "  ".join(
+            [row[0].ljust(wide[0]), *(row[k].rjust(wide[k]) for k in (1, 2, 3)), row[4].ljust(wide[4]), row[5]]
+        ).rstrip()
+        for row in rows
+    ]
 
-    first: str
-    second: str
-    correlation: float
 
-
-def strongest_pairs(fit: Fit) -> tuple[Pair, ...]:
-    """Return the most strongly correlated pairs of the arm's own parameters, strongest first.
+def strongest_pairs(fit: Fit) -> list[tuple[Cell, Cell, str]]:
+    """Return the most strongly correlated pairs of the arm's own parameters as rows, strongest first.
 
     Where base, targets and fixtures are goes with the arm's first and last links in every calibration. So do lengths
     along parallel axes, of which only the sum moves anything. Such pairs say nothing about these data.
@@ -223,30 +260,17 @@ def strongest_pairs(fit: Fit) -> tuple[Pair, ...]:
     pairs = ((int(rows[k]), int(columns[k])) for k in order.tolist())
     of_convention = same_motion(fit)
     told = islice((pair for pair in pairs if pair not in of_convention), _PAIRS)
-    return tuple(Pair(names[i], names[j], float(r[i, j])) for i, j in told)
+    return [(Cell(names[i], code=True), Cell(names[j], code=True), f"{float(r[i, j]):+.3f}") for i, j in told]
 
 
-@dataclass(frozen=True)
-class NoiseRow:
-    """Standard deviation of one kind of reading."""
-
-    kind: str
-    per: str
-    unit: str
-    value: float
-
-    @property
-    def text(self) -> str:
-        """The deviation as it is printed."""
-        return significant(self.value, 3, 5)
-
-
-def noise_rows(fit: Fit) -> Sequence[NoiseRow]:
+def noise_table(fit: Fit) -> Table:
     """Return the deviation of a reading for each kind of observation."""
-    return [
-        NoiseRow(kind, _PER[kind], _SIGMA_SHOWN[kind][0], sigma * _SIGMA_SHOWN[kind][1])
-        for kind, sigma in fit.sigma.items()
-    ]
+    source = "declared in the data" if fit.declared else "estimated from residuals"
+    rows = []
+    for kind, sigma in fit.sigma.items():
+        unit, scale = _SIGMA_SHOWN[kind]
+        rows.append((kind, Cell(f"{significant(sigma * scale, 3, 5)} {unit}", sigma * scale), _PER[kind], source))
+    return Table(("reading", "standard deviation", "per", "source"), rows, texts=(2, 3))
 
 
 def noise_alone(fit: Fit, kind: str) -> str | None:

@@ -143,6 +143,13 @@ def allowed(
             kept[f"moment_{number}"] = np.asarray(loads[joint, row] * (1.0 if sign == "positive" else -1.0) > 0.0)
     targets = [robot.world_poses(postures, target.name)[0] for target in robot.targets]
     if constraints.box is not None:
+        if constraints.box.of == "targets" and not targets:
+            raise InputError(
+                "the box is for targets, and the robot has none",
+                where=f"{where}, box",
+                allowed="of: flange",
+                cure="Write of: flange, or give a robot file that has the targets.",
+            )
         points = targets if constraints.box.of == "targets" else [robot.world_poses(postures)[0]]
         kept["box"] = _in_box(constraints.box, points, length, f"{where}, box")
     if constraints.floor is not None:

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.engine.document.document import Section, pictured
 from truearm.engine.document.drawing import (
     AFTER,
     BEFORE,
@@ -26,7 +27,6 @@ from truearm.engine.document.drawing import (
     rounded_to,
     scene_axis,
 )
-from truearm.engine.document.page import Drawing
 from truearm.engine.motion.cube import DiagonalPlane
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.compliance import PushLine
@@ -79,20 +79,20 @@ def pose_pictures(
     settling: Sequence[SettlingCurve],
     pushes: Sequence[PushLine],
     other: Comparison | None = None,
-) -> list[Drawing]:
+) -> list[Section]:
     """Return the pictures of what was measured at poses.
 
     Args:
         other: Another result, whose accuracy is drawn beside this one's.
     """
-    drawings: list[Drawing] = []
+    drawings: list[Section] = []
     accuracy = fastest([one for one in clouds if one.test == "AP"])
     # Of several robots the first: the picture is of one.
     accuracy = sorted((one for one in accuracy if one.robot == accuracy[0].robot), key=lambda one: one.pose)
     if accuracy:
         under = _under(accuracy[0])
         drawings.append(
-            Drawing(
+            pictured(
                 "clouds",
                 "Attained poses about their barycentre",
                 f"Each point is a cycle {under}; the circle is the sphere of RP about the barycentre.",
@@ -118,11 +118,11 @@ def pose_pictures(
     ):
         of_test = fastest([one for one in clouds if one.test == test])
         if of_test:
-            drawings.append(Drawing(name, title, words, _together(of_test, series)))
+            drawings.append(pictured(name, title, words, _together(of_test, series)))
     courses = [course for course in drift if len(course.ap) > 1]
     if courses:
         drawings.append(
-            Drawing(
+            pictured(
                 "drift",
                 "Drift from cold",
                 "Change of AP and RP against the first value; dAP and dRP are the largest.",
@@ -132,7 +132,7 @@ def pose_pictures(
     rests = [curve for curve in settling if curve.test == "t"]
     if rests:
         drawings.append(
-            Drawing(
+            pictured(
                 "settling",
                 "Coming to rest",
                 "Distance from the final attained pose. Grey: the limit band. t goes from the first entry into it, the "
@@ -144,7 +144,7 @@ def pose_pictures(
     moves = [curve for curve in settling if curve.test == "posing-time"]
     if moves:
         drawings.append(
-            Drawing(
+            pictured(
                 "posing-time",
                 "Posing time over distance",
                 "From the begin of the motion to the final stay in the limit band, each cycle.",
@@ -153,7 +153,7 @@ def pose_pictures(
         )
     if pushes:
         drawings.append(
-            Drawing(
+            pictured(
                 "compliance",
                 "Displacement under force",
                 "Along the force, each cycle with the straight line whose slope is its compliance.",
@@ -194,7 +194,7 @@ def _offsets(clouds: Sequence[PoseCloud], other: Comparison | None) -> Array:
     return found
 
 
-def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str, other: Comparison | None) -> Drawing:
+def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str, other: Comparison | None) -> Section:
     command = np.array([cloud.command for cloud in clouds])
     away = np.array([cloud.barycentre for cloud in clouds]) - command
     beside = _offsets(clouds, other)
@@ -241,7 +241,7 @@ def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str, ot
         scene={**scene, "aspectmode": "data", "camera": _before(plan.cube.plane(plan.plane))},
         margin={"l": 0, "r": 0, "t": 40, "b": 0},
     )
-    return Drawing("accuracy", "Pose accuracy in the cube", words, drawn)
+    return pictured("accuracy", "Pose accuracy in the cube", words, drawn)
 
 
 def _before(plane: DiagonalPlane) -> Figure:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
+from truearm.engine.document.document import Document, Section, answer, pictured, tabled
 from truearm.engine.document.drawing import (
     AFTER,
     BEFORE,
@@ -24,7 +25,6 @@ from truearm.engine.document.drawing import (
     panels,
     rounded_to,
 )
-from truearm.engine.document.page import Drawing, Figures, picture_page
 from truearm.iso9283.criteria.corners import CornerCurves, WeaveCurves
 from truearm.iso9283.criteria.paths import PathDeviations
 from truearm.iso9283.criteria.runs import Run
@@ -62,13 +62,13 @@ _BAND: Final = "#c3d5e3"
 _Curves = TypeVar("_Curves", PathDeviations, CornerCurves, VelocityCurves, WeaveCurves)
 
 
-def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Drawing]:
+def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Section]:
     """Return the pictures of what was measured along paths, those at the fastest velocity of each test.
 
     Args:
         other: Another result, whose deviations are drawn beside these.
     """
-    drawings: list[Drawing] = []
+    drawings: list[Section] = []
     for test, name, title in (
         ("AT", "paths", "Deviation along the paths"),
         ("AT-reorientation", "paths-reoriented", "Deviation along the path on reorientation"),
@@ -82,29 +82,29 @@ def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Dr
             beside = [_course(one, other) for one in courses]
             if any(beside):
                 words += " Dashed: the barycentre of the other result."
-            drawings.append(Drawing(name, title, words, _deviations(courses, beside)))
+            drawings.append(pictured(name, title, words, _deviations(courses, beside)))
     corners = _fastest(found.corners)
     if corners:
         words = (
             f"In the plane of the two sides, {_under(corners[0].run)}. The commanded path comes from the left and goes "
             "on upwards. CR is the least distance to the corner, CO how far the tip goes beyond the second side."
         )
-        drawings.append(Drawing("corners", "Corners", words, _corners(corners)))
+        drawings.append(pictured("corners", "Corners", words, _corners(corners)))
     velocities = _fastest(found.velocities)
     if velocities:
         words = f"Each cycle, {_under(velocities[0].run)}. AV, RV and FV are read in the grey middle half."
-        drawings.append(Drawing("velocity", "Velocity along the path", words, _velocity(velocities)))
+        drawings.append(pictured("velocity", "Velocity along the path", words, _velocity(velocities)))
     weaves = _fastest(found.weaves)
     if weaves:
         words = f"The first {_WAVES} waves of the first cycle beside the command, {_under(weaves[0].run)}."
-        drawings.append(Drawing("weave", "Weave", words, _weave(weaves[0])))
+        drawings.append(pictured("weave", "Weave", words, _weave(weaves[0])))
     streams = [run.found for run in _runs(found) if run.found is not None]
     if streams:
         words = (
             "Speed of the tip in streams whose cycles are not numbered. Cycles found are blue, dwells grey; above "
             "the dashed line is motion."
         )
-        drawings.append(Drawing("streams", "What was found in streams", words, _streams(streams[:_STREAMS])))
+        drawings.append(pictured("streams", "What was found in streams", words, _streams(streams[:_STREAMS])))
     return drawings
 
 
@@ -261,10 +261,10 @@ def iso9283_report(found: Iso9283Evaluation) -> str:
     """Return the report: the criteria at their worst places, pictures, and every value."""
     measured = [value for value in found.values if value.status != "not-measured"]
     worst = tuple(tuple(map(_unbroken, one.cells)) for one in worst_places(found.values))
-    tables = [Figures("Criteria at their worst places", HEADING, worst, texts=(1, 4, 5))]
+    tables = [tabled("Criteria at their worst places", HEADING, worst, texts=(1, 4, 5))]
     if found.comparison is not None:
         tables.append(_compared(found.comparison))
-    details: list[Figures] = []
+    details: list[Section] = []
     for name in dict.fromkeys(test_name(value) for value in found.values):
         details += _tables(name, [value for value in found.values if test_name(value) == name])
     evaluation = found.evaluation
@@ -281,22 +281,20 @@ def iso9283_report(found: Iso9283Evaluation) -> str:
     ]
     if unread:
         words.append(f"Planned and not measured: {', '.join(TESTS[test.id].name for test in unread)}.")
-    return picture_page(
+    return Document(
         f"{plan.robot.title} by the criteria of ISO 9283",
-        "Pose and path characteristics with their intervals.",
-        words,
-        found.command,
-        found,
-        pictures=[
+        [
+            answer(words, found.warnings),
+            *tables,
             *pose_pictures(
                 plan, evaluation.clouds, evaluation.drift, evaluation.settling, evaluation.pushes, found.comparison
             ),
             *path_pictures(evaluation, found.comparison),
+            *details,
         ],
-        tables=tables,
-        details=details,
-        notices=found.warnings,
-    )
+        found.command,
+        subtitle="Pose and path characteristics with their intervals.",
+    ).html(found)
 
 
 def _unbroken(cell: str) -> str:
@@ -304,7 +302,7 @@ def _unbroken(cell: str) -> str:
     return ", ".join(part.replace(" ", "\u00a0") for part in cell.split(", "))
 
 
-def _tables(name: str, values: Sequence[Value]) -> list[Figures]:
+def _tables(name: str, values: Sequence[Value]) -> list[Section]:
     """Return the table of a test, and one of its axes and angles where it has them."""
     title = name[0].upper() + name[1:]
     rows = tuple(
@@ -321,12 +319,12 @@ def _tables(name: str, values: Sequence[Value]) -> list[Figures]:
         if value.component == "position"
     )
     heading = ("Criterion", "Where", "Velocity, load", "Value", "95 %, or range", "Cycles", "Status")
-    made = [Figures(title, heading, rows)]
+    made = [tabled(title, heading, rows)]
     for parts, words, unit in ((_AXES, "single axes", "mm"), (_ANGLES, "angles", "deg")):
         detail = _details([value for value in values if value.component in parts], parts)
         if detail:
             columns = tuple(f"{part} [{unit}]" for part in parts)
-            made.append(Figures(f"{title}: {words}", ("Criterion", "Where", "Velocity, load", *columns), detail))
+            made.append(tabled(f"{title}: {words}", ("Criterion", "Where", "Velocity, load", *columns), detail))
     return made
 
 
@@ -341,7 +339,7 @@ def _details(values: Sequence[Value], parts: Sequence[Component]) -> tuple[tuple
     return tuple((*key, *(row.get(part, "–") for part in parts)) for key, row in rows.items())
 
 
-def _compared(comparison: Comparison) -> Figures:
+def _compared(comparison: Comparison) -> Section:
     """Return what differs of position by more than its intervals leave open, and what does not."""
     rows = tuple(
         (row.id, row.where, row.under, f"{row.value:.4f} {row.unit}", f"{row.other:.4f} {row.unit}", row.verdict)
@@ -349,4 +347,4 @@ def _compared(comparison: Comparison) -> Figures:
         if row.component == "position"
     )
     heading = ("Criterion", "Where", "Velocity, load", "This", "Other", "This one is")
-    return Figures(f"Beside {comparison.other}", heading, rows)
+    return tabled(f"Beside {comparison.other}", heading, rows)

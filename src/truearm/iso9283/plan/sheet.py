@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truearm.engine.document.page import Drawing, Figures, picture_page
+from truearm.engine.document.document import Document, Section, answer, pictured, tabled
 from truearm.engine.document.planning_figures import pose_cube
 from truearm.engine.motion.largest_cube import PosePlan
 from truearm.engine.robot.transform import quaternion_from_rotation
@@ -32,31 +32,29 @@ _NOTED = (
 def iso9283_sheet(planned: Iso9283Plan) -> str:
     """Return the sheet."""
     plan = planned.plan
-    return picture_page(
+    words = [
+        *planned.answer,
+        _tip(plan),
+        "The rows of different criteria are never evaluated together: measure each of them.",
+        "Run every program at 10 % of the velocity first, from the first motion to the last, with nobody in reach of "
+        "the robot, and note that it was completed. Only then run it faster.",
+        "The tests follow ISO 9283:1998 as the literature describes it. Who wants to claim conformity needs the "
+        "standard's own text.",
+    ]
+    cube = "The cube, its diagonal planes, P1 to P5 and the paths. Tails show from where the tip's z axis comes."
+    return Document(
         f"Tests of {plan.robot.title} by ISO 9283",
-        "What to measure, in which order, and what to note.",
         [
-            *planned.answer,
-            _tip(plan),
-            "The rows of different criteria are never evaluated together: measure each of them.",
-            "Run every program at 10 % of the velocity first, from the first motion to the last, with nobody in reach "
-            "of the robot, and note that it was completed. Only then run it faster.",
-            "The tests follow ISO 9283:1998 as the literature describes it. Who wants to claim conformity needs the "
-            "standard's own text.",
+            answer(words, planned.warnings),
+            _tests(plan),
+            *_orders(plan),
+            _poses(plan),
+            _noted(),
+            pictured("cube", "Where the poses and paths lie", cube, _cube(plan)),
         ],
         planned.command,
-        planned,
-        pictures=[
-            Drawing(
-                "cube",
-                "Where the poses and paths lie",
-                "The cube, its diagonal planes, P1 to P5 and the paths. Tails show from where the tip's z axis comes.",
-                _cube(plan),
-            )
-        ],
-        tables=[_tests(plan), *_orders(plan), _poses(plan), _noted()],
-        notices=planned.warnings,
-    )
+        subtitle="What to measure, in which order, and what to note.",
+    ).html(planned)
 
 
 def _cube(plan: PerformancePlan) -> Figure:
@@ -69,7 +67,7 @@ def _cube(plan: PerformancePlan) -> Figure:
     return pose_cube(drawn, paths)
 
 
-def _tests(plan: PerformancePlan) -> Figures:
+def _tests(plan: PerformancePlan) -> Section:
     rows = []
     for test in plan.tests:
         known = TESTS[test.id]
@@ -77,7 +75,7 @@ def _tests(plan: PerformancePlan) -> Figures:
         percent = (", ".join(f"{100 * v:g}" for v in shares) for shares in (test.velocities, test.loads))
         rows.append((f"{', '.join(known.criteria)}: {known.name}", where, str(test.cycles), *percent, "________"))
     heading = ("Criteria and test", "Where", "Cycles", "Velocity [%]", "Load [%]", "Done")
-    return Figures("Tests", heading, tuple(rows))
+    return tabled("Tests", heading, tuple(rows))
 
 
 def _tip(plan: PerformancePlan) -> str:
@@ -87,21 +85,21 @@ def _tip(plan: PerformancePlan) -> str:
     return f"What is measured is the tip {plan.target}, at x {x}, y {y}, z {z} mm in the flange frame."
 
 
-def _orders(plan: PerformancePlan) -> list[Figures]:
+def _orders(plan: PerformancePlan) -> list[Section]:
     """Return the order in which a program drives the poses of a cycle, for whoever writes down the readings."""
     rows = [(test.id, ", ".join(visited(test))) for test in plan.tests if visited(test)]
     heading = ("Test", "Poses of a cycle, in the order in which programs drive them")
-    return [Figures("Order of the poses", heading, tuple(rows))] if rows else []
+    return [tabled("Order of the poses", heading, tuple(rows))] if rows else []
 
 
-def _poses(plan: PerformancePlan) -> Figures:
+def _poses(plan: PerformancePlan) -> Section:
     rows = []
     for pose in plan.poses.values():
         turned = quaternion_from_rotation(pose.rotation[None])[0]
         rows.append((pose.name, *(f"{v * 1e3:.3f}" for v in pose.position), *(f"{v + 0.0:.6f}" for v in turned)))
     heading = ("Pose", "x [mm]", "y [mm]", "z [mm]", "qw", "qx", "qy", "qz")
-    return Figures("Poses in the robot's base frame", heading, tuple(rows))
+    return tabled("Poses in the robot's base frame", heading, tuple(rows))
 
 
-def _noted() -> Figures:
-    return Figures("To note", ("What", ""), tuple((what, "_" * 40) for what in _NOTED))
+def _noted() -> Section:
+    return tabled("To note", ("What", ""), tuple((what, "_" * 40) for what in _NOTED))

@@ -23,6 +23,7 @@ from truearm.iso9283.evaluate.table import (
     values_of,
     worst_places,
 )
+from truearm.iso9283.jobs import PlanTests
 from truearm.iso9283.plan.plan_file import PLAN
 from truearm.iso9283.simulate.simulate import FILES
 from truearm.studio import words
@@ -31,6 +32,7 @@ from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.drawn_cube import DrawnCube
 from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.project import stamp_of
+from truearm.studio.settings import typed_default
 from truearm.studio.tasks import Outcome
 from truearm.studio.tested import evaluate_tests, plan_tests, simulate_tests
 from truearm.studio.window import Window
@@ -100,7 +102,9 @@ class PerformancePage:
             self._criteria: Any = gui.add_text("Criteria", "ap,rp,at,cr", hint="ids with commas between, or all")
             self._tip: Any = gui.add_vector3("Tip [mm]", (0.0, 0.0, 100.0), step=1.0, hint="in the flange frame")
             self._velocity: Any = gui.add_number("Rated [mm/s]", 1000.0, min=10.0, max=20000.0, step=10.0)
-            self._velocities: Any = gui.add_text("Velocities [%]", "100,50,10", hint="percent of the rated velocity")
+            self._velocities: Any = gui.add_text(
+                "Velocities [%]", typed_default(PlanTests, "velocities"), hint="percent of the rated velocity"
+            )
             self._plan_button = gui.add_button("Plan the tests")
         self._plan_button.on_click(self._window.action(self._plan))
 

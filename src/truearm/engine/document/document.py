@@ -1,0 +1,213 @@
+"""What a page is made of: words, tables, pictures, in sections. One template draws them all and knows no feature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Final
+
+from truearm.engine.base.errors import Notice, worst_first
+from truearm.engine.base.units import without_mark
+from truearm.engine.diagnose.next_step import NextStep
+from truearm.engine.document.drawing import Figure
+from truearm.engine.document.page import page
+
+_TEMPLATE: Final = Path(__file__).with_name("document.html.jinja")
+
+
+@dataclass(frozen=True)
+class Words:
+    """A paragraph; what is in backticks is shown as code."""
+
+    text: str
+    quiet: bool = False  #: Whether it stands back.
+    kind: ClassVar = "words"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table that is more than a text."""
+
+    text: str
+    sort: float | str | None = None  #: What rows are sorted by; None for the text.
+    code: bool = False  #: Whether it is a name, of a parameter for example.
+    link: str | None = None
+    look: str = ""  #: A class of the style sheet.
+    share: str | None = None  #: Percent that a bar before the text shows.
+    chip: str = ""  #: The colour of a small square before it: ``before`` or ``after``.
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table."""
+
+    heading: tuple[str, ...]  #: Names of the columns; those after the first are numbers, if they are not in `texts`.
+    rows: Sequence[Sequence[str | Cell]]  #: Its cells, row by row.
+    texts: tuple[int, ...] = ()  #: Columns of words, from 0, whose cells go on in another line where there is no room.
+    caption: str = ""
+    name: str = ""  #: Of its place on the page.
+    look: str = ""  #: ``sortable`` and classes of the style sheet.
+    wide: bool = False  #: Whether it may be wider than the page.
+    marks: tuple[str, ...] = ()  #: Of each row: ``uninformed``, ``taken``, or nothing.
+    kind: ClassVar = "table"
+
+    def is_number(self, column: int) -> bool:
+        """Return whether a column, from 0, has numbers."""
+        return column > 0 and column not in self.texts
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture."""
+
+    name: str  #: Of its place on the page.
+    figure: Figure  #: What Plotly draws.
+    kind: ClassVar = "picture"
+
+
+@dataclass(frozen=True)
+class Lead:
+    """The answer: one figure, before and after, and what it is."""
+
+    blocks: Sequence[Block]
+    now: str = ""
+    was: str = ""
+    unit: str = ""
+    name: str = ""
+    kind: ClassVar = "lead"
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Terms and what is said of them: words, or what to do next; empty is filled in by hand on paper."""
+
+    entries: Sequence[tuple[str, str | Sequence[NextStep]]]
+    name: str = ""
+    kind: ClassVar = "facts"
+
+
+@dataclass(frozen=True)
+class Points:
+    """A list under a small heading."""
+
+    title: str
+    words: str
+    entries: Sequence[str]
+    name: str = ""
+    kind: ClassVar = "points"
+
+
+@dataclass(frozen=True)
+class Folded:
+    """What is opened by a click."""
+
+    summary: str
+    blocks: Sequence[Block]
+    open: bool = False
+    kind: ClassVar = "folded"
+
+
+@dataclass(frozen=True)
+class Warned:
+    """A notice."""
+
+    notice: Notice
+    kind: ClassVar = "notice"
+
+    @property
+    def level(self) -> str:
+        """How grave it is."""
+        return self.notice.level
+
+    @property
+    def code(self) -> str:
+        """Its name."""
+        return self.notice.code
+
+    @property
+    def message(self) -> str:
+        """What it says."""
+        return self.notice.message
+
+
+@dataclass(frozen=True)
+class Alert:
+    """What the reader must not miss, and is no notice of the result."""
+
+    strong: str
+    words: str
+    kind: ClassVar = "alert"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page under a heading."""
+
+    title: str
+    blocks: Sequence[Block]
+    name: str = ""
+    kind: ClassVar = "section"
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it has a picture, with which it is printed on one page."""
+        return any(isinstance(block, Picture) for block in self.blocks)
+
+
+Block = Words | Table | Picture | Lead | Facts | Points | Folded | Warned | Alert | Section
+
+
+@dataclass(frozen=True)
+class Document:
+    """A page about a result."""
+
+    title: str  #: Of the window.
+    blocks: Sequence[Block]
+    command: str  #: How to run it again.
+    headline: str = ""  #: Over the page; empty for the title.
+    subtitle: str = ""
+    history: Sequence[str] = ()  #: What was done before.
+    cover: Sequence[Block] = ()  #: What is printed on the first page, with a place to sign it.
+
+    def html(self, of: object) -> str:
+        """Return the page, one HTML file.
+
+        Args:
+            of: The record that it tells about: if that is simulated, the page begins with it.
+        """
+        return page(_TEMPLATE, pictures_of(self), of, document=self)
+
+
+def _pictures(blocks: Sequence[Block]) -> Iterator[Picture]:
+    for block in blocks:
+        if isinstance(block, Picture):
+            yield block
+        elif isinstance(block, Lead | Folded | Section):
+            yield from _pictures(block.blocks)
+
+
+def answer(words: Sequence[str], notices: Sequence[Notice]) -> Section:
+    """Return the section that a page begins with: what was found, a sentence each, and what to know about it."""
+    lead = Lead([Words(sentence) for sentence in without_mark(words)])
+    return Section("", [lead, *warned(notices)], "result")
+
+
+def warned(notices: Sequence[Notice]) -> list[Warned]:
+    """Return notices as they stand on a page, the worst first."""
+    return [Warned(notice) for notice in worst_first(notices)]
+
+
+def pictured(name: str, title: str, words: str, figure: Figure) -> Section:
+    """Return a section of one picture under a few words."""
+    return Section(title, [Words(words), Picture(name, figure)])
+
+
+def tabled(title: str, heading: tuple[str, ...], rows: Sequence[Sequence[str]], texts: tuple[int, ...] = ()) -> Section:
+    """Return a section of one table; arguments as for :class:`Table`."""
+    return Section(title, [Table(heading, rows, texts, wide=True)])
+
+
+def pictures_of(document: Document) -> dict[str, Figure]:
+    """Return the pictures of a page by the names of their places."""
+    return {one.name: one.figure for one in _pictures((*document.cover, *document.blocks))}

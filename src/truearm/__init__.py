@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     from truearm.importing.jobs import import_robodk as import_robodk
     from truearm.importing.jobs import import_sockets as import_sockets
     from truearm.importing.jobs import import_table as import_table
-    from truearm.inclinometers.pairs import plan_inclinometers as plan_inclinometers
-    from truearm.inclinometers.pairs import simulate_inclinometers as simulate_inclinometers
-    from truearm.inclinometers.tilting import tilting as tilting
+    from truearm.inclinometers.jobs import plan_inclinometers as plan_inclinometers
+    from truearm.inclinometers.jobs import simulate_inclinometers as simulate_inclinometers
+    from truearm.inclinometers.jobs import tilting as tilting
     from truearm.iso9283.jobs import iso9283_evaluate as iso9283_evaluate
     from truearm.iso9283.jobs import iso9283_plan as iso9283_plan
     from truearm.iso9283.jobs import iso9283_simulate as iso9283_simulate
@@ -94,16 +94,16 @@ JOBS: Final = {
     "import_ur_kinematics": "truearm.robot_files.jobs",
     "check": "truearm.checking.check",
     "calibrate": "truearm.calibration.calibrate",
-    "tilting": "truearm.inclinometers.tilting",
+    "tilting": "truearm.inclinometers.jobs",
     "validate": "truearm.validation.jobs",
     "distances": "truearm.validation.jobs",
     "plan": "truearm.planning.plan",
-    "plan_inclinometers": "truearm.inclinometers.pairs",
+    "plan_inclinometers": "truearm.inclinometers.jobs",
     "poses": "truearm.planning.poses",
     "path": "truearm.compensation.jobs",
     "measure": "truearm.measuring.measure",
     "simulate": "truearm.simulation.jobs",
-    "simulate_inclinometers": "truearm.inclinometers.pairs",
+    "simulate_inclinometers": "truearm.inclinometers.jobs",
     "inverse": "truearm.robot_files.jobs",
     "robots": "truearm.robot_files.jobs",
     "devices": "truearm.simulation.jobs",

@@ -22,14 +22,15 @@ from truearm.compensation.jobs import Compensate, FollowPath
 from truearm.drawn_circle.import_circle import ImportCircle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
-from truearm.engine.command.options import CommandError, Commands, add, by_device, command_of
+from truearm.engine.command.options import CommandError, Commands, add, command_of
 from truearm.fleets.fleet import CalibrateFleet
 from truearm.hexapod.command import app as hexapod
 from truearm.importing.jobs import GuessMapping, ImportMatrices, ImportRoboDK, ImportSockets, ImportTable
-from truearm.inclinometers.command import plan_pairs, simulate_readings, tilting
+from truearm.inclinometers.jobs import FindTilting, PlanInclinometers, SimulateInclinometers
 from truearm.iso9283.command import app as iso9283
-from truearm.measuring.command import measure
-from truearm.planning.command import plan, poses
+from truearm.measuring.measure import Measure
+from truearm.planning.plan import PlanPoses
+from truearm.planning.poses import PosesOfSet
 from truearm.robot_files.jobs import (
     ConvertRobot,
     ExportRobot,
@@ -39,8 +40,7 @@ from truearm.robot_files.jobs import (
     ListRobots,
     ShowRobot,
 )
-from truearm.simulation.command import simulate
-from truearm.simulation.jobs import FindInfluence, ListDevices
+from truearm.simulation.jobs import FindInfluence, ListDevices, Simulate
 from truearm.starting.command import study_help
 from truearm.starting.jobs import Demonstrate, NewRobot, WriteExample
 from truearm.starting.study import MakeStudy
@@ -83,14 +83,10 @@ importing = Commands(
 add(importing, ImportMatrices, ImportTable, GuessMapping, ImportRoboDK, ImportCircle, ImportSockets, ImportHandEye)
 add(importing, ImportUrKinematics, ImportRos)
 
-add(app, Check, Calibrate)
-app.command()(tilting)
-add(app, Validate, JudgeDistances, Compensate, FindJoints)
-app.command()(by_device(plan, {"inclinometers": plan_pairs}))
-app.command()(measure)
-app.command()(poses)
-add(app, FollowPath, Axes, JudgeTolerance, TestLines, FindInfluence, JudgeSphere)
-app.command()(by_device(simulate, {"inclinometers": simulate_readings}))
+add(app, Check, Calibrate, FindTilting, Validate, JudgeDistances, Compensate, FindJoints)
+app.command()(command_of(PlanPoses, PlanInclinometers))
+add(app, Measure, PosesOfSet, FollowPath, Axes, JudgeTolerance, TestLines, FindInfluence, JudgeSphere)
+app.command()(command_of(Simulate, SimulateInclinometers))
 add(app, ListDevices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")

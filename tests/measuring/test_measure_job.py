@@ -20,7 +20,8 @@ from truearm.engine.data.readers.canonical import read_csv
 from truearm.engine.twin.devices import DEVICES
 from truearm.engine.twin.devices.device import Device
 from truearm.measuring.begun import BEGUN
-from truearm.measuring.open_campaign import open_campaign, sight
+from truearm.measuring.measure import open_campaign
+from truearm.measuring.open_campaign import sight
 from truearm.measuring.reading_log import LOG
 from truearm.measuring.result import DATA, PAGE
 from truearm.measuring.session import Reading
@@ -468,7 +469,7 @@ def test_the_page_says_the_whole_call_and_no_token(plan: Path, tmp_path: Path) -
 
 def test_a_word_that_the_job_does_not_know_is_no_keyword(plan: Path, tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="'tracker'"):
-        open_campaign(plan, "irb120", tmp_path / "out", tracker=1)  # type: ignore[call-arg]
+        open_campaign(plan, "irb120", tmp_path / "out", tracker=1)
 
 
 def test_a_point_of_which_no_reading_can_be_kept_is_left_out_after_twenty(plan: Path, tmp_path: Path) -> None:
@@ -500,10 +501,7 @@ def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Pat
         ({"device": None, "listen": 0}, "targets", "which targets"),
         ({"device": None, "listen": 0, "targets": ["a"], "token": "short"}, "token", "keeps others out"),
         ({"device": None, "listen": 0, "targets": ["n"]}, "targets, nests", "a target and for a nest"),
-        ({"device": None, "listen": 70000, "targets": ["a"]}, "listen", "out of range"),
         ({"device": None, "watch": "nowhere", "targets": ["a"]}, "mapping", "what the columns"),
-        ({"disturbed": 0.95}, "disturbed", "too many"),
-        ({"every": 0}, "every", "out of range"),
         ({"nests": [" "]}, "nests", "a name belongs here"),
         ({"nests": ["n1", "n2", "n1"]}, "nests", "named twice; got 'n1'"),
         ({"targets": ["1", 1]}, "targets", "named twice; got '1'"),

@@ -86,7 +86,6 @@ def test_auto_and_a_calibrated_robot(truearm: Truearm, small: Path, tmp_path: Pa
         (("--poses", "20", "--objective", "O9"), "no objective of this name"),
         (("--poses", "auto", "--objective", "O2"), "only O1 can choose"),
         (("--poses", "20", "--candidates", "19"), "too few configurations"),
-        (("--poses", "20", "--noise", "0"), "too small"),
     ],
 )
 def test_refusals_write_nothing(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], message: str) -> None:

@@ -52,13 +52,13 @@ def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_
         (("--program", "rapid", "--speed", "0"), "allowed: 1 to 5000 mm/s"),
         (("--program", "rapid", "--speed", "9000"), "got '9000 mm/s'"),
         (("--program", "rapid", "--speed", "250,0.1"), "got '0.1 %'; allowed: 1 to 100 %"),
-        (("--program", "rapid", "--dwell", "-1"), "--dwell: the robot stands in each configuration for a while"),
+        (("--program", "rapid", "--dwell", "-1"), "--dwell: the number is out of range; got -1 s"),
         (("--program", "rapid", "--dwell", "301"), "allowed: above 0, up to 300 s"),
         (
             ("--program", "rapid", "--wait", "button"),
             "--wait: there is no such wait; got 'button'; allowed: time; input",
         ),
-        (("--clearance", "-5"), "--clearance: the length is out of range; got '-5 mm'; allowed: 0 mm to"),
+        (("--clearance", "-5"), "--clearance: the number is out of range; got -5 mm; allowed: 0 mm or"),
     ],
 )
 def test_refusals_write_nothing(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], message: str) -> None:

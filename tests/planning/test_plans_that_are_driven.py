@@ -162,6 +162,9 @@ def test_a_safe_configuration_that_is_given_is_driven_from() -> None:
     planned = truearm.plan("irb120", poses=12, candidates=60, home=home)
     assert planned.tour is not None
     assert planned.tour.home.tolist() == home
+    typed = truearm.plan("irb120", poses=12, candidates=60, home="10,-20,10,0,30,0").tour
+    assert typed is not None
+    assert typed.home == pytest.approx(home)
     assert any(line.startswith("Driven from home (10, -20, 10, 0, 30, 0) and back in ") for line in planned.lines())
     assert planned.summary()["ways"]["home"] == pytest.approx([10, -20, 10, 0, 30, 0])
 
@@ -284,10 +287,10 @@ def test_a_device_that_winds_no_cable() -> None:
         ({"floor": 0.1}, "floor", "the floor is above the base of the robot; got '100 mm'; allowed: 0 mm or less"),
         ({"floor": -0.1, "no_floor": True}, "floor, no_floor", "a floor is given and denied; got '-100 mm'"),
         ({"floor": "0"}, "floor", "number"),
-        ({"no_floor": 1}, "no_floor", "yes or no belongs here"),
-        ({"clearance": -0.01}, "clearance", "the length is out of range"),
         ({"clearance": 0.9}, "clearance", "no configuration was found in which the arm keeps clear"),
         ({"home": [0.0] * 5}, "home", "6 numbers belong here"),
+        ({"home": "0,0,0,0,0"}, "home", "there are not as many numbers as joints; got '5 numbers'"),
+        ({"home": "0,x"}, "home", "numbers separated by commas"),
         ({"home": [0.0, 0, 0, 0, 0, 6.5]}, "home", "joint 6 of the safe configuration is not where"),
         ({"home": [0.0, 1.5, 0, 0, 0, 0]}, "home", "the safe configuration is not clear"),
     ],

@@ -18,6 +18,7 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.devices import named_device
 from truearm.planning.choosing import device_candidates
+from truearm.planning.plan import PlanPoses
 from truearm.planning.programs import program_wanted, refuse_other_programs, with_program
 from truearm.planning.result import Plan
 
@@ -39,9 +40,8 @@ def planned(folder: Path) -> Plan:
 
 
 def wanted(**given: Any) -> Any:
-    return program_wanted(
-        *({"program": "rapid", "approach": False, "speed": None, "dwell": None, "wait": None} | given).values()
-    )
+    asked = PlanPoses("irb120", poses=8, **{"program": "rapid", **given})
+    return program_wanted(asked.program, approach=asked.approach, speed=asked.speed, dwell=asked.dwell, wait=asked.wait)
 
 
 def test_a_folder_has_the_plan_its_ways_the_sheet_and_the_program(planned: Plan, folder: Path) -> None:
@@ -123,9 +123,6 @@ def test_a_plan_without_a_program_stays_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "parameter", "message"),
     [
-        ({"program": "basic"}, "program", "basic"),
-        ({"program": "rapide"}, "program", "Did you mean"),
-        ({"approach": 1}, "approach", "yes or no"),
         ({"program": None, "approach": True}, "approach", "none is asked for"),
         ({"program": None, "speed": (0.1,)}, "speed", "none is asked for"),
         ({"program": None, "dwell": 2.0}, "dwell", "none is asked for"),
@@ -139,12 +136,7 @@ def test_a_plan_without_a_program_stays_a_file(tmp_path: Path) -> None:
         ({"speed": (float("nan"),)}, "speed", "nan"),
         ({"speed": (0.25, 0.0)}, "speed", "0 %.*1 to 100 %"),
         ({"speed": (0.25, 10.0)}, "speed", "1000 %"),
-        ({"dwell": 0.0}, "dwell", "above 0, up to 300 s"),
-        ({"dwell": 301.0}, "dwell", "above 0, up to 300 s"),
-        ({"dwell": "2s"}, "dwell", "2s"),
-        ({"dwell": True}, "dwell", "True"),
         ({"wait": "forever"}, "wait", "there is no such wait; got 'forever'; allowed: time; input N"),
-        ({"wait": 3}, "wait", "there is no such wait"),
         ({"wait": "input"}, "wait", "there is no such wait"),
         ({"wait": "input "}, "wait", "no digital input"),
         ({"wait": "input -3"}, "wait", "no digital input"),

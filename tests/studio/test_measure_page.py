@@ -21,7 +21,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.engine.robot.transform import Transform
-from truearm.measuring.open_campaign import open_campaign
+from truearm.measuring.measure import open_campaign
 from truearm.measuring.report import drift_figure, quality_figure
 from truearm.measuring.session import REASONS
 from truearm.studio.measure_fields import MeasureFields, measure_arguments, measure_command
@@ -206,7 +206,7 @@ def test_lines_of_sight_lead_to_the_targets_of_the_arm_at_the_next_configuration
     [
         ({}, "plan: no plan is chosen"),
         ({"plan": "plan.csv", "targets": "9"}, "targets: the tool has no such target"),
-        ({"plan": "plan.csv", "disturbed": 2.0}, "disturbed: too many readings would be disturbed"),
+        ({"plan": "plan.csv", "disturbed": 2.0}, "disturbed: the number is out of range; got 2"),
         ({"plan": "plan.csv", "nests": "1"}, "a name stands for a target and for a nest"),
         ({"plan": "plan.csv", "source": "watched folder"}, "watch: no folder is given. Write into the field Folder"),
         ({"plan": "plan.csv", "source": "watched folder", "mapping": "m.yaml"}, "watch: no folder is given"),

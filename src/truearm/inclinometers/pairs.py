@@ -5,35 +5,19 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, Unpack
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 
-from truearm.engine.base.arrays import finite_number
-from truearm.engine.base.errors import InputError, Notice, counted, listed, refusals_of, wrong_kind
-from truearm.engine.base.files import path_argument
+from truearm.engine.base.errors import InputError, Notice, counted, listed, refusals_of
 from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.base.writing import output_file, write_files
-from truearm.engine.command.arguments import (
-    JOINTS_OF,
-    choice_argument,
-    command_argument,
-    count_argument,
-    deviation_argument,
-    file_for,
-    files_of,
-    gravity_argument,
-    joints_argument,
-    payload_argument,
-    progress_argument,
-    python_call,
-    robot_argument,
-    whole_argument,
-)
+from truearm.engine.command.arguments import file_for, files_of, joints_argument, robot_argument
 from truearm.engine.command.driving import cell_argument, finder_argument, plan_files_for, replaced_notices
+from truearm.engine.command.texts import positions_of
 from truearm.engine.data.controller_joints import in_controller_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.inclinations import (
@@ -53,7 +37,6 @@ from truearm.engine.motion.ways import WayFinder, drawn_clear
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 from truearm.engine.robot.library.wider_limits import wider_limits_notices
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.urdf_writing import counting, joint_cells, joint_headings
@@ -69,6 +52,9 @@ from truearm.inclinometers.fit import (
     tilting_parameters,
 )
 from truearm.inclinometers.reading import inclinations_text
+
+if TYPE_CHECKING:
+    from truearm.inclinometers.jobs import PlanInclinometers, SimulateInclinometers
 
 # Which postures to hold, under which loads, to tell tilt, backlash and stiffness of the joints apart.
 #
@@ -295,6 +281,11 @@ class InclinometerPlan(Record):
                 writer.writerow([number, number, *cells, *(f"{part:g}" for part in force), reads])
         return stream.getvalue()
 
+    def written_at(self, out: str) -> str:
+        """Return the line that says which files hold it."""
+        file = Path(out)
+        return f"Written: {file}, {file.with_name(f'{file.stem}-ways.csv')}"
+
     def save(self, file: str | Path) -> tuple[Path, ...]:
         """Write the plan as CSV, and every stop on the ways in a second one.
 
@@ -365,130 +356,32 @@ POSE_DEVIATION: Final = 1e-5
 #: How far joints move within a pair without a pull [rad], and pairs of poses under pulls.
 _MOVE: Final = math.radians(20.0)
 _POSED: Final = 8
-_STRONGEST: Final = 1e4  # N
 
 
-def plan_inclinometers(
-    robot: Robot | str | Path,
-    *,
-    poses: int,
-    out: str | Path | None = None,
-    pull: float = 20.0,
-    candidates: int = CANDIDATES,
-    noise: float = POSE_DEVIATION,
-    seed: int = 0,
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-    joints: JointsOf | None = None,
-    floor: float | None = None,
-    no_floor: bool = False,
-    clearance: float | None = None,
-    home: Sequence[float] | None = None,
-    command: str | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-) -> InclinometerPlan:
-    """Choose pairs of configurations in which two-axis inclinometers on all links tell most of the joints.
-
-    Poses under sideways pulls are chosen beside, for joints whose axes stand upright.
-
-    Parameters
-    ----------
-    robot
-        Nominal or calibrated, or what :func:`truearm.load_robot` takes, with masses.
-    poses
-        How many configurations for the inclinometers, an even number.
-    out
-        CSV file to write; None writes nothing, see :meth:`InclinometerPlan.save`.
-    pull
-        Force of a string or a weight on the flange [N], along or against an axis of the base; 0 for gravity alone:
-        joints then move within a pair, and no poses are chosen.
-    candidates
-        Pairs to draw and to choose from.
-    noise
-        Standard deviation of a coordinate of a pose [m].
-    seed
-        Of the random configurations.
-    payload, gravity
-        What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
-        [m/s^2].
-    joints
-        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
-        controller's where the robot file says that they differ.
-    floor, no_floor, clearance, home
-        What is kept clear, and where the arm starts and ends, as for :func:`plan`.
-    command
-        How to run it again; None writes the call in Python.
-    progress
-        Called with a few words at each step.
-
-    Raises
-    ------
-    InputError
-        For anything that cannot be used, with a message that says what to do.
-    """
-    progress_argument(progress)
-    table = None if out is None else file_for(out, robot)
+def planned(asked: PlanInclinometers) -> InclinometerPlan:
+    """Choose pairs of configurations, look for ways between them, and write the plan."""
+    table = None if asked.out is None else file_for(asked.out, asked.robot)
     if table is not None:
-        plan_files_for((table.name, ways_beside(table).name), table, robot)
-    count, force = even_argument(poses), pull_argument(pull)
-    number, deviation = count_argument(candidates, "candidates"), deviation_argument(noise, "noise")
-    rng = np.random.default_rng(whole_argument(seed, "seed"))
-    carried, fall = payload_argument(payload), gravity_argument(gravity)
-    call = command_argument(command) or python_call(
-        "plan_inclinometers",
-        robot,
-        poses=poses,
-        pull=pull,
-        candidates=candidates,
-        noise=noise,
-        seed=seed,
-        payload=carried,
-        gravity=fall,
-        joints=joints,
-        floor=floor,
-        no_floor=no_floor,
-        clearance=clearance,
-        home=home,
-    )
-    progress("reading the robot")
-    carrying = robot_argument(robot).with_payload(carried, fall)
-    joints_are = joints_argument(joints, carrying)
-    progress("looking where the arm keeps clear")
-    cell = cell_argument(carrying, None, "", floor, no_floor, clearance)
+        plan_files_for((table.name, ways_beside(table).name), table, asked.robot)
+    asked.progress("reading the robot")
+    carrying = asked.loads.on(robot_argument(asked.robot))
+    joints_are = joints_argument(asked.joints, carrying)
+    asked.progress("looking where the arm keeps clear")
+    cell = cell_argument(carrying, None, "", asked.floor, asked.no_floor, asked.clearance)
+    home = None if asked.home is None else positions_of(asked.home, carrying, joints_are, "home")
     finder = finder_argument(carrying, None, "", cell, home)
-    progress("choosing pairs of configurations")
-    made = planned_pairs(carrying, count, rng, force, number, deviation, finder)
-    progress("looking for ways that keep clear")
+    asked.progress("choosing pairs of configurations")
+    rng = np.random.default_rng(asked.seed)
+    made = planned_pairs(carrying, asked.poses, rng, asked.pull, asked.candidates, asked.noise, finder)
+    asked.progress("looking for ways that keep clear")
     at = np.concatenate([pairs.joints_in_turn()[0] for pairs in (made.inclined, made.posed) if len(pairs)])
     tour = tour_of(finder, at, [str(k + 1) for k in range(len(at))])
-    planned = InclinometerPlan(carrying, made, force, call, tour, files_of(robot), joints_are)
-    if table is not None:
-        replaced = replaced_notices(table.parent, table.name, planned.csv_text())
-        planned.save(table)
-        planned = replace(planned, replaced=replaced)
-    return planned
-
-
-def even_argument(poses: object) -> int:
-    """Return how many configurations there shall be, two for each pair."""
-    count = count_argument(poses, "poses", 2)
-    if count % 2:
-        raise InputError(
-            "inclinations are compared two by two",
-            parameter="poses",
-            came=count,
-            allowed="an even number",
-            cure=f"Use `poses={count + 1}`.",
-        )
-    return count
-
-
-def pull_argument(pull: object) -> float:
-    """Return the force on the flange that inclinometers are read under [N]."""
-    force = finite_number(pull, "pull", lowest=0.0)
-    if force > _STRONGEST:
-        raise InputError("no flange is pulled so hard", parameter="pull", came=force, allowed=f"0 to {_STRONGEST:g} N")
-    return force
+    found = InclinometerPlan(carrying, made, asked.pull, asked.again, tour, files_of(asked.robot), joints_are)
+    if table is None:
+        return found
+    replaced = replaced_notices(table.parent, table.name, found.csv_text())
+    found.save(table)
+    return replace(found, replaced=replaced)
 
 
 def planned_pairs(
@@ -599,78 +492,21 @@ def measure_pairs(twin: Twin, pairs: Pairs, noise: float, rng: np.random.Generat
     return measure(twin, joints, noise, rng, wrench=wrench)
 
 
-def simulate_inclinometers(
-    robot: Robot | str | Path,
-    *,
-    truth: Robot | str | Path,
-    poses: int,
-    out: str | Path | None = None,
-    pull: float = 20.0,
-    seed: int = 0,
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-    joints: JointsOf = "model",
-    progress: Callable[[str], None] = lambda _: None,
-) -> InclinometerSimulation:
-    """Read two-axis inclinometers on all links of a digital twin, and its poses under sideways pulls.
-
-    Configurations are those of :func:`truearm.plan_inclinometers`. Angles are rounded to 0.001 deg, poses have 0.01 mm
-    of noise a coordinate.
-
-    Parameters
-    ----------
-    robot
-        The nominal robot, or what :func:`truearm.load_robot` takes.
-    truth
-        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; ``gear-errors`` or ``tooth-errors``,
-        the same with errors of encoders and gears; the name of a truth in the robot's file; or another robot or its
-        file, with its own base and targets if it has targets.
-    poses
-        How many configurations for the inclinometers, an even number.
-    out
-        CSV file of inclinations to write, and one that ends in ``-pushed`` for the poses beside it; None writes
-        nothing.
-    pull
-        Force of a string or a weight on the flange [N]; 0 for gravity alone, without poses.
-    seed
-        Of configurations, noise and a random truth.
-    payload, gravity
-        What the robot truly carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base
-        frame [m/s^2]; None for what its file says.
-    joints
-        Whose joint positions the data hold: the ``model``'s, or as the ``controller`` shows them.
-    progress
-        Called with a few words at each step.
-
-    Raises
-    ------
-    InputError
-        For anything that cannot be used, with a message that says what to do.
-    """
-    progress_argument(progress)
-    count, force = even_argument(poses), pull_argument(pull)
-    if not isinstance(truth, Robot):
-        if not isinstance(truth, str | Path):
-            raise wrong_kind(
-                "a truth belongs here",
-                truth,
-                "truth",
-                "nominal, random, gear-errors, tooth-errors, a truth's name, or a robot",
-            )
-        path_argument(truth, "truth")
-    file = None if out is None else file_for(out, robot, truth)
-    if file is not None:
-        file_for(pushed_file(file), robot, truth)
-    rng = np.random.default_rng(whole_argument(seed, "seed"))
-    carried, fall = payload_argument(payload), gravity_argument(gravity)
-    nominal = robot_argument(robot)
-    joints_are = joints_argument(choice_argument(joints, "joints", JOINTS_OF), nominal)
+def simulated(asked: SimulateInclinometers) -> InclinometerSimulation:
+    """Read inclinometers of a twin, and its poses under pulls, and write them."""
+    file, truth = None, asked.truth
+    if asked.out is not None:
+        file = file_for(asked.out, asked.robot, truth)
+        file_for(pushed_file(file), asked.robot, truth)
+    rng = np.random.default_rng(asked.seed)
+    nominal = robot_argument(asked.robot)
+    joints_are = joints_argument(asked.joints, nominal)
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
-    twin = replace(twin, robot=twin.robot.with_payload(carried, fall))
-    progress("choosing pairs of configurations")
-    pairs = planned_pairs(nominal.with_payload(carried, fall), count, rng, force, CANDIDATES, POSE_DEVIATION)
-    progress(f"reading {count} configurations")
+    twin = replace(twin, robot=asked.loads.on(twin.robot))
+    asked.progress("choosing pairs of configurations")
+    pairs = planned_pairs(asked.loads.on(nominal), asked.poses, rng, asked.pull, CANDIDATES, POSE_DEVIATION)
+    asked.progress(f"reading {asked.poses} configurations")
     read = read_pairs(twin, pairs.inclined, RESOLUTION, rng, AXES)
     pushed = measure_pairs(twin, pairs.posed, POSE_DEVIATION, rng) if len(pairs.posed) else None
     if joints_are == "controller":

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -20,31 +20,21 @@ from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.base.version import __version__
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.command.arguments import (
-    choice_argument,
-    command_argument,
     files_of,
     folder_for,
-    gravity_argument,
-    notes_argument,
-    payload_argument,
-    progress_argument,
-    python_call,
     readings_argument,
     refuse_swapped,
     robot_argument,
-    whole_argument,
 )
-from truearm.engine.command.groups import Train
 from truearm.engine.command.split import train_count
 from truearm.engine.data.checks import check_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.inclinations import Inclinations, InclinometerReadings
 from truearm.engine.document.records import Record, notice_lines, notice_summaries
 from truearm.engine.document.summaries import error_line
-from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.models import MODELS as EVERY_MODEL
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import is_robot, urdf_source
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.proof import Proof
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import sealed
@@ -52,6 +42,9 @@ from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.inclinometers.fit import TILTING, TiltingFit, calibrate_tilting, check_tilting, seen
 from truearm.inclinometers.mounting import Mounting, find_mounting
 from truearm.inclinometers.reading import read_inclinations
+
+if TYPE_CHECKING:
+    from truearm.inclinometers.jobs import FindTilting
 
 #: What tilting writes into its folder, and the report of the geometry where poses were given.
 TILTING_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
@@ -85,6 +78,11 @@ class Tilting(Record):
     def warnings(self) -> tuple[Notice, ...]:
         """What to know about both stages."""
         return self.notices if self.geometry is None else (*self.notices, *self.geometry.warnings)
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """Names of the files that hold it."""
+        return TILTING_FILES if self.geometry is None else (*TILTING_FILES, GEOMETRY)
 
     @property
     def finished(self) -> bool:
@@ -232,144 +230,124 @@ def _words(row: dict[str, Any]) -> str:
 
 
 #: Models that leave tilt, backlash and stiffness as the inclinometers told them.
-_MODELS: Final = {model.name: model for model in MODELS if not set(model.effects) & set(TILTING)}
+MODELS: Final = tuple(model.name for model in EVERY_MODEL if not set(model.effects) & set(TILTING))
 
 
-def tilting(
-    robot: Robot | str | Path,
-    inclinations: Inclinations | str | Path,
-    poses: Dataset | str | Path | None = None,
-    *,
-    pushed: Dataset | str | Path | None = None,
-    out: str | Path | None = None,
-    model: str = "geometric",
-    train: Train = None,
-    seed: int = 0,
-    payload: Payload | str | None = None,
-    gravity: Sequence[float] | None = None,
-    notes: Mapping[str, str] | None = None,
-    command: str | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-) -> Tilting:
-    """Find tilt, backlash and stiffness of every joint by inclinometers, then the geometry with these held.
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """What was given, as it was read."""
 
-    Parameters
-    ----------
-    robot
-        Nominal, or what :func:`truearm.load_robot` takes. Tilt, backlash and compliance are looked for anew.
-    inclinations
-        What inclinometers on the links read, or a CSV file of it.
-    poses
-        Readings of targets for the geometry, or a canonical CSV file; None ends after the first stage.
-    pushed
-        Readings of targets in pairs of configurations at the same joint positions under two forces, which tell what
-        inclinometers cannot see: a joint whose axis stands upright. They are not used for the geometry.
-    out
-        Folder for calibrated.yaml, result.json, report.html, calibrated.urdf and, with poses, geometry.html; None
-        writes nothing, see :meth:`Tilting.save`.
-    model
-        What the poses are to tell: ``offsets``, ``joints`` or ``geometric``.
-    train, seed
-        Split of the poses, as in :func:`truearm.calibrate`.
-    payload, gravity
-        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``), beside what the file of
-        inclinations says of single configurations, and free fall in its base frame [m/s^2].
-    notes
-        What to write on the report and into result.json, by its name.
-    command
-        How to run it again, for the report; None writes the call in Python.
-    progress
-        Called with a few words at each step.
+    robot: Robot  #: With its loads.
+    urdf: bytes | None  #: The user's own, if that is where the robot came from.
+    inclinations: Inclinations
+    pushed: Dataset | None
+    poses: Dataset | None
 
-    Raises
-    ------
-    InputError
-        For anything that cannot be used, with a message that says what to do.
-    """
-    progress_argument(progress)
-    choice_argument(model, "model", _MODELS)
-    seed, notes = whole_argument(seed, "seed"), notes_argument(notes)
-    carried, fall = payload_argument(payload), gravity_argument(gravity)
-    call = command_argument(command) or python_call(
-        "tilting",
-        robot,
-        inclinations,
-        poses,
-        pushed=pushed,
-        model=model,
-        train=train,
-        seed=seed,
-        payload=carried,
-        gravity=fall,
-        notes=notes or None,
-    )
-    refuse_swapped(robot, inclinations, "tilting")
-    given = robot, inclinations, poses, pushed
+
+@dataclass(frozen=True, eq=False)
+class _First:
+    """What inclinometers told."""
+
+    fit: TiltingFit
+    robot: Robot  #: With what is known of its constants.
+    changes: InclinometerReadings
+    mounting: Mounting
+    told: tuple[Notice, ...]
+
+
+def found(asked: FindTilting) -> Tilting:
+    """Read, find tilt, backlash and stiffness, then the geometry, and write both."""
+    refuse_swapped(asked.robot, asked.inclinations, "tilting")
+    given = asked.robot, asked.inclinations, asked.poses, asked.pushed
     inputs = files_of(*given)
-    folder = None if out is None else folder_for((*TILTING_FILES, GEOMETRY), out, *given, ours=True)
-    progress("reading the robot")
-    source = urdf_source(robot) if isinstance(robot, str | Path) else None
-    start = robot_argument(robot).with_payload(carried, fall)
-    if not start.layout.turning:
-        raise InputError("no joint of this robot turns, so no link leans", parameter="robot", where=start.name)
-    progress("reading the data")
-    read = _inclinations(start, inclinations)
-    pairs = None if pushed is None else readings_argument(start, pushed, "pushed")
-    measured = None if poses is None else readings_argument(start, poses, "poses")
-    start = start.marked(any(one is not None and one.simulated for one in (read, pairs)))
-    if measured is None:
-        if train is not None:
-            raise InputError("there are no poses to split", parameter="train", cure="Give `poses`, or leave it out.")
-    else:
-        with refusals_of("train"):
-            train_count(train, measured.configurations, measured.source)
-    with refusals_of("inclinations"):
-        progress("finding how the instruments sit")
-        mounting = find_mounting(start, read)
-        changes = read.changes(start, mounting.mounts)
-        if not len(changes.pairs):
-            raise InputError(
-                "no two configurations can be compared",
-                where=read.source,
-                came=counted(len(read.labels), "configuration"),
-                allowed="those of the orders 1 and 2, 3 and 4 and so on",
-            )
-    progress(f"identifying tilt, backlash and stiffness from {counted(len(changes.pairs), 'pair')}")
-    try:
-        fit = calibrate_tilting(start, changes, pairs)
-    except InputError as error:
-        of_poses = pairs is not None and error.where == pairs.source
-        name_parameter(error, "pushed" if of_poses else "inclinations")
-        raise
-    told = (*check_tilting(start, fit, read, pushed=pairs is not None), *mounting.notices)
-    found = _proven(start, fit, read, changes.pairs.in_turn.joints, told)
+    if asked.out is not None:
+        folder_for((*TILTING_FILES, GEOMETRY), asked.out, *given, ours=True)
+    read = _read(asked)
+    first = _first(asked, read)
     geometry = alone = None
-    if measured is not None:
-        with refusals_of("poses"):
-            progress("identifying the geometry with these held")
-            options = {"model": model, "train": train, "seed": seed, "notes": notes, "command": call}
-            geometry = _with_constants(calibrate(found, measured, **options), fit)  # type: ignore[arg-type]
-            progress("identifying the geometry alone, for comparison")
-            alone = calibrate(start, measured, **options)  # type: ignore[arg-type]
+    told = first.told
+    if read.poses is not None:
+        geometry, alone = _geometry(asked, read, first)
         told = (*told, *_compared(geometry, alone))
     made = Tilting(
-        fit=fit,
-        robot=found if geometry is None else geometry.robot,
-        read=read,
-        changes=changes,
-        mounting=mounting,
-        pushed=0 if pairs is None else pairs.configurations,
+        fit=first.fit,
+        robot=first.robot if geometry is None else geometry.robot,
+        read=read.inclinations,
+        changes=first.changes,
+        mounting=first.mounting,
+        pushed=0 if read.pushed is None else read.pushed.configurations,
         geometry=geometry,
         geometry_alone=alone,
         notices=told,
-        command=call,
-        urdf=None if source is None else read_bytes(source[0]),
+        command=asked.again,
+        urdf=read.urdf,
         inputs=inputs,
-        notes=notes,
+        notes=dict(asked.notes or {}),
     )
-    if folder is not None:
-        made.save(folder, progress)
+    if asked.out is not None:
+        made.save(asked.out, asked.progress)
     return made
+
+
+def _read(asked: FindTilting) -> _Read:
+    """Read robot and data."""
+    asked.progress("reading the robot")
+    source = urdf_source(asked.robot) if isinstance(asked.robot, str | Path) else None
+    robot = asked.loads.on(robot_argument(asked.robot))
+    if not robot.layout.turning:
+        raise InputError("no joint of this robot turns, so no link leans", parameter="robot", where=robot.name)
+    asked.progress("reading the data")
+    inclinations = _inclinations(robot, asked.inclinations)
+    pushed = None if asked.pushed is None else readings_argument(robot, asked.pushed, "pushed")
+    poses = None if asked.poses is None else readings_argument(robot, asked.poses, "poses")
+    robot = robot.marked(any(one is not None and one.simulated for one in (inclinations, pushed)))
+    if poses is not None:
+        with refusals_of("train"):
+            train_count(asked.train, poses.configurations, poses.source)
+    return _Read(robot, None if source is None else read_bytes(source[0]), inclinations, pushed, poses)
+
+
+def _first(asked: FindTilting, read: _Read) -> _First:
+    """Find tilt, backlash and stiffness of the joints."""
+    start, inclinations = read.robot, read.inclinations
+    with refusals_of("inclinations"):
+        asked.progress("finding how the instruments sit")
+        mounting = find_mounting(start, inclinations)
+        changes = inclinations.changes(start, mounting.mounts)
+        if not len(changes.pairs):
+            raise InputError(
+                "no two configurations can be compared",
+                where=inclinations.source,
+                came=counted(len(inclinations.labels), "configuration"),
+                allowed="those of the orders 1 and 2, 3 and 4 and so on",
+            )
+    asked.progress(f"identifying tilt, backlash and stiffness from {counted(len(changes.pairs), 'pair')}")
+    try:
+        fit = calibrate_tilting(start, changes, read.pushed)
+    except InputError as error:
+        of_poses = read.pushed is not None and error.where == read.pushed.source
+        name_parameter(error, "pushed" if of_poses else "inclinations")
+        raise
+    told = (*check_tilting(start, fit, inclinations, pushed=read.pushed is not None), *mounting.notices)
+    proven = _proven(start, fit, inclinations, changes.pairs.in_turn.joints, told)
+    return _First(fit, proven, changes, mounting, told)
+
+
+def _geometry(asked: FindTilting, read: _Read, first: _First) -> tuple[Calibration, Calibration]:
+    """Identify the geometry with what was found held, and alone."""
+    options: Any = {
+        "model": asked.model,
+        "train": asked.train,
+        "seed": asked.seed,
+        "notes": asked.notes,
+        "command": asked.again,
+    }
+    assert read.poses is not None
+    with refusals_of("poses"):
+        asked.progress("identifying the geometry with these held")
+        geometry = _with_constants(calibrate(first.robot, read.poses, **options), first.fit)
+        asked.progress("identifying the geometry alone, for comparison")
+        return geometry, calibrate(read.robot, read.poses, **options)
 
 
 def _inclinations(robot: Robot, given: object) -> Inclinations:

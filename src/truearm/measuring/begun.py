@@ -4,33 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from truearm.engine.base.arrays import finite_number
 from truearm.engine.base.errors import InputError, refusals_of
 from truearm.engine.base.files import path_argument, read_text
 from truearm.engine.base.writing import write_text
-from truearm.engine.command.arguments import (
-    deviation_argument,
-    length_argument,
-    name_argument,
-    payload_argument,
-    whole_argument,
-)
+from truearm.engine.command.arguments import payload_argument
 from truearm.engine.command.driving import constraints_argument
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.measuring.reading_log import LOG, About
 from truearm.measuring.session import Quality, Session
 
 if TYPE_CHECKING:
-    from truearm.measuring.sources import Listener
+    from truearm.measuring.measure import Measure
     from truearm.measuring.virtual_instrument import VirtualInstrument
     from truearm.measuring.watched_folder import WatchedFolder
 
@@ -120,70 +111,6 @@ def hash_of(content: object) -> str:
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
-_MOST_DISTURBED: Final = 0.9
-T = TypeVar("T")
-
-Kind = Literal["device", "watch", "listen"]
-
-
-class AskedOfSource(TypedDict, total=False):
-    """What :func:`truearm.measure` is asked for where readings come from; what is not named is None."""
-
-    device: str | None
-    truth: Robot | str | Path | None
-    noise: float | None
-    seed: int | None
-    disturbed: float | None
-    drift: float | None
-    payload: Payload | str | None
-    constraints: str | Path | None
-    watch: str | Path | None
-    mapping: str | Path | None
-    listen: int | None
-    token: str | None
-
-
-#: What belongs to each source.
-_OF: Final[Mapping[Kind, tuple[str, ...]]] = {
-    "device": ("truth", "noise", "seed", "disturbed", "drift", "payload", "constraints"),
-    "watch": ("mapping",),
-    "listen": ("token",),
-}
-#: What each source is, where it is not given.
-_CALLED_MEASURING_SOURCES: Final[Mapping[Kind, str]] = {"device": "virtual device", "watch": "folder", "listen": "port"}
-
-
-def source_kind(asked: Mapping[str, object]) -> Kind:
-    """Return which source is asked for.
-
-    Raises:
-        InputError: If it is none, or more than one, or something is asked for that belongs to another one.
-    """
-    given = [kind for kind in _OF if asked.get(kind) is not None]
-    for of, names in _OF.items() if not given else ():
-        for name in names:
-            if asked.get(name) is not None:
-                raise InputError(
-                    f"no {_CALLED_MEASURING_SOURCES[of]} is given, and `{name}` belongs to one",
-                    parameter=of,
-                    cure="Name it.",
-                )
-    if len(given) != 1:
-        raise InputError(
-            "readings come from one source" if given else "nobody says where readings come from",
-            parameter=", ".join(given) or "device, watch, listen",
-            allowed="a virtual device, a folder to watch, or a port to listen on",
-            cure="Keep one of them." if given else "Give one of them.",
-        )
-    for of, names in _OF.items():
-        for name in names:
-            if asked.get(name) is not None and of != given[0]:
-                raise InputError(
-                    f"this belongs to `{of}`, and readings come from `{given[0]}`", parameter=name, cure="Leave it out."
-                )
-    return given[0]
-
-
 # -- a virtual instrument --------------------------------------------------------------------------------------
 
 
@@ -197,7 +124,7 @@ class VirtualSource:
 
 
 def virtual_source(
-    asked: AskedOfSource, nominal: Robot, joints: Array, before: Array | None, nests: tuple[str, ...]
+    asked: Measure, nominal: Robot, joints: Array, before: Array | None, nests: tuple[str, ...]
 ) -> VirtualSource:
     """Return a virtual instrument that measures a twin.
 
@@ -213,36 +140,31 @@ def virtual_source(
     from truearm.engine.twin.truths import truth_twin
     from truearm.measuring.virtual_instrument import VirtualInstrument, virtual_device
 
-    name = name_argument(asked.get("device"), "device")
-    given = asked.get("truth")
-    truth = "random" if given is None else given
-    seed = whole_argument(_or(asked.get("seed"), 0), "seed")
-    sigma = None if (noise := asked.get("noise")) is None else _noise(noise)
-    disturbed = _share(_or(asked.get("disturbed"), 0.0))
-    drift = length_argument(_or(asked.get("drift"), 0.0), "drift", 0.0)
-    device = virtual_device(name)
-    rules = constraints_argument(asked.get("constraints"))
+    truth = "random" if asked.truth is None else asked.truth
+    seed, disturbed, drift = asked.seed or 0, asked.disturbed or 0.0, asked.drift or 0.0
+    device = virtual_device(str(asked.device))
+    rules = constraints_argument(asked.constraints)
     with refusals_of("truth"):
-        made = truth if isinstance(truth, Robot) else str(path_argument(truth, "truth"))
+        made = truth if isinstance(truth, Robot) else str(truth)
         twin = truth_twin(nominal, made, np.random.default_rng(seed))
-    twin = replace(twin, robot=twin.robot.with_payload(payload_argument(asked.get("payload"))))
+    twin = replace(twin, robot=twin.robot.with_payload(payload_argument(asked.payload)))
     twin, placed = seen_by(device, nominal, twin)
-    source = VirtualInstrument(device, twin, placed, joints, nests, seed, disturbed, drift, sigma, before)
+    source = VirtualInstrument(device, twin, placed, joints, nests, seed, disturbed, drift, asked.noise, before)
     boxes: dict[str, Any] = {}
     if rules is not None:
         from truearm.engine.motion.constraints import keep_out
 
         with refusals_of("constraints"):
-            boxes = keep_out(rules, str(asked.get("constraints")))
+            boxes = keep_out(rules, str(asked.constraints))
     if nests and source.looks:
         from truearm.engine.motion.cell import boxes_of
         from truearm.measuring.lines_of_sight import hidden
 
         source.hides = hidden(placed, joints, np.zeros(3), source.nests, boxes_of(boxes))
     entries = {
-        "device": name,
+        "device": asked.device,
         "truth": truth.name if isinstance(truth, Robot) else Path(truth).name,
-        "noise": sigma,
+        "noise": asked.noise,
         "seed": seed,
         "disturbed": disturbed,
         "drift": drift,
@@ -252,50 +174,27 @@ def virtual_source(
     return VirtualSource(source, placed, entries)
 
 
-def _or(value: T | None, usual: T) -> T:
-    return usual if value is None else value
-
-
-def _noise(noise: object) -> float:
-    return deviation_argument(noise, "noise") if finite_number(noise, "noise", lowest=0.0) else 0.0
-
-
-def _share(disturbed: object) -> float:
-    share = finite_number(disturbed, "disturbed", lowest=0.0)
-    if share > _MOST_DISTURBED:
-        raise InputError(
-            "too many readings would be disturbed",
-            parameter="disturbed",
-            came=f"{share:g}",
-            allowed=f"0 to {_MOST_DISTURBED:g}, a share",
-        )
-    return share
-
-
-def quality_of_device(quality: Quality, source: Any, *said: object) -> Quality:
+def quality_of_device(asked: Measure, source: VirtualInstrument) -> Quality:
     """Return what is asked of the readings of a virtual device: what is expected of it where nothing else is said."""
     from truearm.measuring.virtual_instrument import SAMPLES
 
     expected = Quality.of_instrument(source.sigma, SAMPLES) if source.sigma else Quality(samples=SAMPLES // 2)
-    mine = [quality.deviation, quality.settling, quality.samples]
-    usual = [expected.deviation, expected.settling, expected.samples]
-    deviation, settling, samples = (
-        theirs if given is None else own for own, theirs, given in zip(mine, usual, said, strict=True)
+    return Quality(
+        expected.deviation if asked.most_deviation is None else asked.most_deviation,
+        expected.settling if asked.most_settling is None else asked.most_settling,
+        expected.samples if asked.fewest_samples is None else asked.fewest_samples,
     )
-    return Quality(deviation, settling, samples)  # type: ignore[arg-type]
 
 
 # -- a real one ------------------------------------------------------------------------------------------------
 
 
-def watched_source(watch: object, mapping: object, labels: tuple[str, ...], out: Path) -> WatchedFolder:
+def watched_source(asked: Measure, labels: tuple[str, ...], out: Path) -> WatchedFolder:
     """Return the folder that is watched, its rows read as a mapping says."""
     from truearm.measuring.watched_folder import WatchedFolder
 
-    if watch == "":  # a variable of the shell that is not set
-        raise InputError("no folder is given", parameter="watch", came=watch)
-    folder = path_argument(watch, "watch")
-    if mapping is None:
+    folder = path_argument(asked.watch, "watch")
+    if asked.mapping is None:
         raise InputError(
             "nobody says what the columns of the rows mean",
             parameter="mapping",
@@ -307,25 +206,4 @@ def watched_source(watch: object, mapping: object, labels: tuple[str, ...], out:
             "the folder that is watched is written to", parameter="out", came=str(out), cure="Choose another."
         )
     with refusals_of("mapping"):
-        return WatchedFolder(folder, path_argument(mapping, "mapping"), labels)
-
-
-def listener(listen: object, token: object) -> Listener:
-    """Return what listens to programs of this machine."""
-    from truearm.measuring.sources import Listener
-
-    return Listener(whole_argument(listen, "listen", 0, 65535), _token(token))
-
-
-def _token(token: object) -> str | None:
-    if token is None:
-        return None
-    text = name_argument(token, "token")
-    if not 16 <= len(text) <= 200 or not all(c.isascii() and (c.isalnum() or c in "-_") for c in text):
-        raise InputError(
-            "this is no token that keeps others out",
-            parameter="token",
-            allowed="16 to 200 letters, digits, - and _",
-            cure="Leave it out: then one is made.",
-        )
-    return text
+        return WatchedFolder(folder, Path(asked.mapping), labels)

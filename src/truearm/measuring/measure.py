@@ -1,200 +1,273 @@
-"""Measuring a plan with an instrument, reading by reading."""
+"""What the measuring of a plan is asked for."""
 
 from __future__ import annotations
 
-import signal
-import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import FrameType
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from truearm.engine.base.arrays import finite_number
-from truearm.engine.base.errors import wrong_kind
-from truearm.engine.command.arguments import progress_argument
-from truearm.engine.robot.parts import Payload
-from truearm.engine.robot.robot import Robot
-from truearm.measuring.open_campaign import Asked, OpenCampaign, Sight, open_campaign, sight
-from truearm.measuring.result import Measured
+from truearm.engine.base.errors import InputError, is_one_line
+from truearm.engine.command.groups import Carrying, Long, OfPlan, OfRobot, Repeatable
+from truearm.engine.command.kinds import File, Names, Number, Text, Told, TruthKind, Whole
+from truearm.engine.command.request import job, option, required
 
-__all__ = ["OpenCampaign", "Sight", "measure", "open_campaign", "sight"]
+if TYPE_CHECKING:
+    from truearm.engine.robot.robot import Robot
+    from truearm.measuring.open_campaign import OpenCampaign
+    from truearm.measuring.result import Measured
 
-#: How long a source is waited for before somebody is asked whether to stop [s].
-_TURN: Final = 0.5
+Source = Literal["device", "watch", "listen"]
+#: What belongs to each source.
+_OF: Final[Mapping[Source, tuple[str, ...]]] = {
+    "device": ("truth", "noise", "seed", "disturbed", "drift", "payload", "constraints"),
+    "watch": ("mapping",),
+    "listen": ("token",),
+}
+#: What each source is, where it is not given.
+_CALLED: Final[Mapping[Source, str]] = {"device": "virtual device", "watch": "folder", "listen": "port"}
+_VIRTUAL: Final = "Virtual instrument"
+_REAL: Final = "Real instrument"
+_LONGEST_NAME: Final = 100
+_FEWEST_AND_MOST_OF_A_TOKEN: Final = (16, 200)
 
 
-def measure(
-    plan: str | Path,
-    robot: Robot | str | Path,
-    *,
-    out: str | Path,
-    device: str | None = None,
-    truth: Robot | str | Path | None = None,
-    noise: float | None = None,
-    seed: int | None = None,
-    disturbed: float | None = None,
-    drift: float | None = None,
-    payload: Payload | str | None = None,
-    constraints: str | Path | None = None,
-    watch: str | Path | None = None,
-    mapping: str | Path | None = None,
-    listen: int | None = None,
-    token: str | None = None,
-    targets: Sequence[str] | None = None,
-    nests: Sequence[str] | None = None,
-    every: int = 10,
-    most_deviation: float | None = None,
-    most_settling: float | None = None,
-    fewest_samples: int | None = None,
-    about: str | Path | None = None,
-    wait: float | None = None,
-    command: str | None = None,
-    tell: Callable[[str], None] = lambda _: None,
-    progress: Callable[[str], None] = lambda _: None,
-) -> Measured:
-    """Go through a plan with an instrument and write what it read as a canonical CSV.
+def _silent(line: str) -> None:
+    """Tell nobody."""
 
-    Every reading is on disk before the next one is asked for, in the log ``readings.csv``. It is kept or set aside for
-    reasons of the instrument alone: nothing here knows how well it fits. The same call in the same folder goes on where
-    it was stopped, by Ctrl-C or otherwise.
 
-    Parameters
-    ----------
-    plan
-        The configurations in the order of measuring, as :func:`truearm.plan` writes them: ``configuration`` and
-        ``joint_1 [deg]`` .. or ``axis_1 [deg]`` ..
-    robot
-        The nominal robot, or what :func:`truearm.load_robot` takes.
-    out
-        Folder for the log, the measurements and the report.
-    device
-        Readings of a virtual instrument: one of ``truearm.devices()`` that reads where targets are. A plan of which it
-        can read nothing is refused.
-    truth, noise, seed, payload
-        The twin that it measures, its standard deviation of a coordinate [m], what is drawn, and what the robot
-        carries, as for :func:`truearm.simulate`; a random truth, the device's deviation and seed 0 if None.
-    disturbed
-        Share of its readings with a broken beam, an arm that still moves, or too much scatter, up to 0.9.
-    drift
-        How far it moves until the last configuration [m].
-    constraints
-        Constraints file whose boxes hide nests from it, as the arm does.
-    watch
-        Or readings that an instrument's software writes into this folder, in files or rows at the end of files.
-    mapping
-        What their columns mean, as for :func:`truearm.import_table`; the joint positions are the plan's, so that
-        the entry ``joints`` may be left out.
-    listen
-        Or readings that programs of this machine send to this port of 127.0.0.1; 0 for any that is free.
-    token
-        Which they must send first; a new one if None. It is told once.
-    targets
-        What is measured at each configuration; those of the device or robot if None, else those that the mapping fixes.
-        A plan that says in its column ``reads`` which of them the instrument sees is followed.
-    nests
-        Fixed points beside the robot that are measured at the start, along the way and at the end; the mapping's
-        ``references``, or none, if None.
-    every
-        How many configurations lie between two rounds of the nests.
-    most_deviation, most_settling, fewest_samples
-        What a reading must be to be kept: scatter of a sample, and way between the halves of a dwell, at most [m]; how
-        many samples there must be. None asks for nothing; of a virtual device what is expected of it.
-    about
-        File that says what was measured with, and in what air (schema ``truearm-about/1``).
-    wait
-        End after so many seconds without a reading; None waits until all is measured, or Ctrl-C.
-    command
-        How to run it again, for the report; None writes the call in Python.
-    tell
-        Called with a line for each reading, and for what could not be read.
-    progress
-        Called with a few words at each step.
+class _Points(Names):
+    """Names of points, each once."""
 
-    Returns
-    -------
-    Measured
-        What is there, whether the plan was finished or not.
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse what are no names, or one twice."""
+        found = super().check(value, name)
+        given = [str(one) for one in value]
+        if len(given) > len(found):
+            twice = next(one for one in found if given.count(one) > 1)
+            raise InputError("a point is named twice", parameter=name, came=twice, cure="Name each once.")
+        for one in found:
+            if not is_one_line(one) or len(one) > _LONGEST_NAME or one != one.strip():
+                raise InputError(
+                    "a name belongs here",
+                    parameter=name,
+                    came=one,
+                    allowed=f"one line of up to {_LONGEST_NAME} characters",
+                )
+        return found
 
-    Raises
-    ------
-    InputError
-        If anything cannot be used, the folder holds the measuring of another plan, or the log cannot be written.
+
+class _Folder(File):
+    """A folder."""
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse what is none."""
+        if value == "":  # a variable of the shell that is not set
+            raise InputError("no folder is given", parameter=name, came=value)
+        return super().check(value, name)
+
+
+class _Token(Text):
+    """What a program sends first."""
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse what keeps nobody out."""
+        text = super().check(value, name)
+        fewest, most = _FEWEST_AND_MOST_OF_A_TOKEN
+        if not fewest <= len(text) <= most or not all(c.isascii() and (c.isalnum() or c in "-_") for c in text):
+            raise InputError(
+                "this is no token that keeps others out",
+                parameter=name,
+                allowed=f"{fewest} to {most} letters, digits, - and _",
+                cure="Leave it out: then one is made.",
+            )
+        return text
+
+
+class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
+    """Go through a plan with an instrument, reading by reading; run again, it goes on where it stopped.
+
+    Every reading is on disk before the next one is asked for, in the log readings.csv. It is kept or set aside for
+    reasons of the instrument alone: nothing here knows how well it fits. Ctrl-C stops it, and the result says what is
+    there, whether the plan was finished or not.
     """
-    progress_argument(progress)
-    if not callable(tell):
-        raise wrong_kind("a function belongs here", tell, "tell", "a function that takes a text")
-    patience = None if wait is None else finite_number(wait, "wait", lowest=0.0, allowed="seconds, 0 or more")
-    given: Asked = {
-        "device": device,
-        "truth": truth,
-        "noise": noise,
-        "seed": seed,
-        "disturbed": disturbed,
-        "drift": drift,
-        "payload": payload,
-        "constraints": constraints,
-        "watch": watch,
-        "mapping": mapping,
-        "listen": listen,
-        "token": token,
-        "targets": targets,
-        "nests": nests,
-        "every": every,
-        "most_deviation": most_deviation,
-        "most_settling": most_settling,
-        "fewest_samples": fewest_samples,
-        "about": about,
-    }
-    with open_campaign(plan, robot, out, **given, command=command) as campaign:
-        _begun(campaign, tell, told_token=token is None)
-        with _stopped_by_hand() as stopped:
-            last = time.monotonic()
-            while not campaign.session.done and not stopped():
-                step = campaign.session.next
-                if step is not None:
-                    progress(f"{step.number} of {step.of}: {step.label} {step.names[0]}, {campaign.source.waiting}")
-                turn = _TURN if patience is None else max(0.0, min(_TURN, patience - (time.monotonic() - last)))
-                entries = campaign.step(turn)
-                for line in campaign.source.told():
-                    tell(line)
-                for entry in entries:
-                    tell(entry.line())
-                if entries:
-                    last = time.monotonic()
-                elif patience is not None and time.monotonic() - last >= patience:
-                    break
-        progress("writing the measurements")
-        return campaign.finish()
+
+    job = "measure"
+    judged = False
+    refuses = (
+        "If anything cannot be used, the folder holds the measuring of another plan, or the log cannot be written."
+    )
+    out: str | Path = required(File("DIR"), "Folder for log, measurements and report.", kw_only=True, word="out")
+    device: str | None = option(
+        Text("NAME"),
+        "Readings of a virtual instrument ('truearm devices').",
+        default=None,
+        panel=_VIRTUAL,
+        shown=False,
+        more="It reads where targets are. A plan of which it can read nothing is refused.",
+    )
+    truth: Robot | str | Path | None = option(
+        TruthKind("NAME|FILE"),
+        "The twin that it measures, as for 'truearm simulate'.",
+        default=None,
+        shown="random",
+        panel=_VIRTUAL,
+    )
+    noise: float | None = option(
+        Number("mm", low=0.0, deviation=True),
+        "Of a coordinate: its standard deviation.",
+        default=None,
+        shown="the deviation of the device",
+        panel=_VIRTUAL,
+    )
+    seed: int | None = option(Whole("S"), "Of all draws.", default=None, shown="0", panel=_VIRTUAL)
+    disturbed: float | None = option(
+        Number(metavar="SHARE", low=0.0, high=0.9),
+        "Of readings that go wrong, up to 0.9.",
+        default=None,
+        shown="0",
+        panel=_VIRTUAL,
+        more="A share of them has a broken beam, an arm that still moves, or too much scatter.",
+    )
+    drift: float | None = option(
+        Number("mm", low=0.0), "How far the instrument moves till the end.", default=None, shown="0", panel=_VIRTUAL
+    )
+    constraints: str | Path | None = option(
+        File("FILE"), "Its boxes hide nests, as the arm does.", default=None, shown=False, panel=_VIRTUAL
+    )
+    watch: str | Path | None = option(
+        _Folder("DIR"),
+        "Readings from a folder into which software writes.",
+        default=None,
+        shown=False,
+        panel=_REAL,
+        more="It writes files, or rows at the end of files.",
+    )
+    mapping: str | Path | None = option(
+        File("MAPPING.yaml"),
+        "What the columns mean.",
+        default=None,
+        word="map",
+        shown=False,
+        panel=_REAL,
+        more="As for :func:`truearm.import_table`; the joint positions are the plan's, so that the entry ``joints`` "
+        "may be left out.",
+    )
+    listen: int | None = option(
+        Whole("PORT", high=65535),
+        "Readings from programs of this machine; 0: any free port.",
+        default=None,
+        shown=False,
+        panel=_REAL,
+        more="They send them to this port of 127.0.0.1.",
+    )
+    token: str | None = option(
+        _Token("TOKEN"),
+        "Which they send first.",
+        default=None,
+        shown="a new one",
+        panel=_REAL,
+        repeated=False,
+        more="That is told once.",
+    )
+    targets: Sequence[str] | None = option(
+        _Points(example="names of points", commas=False),
+        "Measured at each configuration.",
+        default=None,
+        word="target",
+        shown=False,
+        more="None: those of the device or robot, else those that the mapping fixes. A plan that says in its column "
+        "``reads`` which of them the instrument sees is followed.",
+    )
+    nests: Sequence[str] | None = option(
+        _Points(example="names of points", commas=False),
+        "Fixed point beside the robot.",
+        default=None,
+        word="nest",
+        shown=False,
+        more="They are measured at the start, along the way and at the end. None: the mapping's ``references``, or "
+        "none.",
+    )
+    every: int = option(Whole(low=1, high=10_000), "Configurations between two rounds of the nests.", default=10)
+    most_deviation: float | None = option(
+        Number("mm", low=0.0),
+        "Largest scatter of a sample.",
+        default=None,
+        shown="by the virtual device",
+        more="A real one is asked for nothing.",
+    )
+    most_settling: float | None = option(
+        Number("mm", low=0.0),
+        "Between the halves of a dwell.",
+        default=None,
+        shown="by the virtual device",
+        more="A real one is asked for nothing.",
+    )
+    fewest_samples: int | None = option(
+        Whole(low=1, high=1_000_000),
+        "Of a dwell.",
+        default=None,
+        shown="by the virtual device",
+        more="A real one is asked for nothing.",
+    )
+    about: str | Path | None = option(
+        File("ABOUT.yaml"),
+        "Serial numbers, reflector, air.",
+        default=None,
+        shown=False,
+        more="Of the schema ``truearm-about/1``.",
+    )
+    wait: float | None = option(
+        Number("s", metavar="SECONDS", low=0.0),
+        "End after so long without a reading.",
+        default=None,
+        shown="never",
+        more="None waits until all is measured, or Ctrl-C.",
+    )
+    tell: Callable[[str], None] = option(
+        Told(),
+        "Called with a line for each reading, and for what could not be read",
+        default=_silent,
+        word="",
+        repeated=False,
+    )
+
+    @property
+    def source(self) -> Source:
+        """Where readings come from."""
+        return next(source for source in _OF if getattr(self, source) is not None)
+
+    def check(self) -> None:
+        """Refuse no source or several, and what belongs to another one."""
+        given = [source for source in _OF if getattr(self, source) is not None]
+        belonging = [(of, name) for of, names in _OF.items() for name in names if getattr(self, name) is not None]
+        if belonging and not given:
+            of, name = belonging[0]
+            raise InputError(f"no {_CALLED[of]} is given, and `{name}` belongs to one", parameter=of, cure="Name it.")
+        if len(given) != 1:
+            raise InputError(
+                "readings come from one source" if given else "nobody says where readings come from",
+                parameter=", ".join(given) or "device, watch, listen",
+                allowed="a virtual device, a folder to watch, or a port to listen on",
+                cure="Keep one of them." if given else "Give one of them.",
+            )
+        for of, name in belonging:
+            if of != given[0]:
+                raise InputError(
+                    f"this belongs to `{of}`, and readings come from `{given[0]}`", parameter=name, cure="Leave it out."
+                )
+
+    def run(self) -> Measured:
+        """Measure."""
+        from truearm.measuring.measuring import measured
+
+        return measured(self)
 
 
-def _begun(campaign: OpenCampaign, tell: Callable[[str], None], *, told_token: bool) -> None:
-    from truearm.measuring.sources import HOST, Listener
-
-    session = campaign.session
-    if campaign.before:
-        tell(f"Going on after {campaign.before} entries of the log: {session.outstanding} readings are still to come.")
-    if isinstance(campaign.source, Listener):
-        said = f", token {campaign.source.token}" if told_token else ""
-        tell(f"Listening on {HOST} port {campaign.source.port}{said}")
+measure = job(Measure)
 
 
-@contextmanager
-def _stopped_by_hand() -> Iterator[Callable[[], bool]]:
-    """Tell whether Ctrl-C was pressed, instead of ending in the middle of a line; the second one ends at once."""
-    pressed = threading.Event()
+def open_campaign(plan: str | Path, robot: Robot | str | Path, out: str | Path, **asked: Any) -> OpenCampaign:
+    """Open the measuring of a plan; keywords as for :func:`truearm.measure`, and refusals."""
+    from truearm.measuring.open_campaign import opened
 
-    def press(number: int, frame: FrameType | None) -> None:
-        if pressed.is_set():
-            raise KeyboardInterrupt
-        pressed.set()
-
-    if threading.current_thread() is not threading.main_thread():
-        yield pressed.is_set
-        return
-    before = signal.signal(signal.SIGINT, press)
-    try:
-        yield pressed.is_set
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+    return opened(Measure(plan, robot, out=out, **asked))

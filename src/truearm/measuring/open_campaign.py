@@ -5,22 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, Unpack
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice, did_you_mean, is_one_line, refusals_of
-from truearm.engine.base.files import path_argument
-from truearm.engine.command.arguments import (
-    command_argument,
-    folder_for,
-    length_argument,
-    names_argument,
-    python_call,
-    robot_argument,
-    whole_argument,
-)
+from truearm.engine.base.errors import InputError, Notice, did_you_mean, refusals_of
+from truearm.engine.command.arguments import folder_for, robot_argument
 from truearm.engine.data.controller_joints import in_model_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.rows import Configurations
@@ -29,12 +20,9 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.measuring.begun import (
     BEGUN,
-    AskedOfSource,
     VirtualSource,
     begin,
-    listener,
     quality_of_device,
-    source_kind,
     virtual_source,
     watched_source,
 )
@@ -42,27 +30,15 @@ from truearm.measuring.campaign import Campaign
 from truearm.measuring.lines_of_sight import extent_notices, sight_notices
 from truearm.measuring.reading_log import LOG, About, read_about
 from truearm.measuring.result import DATA, PAGE, Measured
-from truearm.measuring.session import LONGEST_ROUND, MOST_SAMPLES, Quality, Session
+from truearm.measuring.session import Quality, Session
 from truearm.measuring.sources import Source
 
-_LONGEST_NAME: Final = 100
-#: Configurations between two rounds of the nests, where nothing is said.
-_EVERY: Final = 10
+if TYPE_CHECKING:
+    from truearm.measuring.measure import Measure
+
 #: Column of a plan that names what a device reads at a configuration, and what separates the names.
 _READS: Final = "reads"
 _BETWEEN: Final = "; "
-
-
-class Asked(AskedOfSource, total=False):
-    """What :func:`truearm.measure` is asked for of a plan; what is not named is None."""
-
-    targets: Sequence[str] | None
-    nests: Sequence[str] | None
-    every: int
-    most_deviation: float | None
-    most_settling: float | None
-    fewest_samples: int | None
-    about: str | Path | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,70 +145,82 @@ class _Said:
     command: str
 
 
-def open_campaign(
-    plan: str | Path, robot: Robot | str | Path, out: str | Path, *, command: str | None = None, **asked: Unpack[Asked]
-) -> OpenCampaign:
-    """Open the measuring of a plan; keywords as for :func:`truearm.measure`.
+def opened(asked: Measure) -> OpenCampaign:
+    """Open the measuring of a plan.
 
     Raises:
         InputError: If anything cannot be used, or the folder holds the measuring of another plan.
     """
-    if unknown := {*asked} - {*Asked.__annotations__, *AskedOfSource.__annotations__}:
-        raise TypeError(f"open_campaign() takes no keyword {sorted(unknown)[0]!r}")
-    path = path_argument(plan, "plan")
-    kind = source_kind(asked)
-    truth, mapping, about = asked.get("truth"), asked.get("mapping"), asked.get("about")
-    between = whole_argument(asked.get("every", _EVERY), "every", 1, LONGEST_ROUND)
-    call = command_argument(command) or _call(path, robot, out, {**asked, "every": between})
-    read = (path, robot, truth, mapping, about, asked.get("constraints"))
-    folder_for((LOG, BEGUN), out, *read)
-    folder = folder_for((DATA, PAGE), out, *read, ours=True)
-    nominal = robot_argument(robot)
+    path = Path(asked.plan)
+    read = (path, asked.robot, asked.truth, asked.mapping, asked.about, asked.constraints)
+    folder_for((LOG, BEGUN), asked.out, *read)
+    folder = folder_for((DATA, PAGE), asked.out, *read, ours=True)
+    nominal = robot_argument(asked.robot)
     with refusals_of("plan"):
         planned = _planned(path, nominal)
-    said = About() if about is None else _about(about)
-    targets, nests = _names(asked.get("targets"), "targets"), _names(asked.get("nests"), "nests")
-    quality = _quality(asked)
-    source: Source
-    virtual: VirtualSource | None = None
-    if kind == "device":
-        nests = nests or ()
-        virtual = virtual_source(asked, nominal, planned.joints, planned.before, nests)
-        source, known = virtual.source, tuple(target.name for target in virtual.placed.targets)
-        _refuse_unknown(targets, known)
-        quality = quality_of_device(
-            quality, source, *(asked.get(name) for name in ("most_deviation", "most_settling", "fewest_samples"))
-        )
-        instrument = f"a virtual {source.device.name} that measures a twin"
-    elif kind == "watch":
-        source = watched = watched_source(asked.get("watch"), mapping, planned.configurations.labels, folder)
-        instrument = f"files in {watched.folder}"
-        nests = tuple(watched.content.references) if nests is None else nests
-        known = tuple(name for name in watched.names or () if name not in nests)
-    else:
-        source = port = listener(asked.get("listen"), asked.get("token"))
-        nests, known, instrument = nests or (), (), f"lines sent to port {port.port}"
+    about = About()
+    if asked.about is not None:
+        with refusals_of("about"):
+            about = read_about(Path(asked.about))
+    of = _source(asked, nominal, planned, folder)
+    virtual = of.virtual
     try:
-        names = targets or (tuple(target.name for target in nominal.targets) if virtual is None else ()) or known
-        _refuse_names(names, nests)
-        session = Session(planned.configurations.labels, names, nests, between, quality, planned.reads_of(names))
+        own = tuple(one.name for one in nominal.targets) if virtual is None else ()
+        names = tuple(asked.targets or own or of.known)
+        _refuse_names(names, of.nests)
+        quality = Quality(asked.most_deviation, asked.most_settling, asked.fewest_samples or 1)
         sighted: tuple[Notice, ...] = ()
         if virtual is not None:
+            quality = quality_of_device(asked, virtual.source)
+        session = Session(planned.configurations.labels, names, of.nests, asked.every, quality, planned.reads_of(names))
+        if virtual is not None:
             sighted = sight_notices(session, virtual.source.device, virtual.placed, planned.joints)
-        begin(folder, planned.begun, nominal, session, None if virtual is None else virtual.entries, said)
+        begin(folder, planned.begun, nominal, session, None if virtual is None else virtual.entries, about)
         return OpenCampaign(
             session,
-            source,
+            of.source,
             folder,
             robot=nominal,
             placed=None if virtual is None else virtual.placed,
             plan=planned,
-            said=_Said(said, instrument, call),
+            said=_Said(about, of.instrument, asked.again),
             sighted=sighted,
         )
     except BaseException:
-        source.close()
+        of.source.close()
         raise
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """A source of readings."""
+
+    source: Source
+    virtual: VirtualSource | None  #: Of a virtual instrument.
+    nests: tuple[str, ...]
+    known: tuple[str, ...]  #: Targets that it knows.
+    instrument: str  #: What it is, in words.
+
+
+def _source(asked: Measure, nominal: Robot, planned: _Plan, folder: Path) -> _Opened:
+    """Open where readings come from."""
+    nests = None if asked.nests is None else tuple(asked.nests)
+    if asked.source == "device":
+        virtual = virtual_source(asked, nominal, planned.joints, planned.before, nests or ())
+        known = tuple(target.name for target in virtual.placed.targets)
+        _refuse_unknown(asked.targets, known)
+        words = f"a virtual {virtual.source.device.name} that measures a twin"
+        return _Opened(virtual.source, virtual, nests or (), known, words)
+    if asked.source == "watch":
+        watched = watched_source(asked, planned.configurations.labels, folder)
+        nests = tuple(watched.content.references) if nests is None else nests
+        known = tuple(name for name in watched.names or () if name not in nests)
+        return _Opened(watched, None, nests, known, f"files in {watched.folder}")
+    from truearm.measuring.sources import Listener
+
+    assert asked.listen is not None
+    port = Listener(asked.listen, asked.token)
+    return _Opened(port, None, nests or (), (), f"lines sent to port {port.port}")
 
 
 def sight(campaign: OpenCampaign) -> Sight | None:
@@ -260,14 +248,6 @@ def sight(campaign: OpenCampaign) -> Sight | None:
         campaign.source.visible(step.configuration),
         np.array([name in step.names for name in names]),
     )
-
-
-def _call(plan: Path, robot: object, out: object, asked: Asked) -> str:
-    """Return the call that does the same, without the token: it stands in no file."""
-    said = {name: value for name, value in asked.items() if name != "token"}
-    if said["every"] == _EVERY:
-        del said["every"]
-    return python_call("measure", plan, robot, out=out, **said)
 
 
 # -- what was asked for ----------------------------------------------------------------------------------------
@@ -306,40 +286,6 @@ def _planned(path: Path, robot: Robot) -> _Plan:
         reads,
         None if before is None else in_model_joints(robot, before).joints,
     )
-
-
-def _about(about: object) -> About:
-    path = path_argument(about, "about")
-    with refusals_of("about"):
-        return read_about(path)
-
-
-def _quality(asked: Asked) -> Quality:
-    deviation, settling, samples = (asked.get(n) for n in ("most_deviation", "most_settling", "fewest_samples"))
-    return Quality(
-        None if deviation is None else length_argument(deviation, "most_deviation", 0.0),
-        None if settling is None else length_argument(settling, "most_settling", 0.0),
-        1 if samples is None else whole_argument(samples, "fewest_samples", 1, MOST_SAMPLES),
-    )
-
-
-def _names(names: object, parameter: str) -> tuple[str, ...] | None:
-    if names is None:
-        return None
-    found = names_argument(names, parameter, "names of points")
-    given = [str(name) for name in names]  # type: ignore[attr-defined]
-    if len(given) > len(found):
-        twice = next(name for name in found if given.count(name) > 1)
-        raise InputError("a point is named twice", parameter=parameter, came=twice, cure="Name each once.")
-    for name in found:
-        if not is_one_line(name) or len(name) > _LONGEST_NAME or name != name.strip():
-            raise InputError(
-                "a name belongs here",
-                parameter=parameter,
-                came=name,
-                allowed=f"one line of up to {_LONGEST_NAME} characters",
-            )
-    return found
 
 
 def _refuse_unknown(targets: Sequence[str] | None, known: Sequence[str]) -> None:

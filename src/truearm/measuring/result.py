@@ -76,6 +76,10 @@ class Measured(Record):
         """Names of the files that are written: none before a reading of a target is kept."""
         return () if self.data is None else (DATA, PAGE)
 
+    def written_at(self, out: str) -> str:
+        """Return the line that says which files hold it; empty before a reading of a target is kept."""
+        return f"Written to {out}: {', '.join(self.files)}, and the log readings.csv" if self.files else ""
+
     def write(self) -> None:
         """Write measurements and report into the folder, if there are any."""
         from truearm.measuring.report import measure_report

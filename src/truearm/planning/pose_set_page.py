@@ -12,7 +12,7 @@ from truearm.engine.document.planning_figures import pose_cube
 from truearm.engine.motion.largest_cube import PosePlan
 
 if TYPE_CHECKING:
-    from truearm.planning.poses import PlannedPoses
+    from truearm.planning.posing import PlannedPoses
 
 
 def pose_set_page(poses: PlannedPoses) -> str:

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.units import as_number
-from truearm.engine.command.arguments import choice_argument, flag_argument, folder_for, numbers_argument
+from truearm.engine.command.arguments import folder_for, numbers_argument
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.programs import PROGRAM_LANGUAGES
 from truearm.engine.programs.joint_speeds import (
@@ -234,28 +234,21 @@ class ProgramWanted:
                 )
 
 
-def program_wanted(program: object, approach: object, speed: Any, dwell: object, wait: object) -> ProgramWanted | None:
+def program_wanted(
+    program: str | None, *, approach: bool, speed: Any, dwell: float | None, wait: str | None
+) -> ProgramWanted | None:
     """Return the program that was asked for; None for none.
 
     Raises:
-        InputError: If an argument is none, or is given and no program is asked for.
+        InputError: If the speed or the wait is none that it can have.
     """
-    from_below = flag_argument(approach, "approach")
     if program is None:
-        given = {"approach": from_below or None, "speed": speed, "dwell": dwell, "wait": wait}
-        for name, value in given.items():
-            if value is not None:
-                raise InputError(
-                    "this is said of a measuring program, and none is asked for",
-                    parameter=name,
-                    cure="State `program`, or leave it out.",
-                )
         return None
-    language = choice_argument(program, "program", PROGRAM_LANGUAGES)
+    language = PROGRAM_LANGUAGES[program]
     fast, share = _speed(speed)
     kind, signal, longest = _wait(wait, language)
-    driving = Driving(fast, share, _dwell(dwell), kind, signal, longest)
-    return ProgramWanted(str(program), language, driving, from_below)
+    driving = Driving(fast, share, Driving().dwell if dwell is None else dwell, kind, signal, longest)
+    return ProgramWanted(program, language, driving, approach)
 
 
 def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str = "", *, weighed: bool) -> Plan:
@@ -349,27 +342,13 @@ def _speed(value: Any) -> tuple[float, float]:
     return speed, share
 
 
-def _dwell(value: object) -> float:
-    if value is None:
-        return Driving().dwell
-    return _seconds(value, "dwell", "the robot stands in each configuration for a while", value)
-
-
-def _seconds(value: object, parameter: str, what: str, came: object) -> float:
-    allowed = f"above 0, up to {LONGEST_WAIT:g} s"
-    (seconds,) = numbers_argument([value], parameter, 1, allowed)
-    if not 0.0 < seconds <= LONGEST_WAIT:
-        raise InputError(what, parameter=parameter, came=came, allowed=allowed)
-    return seconds
-
-
-def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "operator"], str, float]:
+def _wait(value: str | None, language: Language) -> tuple[Literal["time", "input", "operator"], str, float]:
     longest = Driving().longest
     if value is None or value == "time":
         return "time", "", longest
     if value == "operator":
         return "operator", "", longest
-    if not isinstance(value, str) or not value.startswith("input "):
+    if not value.startswith("input "):
         raise InputError("there is no such wait", parameter="wait", came=value, allowed=_WAITS)
     name, comma, time = (part.strip() for part in value.removeprefix("input ").partition(","))
     if not _INPUT.fullmatch(name):
@@ -391,7 +370,10 @@ def _wait(value: object, language: Language) -> tuple[Literal["time", "input", "
         seconds = as_number(time.removesuffix("s").strip()) if time.endswith("s") else None
         if seconds is None:
             raise InputError("this is no time", parameter="wait", came=time, allowed="input 3,300s")
-        longest = _seconds(seconds, "wait", "an input is waited for a while", time)
+        longest = seconds
+        if not 0.0 < longest <= LONGEST_WAIT:
+            allowed = f"above 0, up to {LONGEST_WAIT:g} s"
+            raise InputError("an input is waited for a while", parameter="wait", came=time, allowed=allowed)
     return "input", name, longest
 
 

@@ -185,6 +185,14 @@ class Plan(Record):
             **self.program.files,
         }
 
+    def written_at(self, out: str) -> str:
+        """Return the line that says which files hold it."""
+        if self.program is not None:
+            return f"Written to {out}: {', '.join(self.contents())}"
+        file = Path(out)
+        ends = [PAGE, *([] if self.tour is None else ["-ways.csv", "-sheet.html"])]
+        return f"Written: {file}, {', '.join(str(file.with_name(file.stem + end)) for end in ends)}"
+
     def save(self, file: str | Path) -> tuple[Path, ...]:
         """Write the plan as CSV, a page with the same name that ends in ``.html``, and a driven one's ways and sheet.
 

@@ -13,7 +13,8 @@ from truearm.engine.base.errors import Notice, counted, listed
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
-from truearm.measuring.open_campaign import OpenCampaign, open_campaign, sight
+from truearm.measuring.measure import open_campaign
+from truearm.measuring.open_campaign import OpenCampaign, sight
 from truearm.measuring.result import DATA, GOES_ON, Measured
 from truearm.measuring.session import REASONS, Entry
 from truearm.measuring.sources import HOST, Listener

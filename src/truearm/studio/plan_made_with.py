@@ -9,7 +9,7 @@ from typing import Final
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.base.manifest import hash_of, sets_in
-from truearm.planning.plan import plan_inputs
+from truearm.planning.planned import plan_inputs
 from truearm.studio import words
 from truearm.studio.plan_fields import UNSAID
 from truearm.studio.planned import asked_by, cell_places

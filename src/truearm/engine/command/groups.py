@@ -13,6 +13,7 @@ from truearm.engine.command.kinds import (
     Choice,
     Doing,
     File,
+    Flag,
     Given,
     Gravity,
     Names,
@@ -24,6 +25,7 @@ from truearm.engine.command.kinds import (
     Positions,
     Text,
     Told,
+    TruthKind,
     Whole,
     WrenchKind,
 )
@@ -64,6 +66,17 @@ class OfRobot(Request):
     """Which robot."""
 
     robot: Robot | str | Path = required(Given("ROBOT"), "A library id, a robot file or a URDF.", kw_only=False)
+
+
+class OfPlan(Request):
+    """Which plan."""
+
+    plan: str | Path = required(
+        File("PLAN.csv"),
+        "Configurations, as 'truearm plan' writes them.",
+        kw_only=False,
+        more="In the order of measuring: ``configuration`` and ``joint_1 [deg]`` .. or ``axis_1 [deg]`` ..",
+    )
 
 
 class Measured(Request):
@@ -389,17 +402,83 @@ class Accepting(Request):
     )
 
 
-class InCell(Request):
-    """What stands in the cell."""
+class Constrained(Request):
+    """What configurations must keep."""
 
     constraints: Constraints | str | Path | None = option(
         Given("FILE"), "What a configuration must keep: boxes, limits of joints, a floor.", default=None, shown=False
     )
+
+
+class Clearing(Request):
+    """How much room is kept."""
+
     clearance: float | None = option(
         Number("mm", low=0.0),
         "Room that the arm keeps to floor, boxes and its own links, on the ways too.",
         default=None,
         shown="50 mm",
+    )
+
+
+class InCell(Constrained, Clearing):
+    """What stands in the cell."""
+
+
+class OnFloor(Request):
+    """Where the floor is."""
+
+    floor: float | None = option(
+        Number("mm"),
+        "Height of the floor in the base frame, kept clear.",
+        default=None,
+        shown="0; where the robot hangs, its mounting surface",
+        more="It is 0 or less. Where the robot's gravity says that it does not stand, only 0 is taken: the surface on "
+        "which it is mounted. With `clearance` it is kept by all that moves, as are boxes and the arm's own links: in "
+        "every configuration, and on the ways from the safe one to the first, on to each other and back.",
+    )
+    no_floor: bool = option(Flag(), "There is no floor and no mounting surface to keep clear.", default=False)
+
+
+class FromHome(Request):
+    """Where an arm starts and ends."""
+
+    home: Sequence[float] | str | None = option(
+        Positions("DEG,DEG,.."),
+        "The safe configuration to start and end in (mm if sliding), of the kind that is written.",
+        default=None,
+        shown="one is found",
+        more="That is a text; numbers are positions of the model [rad; m for prismatic joints].",
+    )
+
+
+class OfTruth(Request):
+    """What a simulated robot truly is, and whose joint positions its data hold."""
+
+    truth: Robot | str | Path = required(
+        TruthKind("NAME|FILE"),
+        "nominal, random, gear-errors, tooth-errors, a truth of the robot file ('truearm show'), or a file.",
+        kw_only=True,
+        word="truth",
+        more="``random``: geometry and joint zeros drawn from their priors; ``gear-errors``, ``tooth-errors``: the "
+        "same with errors of encoders and gears. A file, or a robot, has its own base, and its own targets if it has "
+        "some.",
+    )
+    joints: JointsOf = option(
+        Choice(known=("controller", "model")),
+        "Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
+        default="model",
+    )
+
+
+class AmongCandidates(Request):
+    """Among what configurations are chosen."""
+
+    candidates: int = option(Whole(low=1, counts=True), "Random configurations to choose from.", default=5000)
+    noise: float = option(
+        Number("mm", low=0.0, above=True, deviation=True),
+        "Standard deviation of a coordinate about a well identified model.",
+        default=1e-4,
     )
 
 

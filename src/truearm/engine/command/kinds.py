@@ -447,8 +447,33 @@ class WrenchKind(Given):
         return [value.text] if hasattr(value, "text") else Numbers().typed_again(value)
 
 
+class TruthKind(Given):
+    """What a robot truly is: a name, a file, or a robot."""
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse what is none of these."""
+        from truearm.engine.base.files import path_argument
+        from truearm.engine.robot.robot import Robot
+
+        if isinstance(value, Robot):
+            return value
+        if not isinstance(value, str | Path):
+            allowed = "nominal, random, gear-errors, tooth-errors, a truth's name, or a robot"
+            raise wrong_kind("a truth belongs here", value, name, allowed)
+        path_argument(value, name)
+        return value
+
+
 class Positions(Given):
-    """Joint positions as Python has them, or a text in deg and mm, which the job reads with the robot at hand."""
+    """Joint positions by the model, or a text in deg and mm: only with the robot it is known what that is."""
+
+    def check(self, value: Any, name: str) -> Any:
+        """Refuse a text without numbers; the job counts them."""
+        from truearm.engine.command.texts import read_numbers
+
+        if isinstance(value, str):
+            read_numbers(value, name, "0,-30,45, ..")
+        return value
 
     def typed_again(self, value: Any) -> list[str]:
         """Return a text; numbers are typed in units that only the robot knows."""

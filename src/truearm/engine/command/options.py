@@ -10,14 +10,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import replace
-from functools import wraps
+from functools import partial, wraps
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
 
 import typer
 from typer.core import TyperArgument, TyperCommand
 
-from truearm.engine.base.errors import InputError, printable, with_parameters, with_short_words
+from truearm.engine.base.errors import InputError, listed, printable, with_parameters, with_short_words
 from truearm.engine.command.kinds import ByFlags
 from truearm.engine.command.request import Option, Request, flag_of
 
@@ -205,32 +205,41 @@ def add(group: Commands, *requests: type[Request]) -> None:
         group.command(request.command_words().split()[-1])(command_of(request))
 
 
-def command_of(request: type[Request]) -> Callable[..., None]:
-    """Return the command of a request as Typer takes it: a function with an argument for each option."""
-    declared, instead = dict(request.options()), request.instead
+def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[..., None]:
+    """Return the command of a request as Typer takes it: a function with an argument for each option.
+
+    Args:
+        of_devices: Requests that are made instead for their devices. The command has the options of all.
+    """
+    instead, others = request.instead, {one.of_device: one for one in of_devices}
+    declared, owners = dict[str, Option](), dict[str, type[Request]]()
+    for one in (request, *others.values()):
+        for name, option in one.options():
+            declared.setdefault(name, option)
+            owners.setdefault(name, one)
 
     def run(**typed: Any) -> None:
-        as_json, details = typed.pop("json"), typed.pop("details")
-        wanted, given = request, _with_flags(typed, declared)
-        if instead is not None and given.pop(instead.job):
-            wanted, given = instead, _only_those(given, instead, declared)
-        options = dict(wanted.options())
-        given = {name: options[name].kind.read(value, name) for name, value in given.items() if value is not None}
+        as_json, details = typed.pop("json", False), typed.pop("details", True)
+        wanted, typed = others.get(typed.get("device", ""), request), _with_flags(typed, declared)
+        if instead is not None and typed.pop(instead.job):
+            wanted, typed = instead, _only_those(typed, instead, declared)
+        own = dict(wanted.options())
+        given = {name: own[name].kind.read(value, name) for name, value in _given_of(wanted, others, typed).items()}
         with (
-            progress() if "progress" in options else nullcontext() as say,
+            progress() if "progress" in own else nullcontext() as say,
             _shown_if_kept(as_json=as_json, details=details),
         ):
             asked = wanted(**given)
-            own = {"command": asked.as_command(), "progress": say}
-            result = replace(asked, **{name: value for name, value in own.items() if name in options}).run()
+            said = {"command": asked.as_command(), "progress": say, "tell": partial(print_line, err=as_json)}
+            result = replace(asked, **{name: value for name, value in said.items() if name in own}).run()
         _show(result, as_json=as_json, details=details)
         written = result.written_at(given["out"]) if "out" in given else ""
         if written and not as_json:
             print_line(written)
-        if not result.finished:
+        if wanted.judged and not result.finished:
             raise typer.Exit(3)
 
-    asked = [one for name in declared for one in _parameters(name, declared, request.default(name))]
+    asked = [one for name in declared for one in _parameters(name, declared, owners[name].default(name))]
     flags = [] if instead is None else [_flag_parameter(instead.job, instead.job, _headline(instead))]
     flags += [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
@@ -288,24 +297,50 @@ def _parameters(name: str, declared: Mapping[str, Option], default: Any) -> Iter
         yield _parameter(name, one, default, declared)
 
 
+def _given_of(request: type[Request], others: Mapping[str, type[Request]], typed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what was typed, by option; refuse options of the requests for other devices."""
+    context, own, device = _running.get(), dict(request.options()), typed.get("device")
+    given = {
+        name: value
+        for name, value in typed.items()
+        if value is not None
+        and (context is None or name not in context.params or _given(context, name))
+        and (name != "device" or name in own)
+    }
+    for name, value in given.items():
+        if name in own:
+            continue
+        if "device" not in own:
+            raise InputError(f"this says nothing for {device}", parameter=name, came=value, cure=f"Leave `{name}` out.")
+        of = [device for device, other in others.items() if name in dict(other.options())]
+        raise InputError(
+            f"this is said of {listed(of)} alone",
+            parameter=name,
+            came=value,
+            cure=f"Leave `{name}` out, or use `device={of[0]}`.",
+        )
+    return given
+
+
 def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, Option]) -> inspect.Parameter:
     """Return an option as an argument of a function that Typer reads."""
     kind, flag = declared.kind, flag_of(name, declared)
     metavar = declared.metavar or kind.metavar
     text = spelled_by(declared.help, others).replace("[", "\\[")
     if typing.get_origin(kind.typed) is list and not declared.is_argument:
-        text = f"{text.removesuffix('.')}; repeatable."
+        text = f"{text if text.endswith('...') else text.removesuffix('.')}; repeatable."
     if kind.at_edges and kind.at_edges.upper() not in metavar:
         text = f"{text.removesuffix('.')} \\[{kind.at_edges}]."
     typed = kind.typed
     if declared.is_argument:
-        how = typer.Argument(metavar=metavar, help=text, show_default=False)
+        shown: Any = declared.shown if isinstance(declared.shown, str) else False
+        how: Any = typer.Argument(metavar=metavar, help=text, show_default=shown)
     else:
         told = isinstance(declared.shown, str) or (declared.shown and default not in (None, ()))
-        shown: Any = declared.shown if told and not declared.needed else False
+        shown = declared.shown if told and not declared.needed else False
         shown = spelled_by(shown, others) if isinstance(shown, str) else shown
         only: dict[str, Any] = {} if typed is bool else {"metavar": metavar, "show_default": shown}
-        how = typer.Option(flag, help=text, **only)
+        how = typer.Option(flag, help=text, rich_help_panel=declared.panel, **only)
     given: Any
     if declared.needed:
         given = inspect.Parameter.empty
@@ -464,17 +499,3 @@ def refuse_pull(pull: float | None) -> None:
             came=pull,
             cure="Leave `pull` out, or use `device=inclinometers`.",
         )
-
-
-Ahead = Annotated[str, typer.Option(metavar="+x|-x|+y|-y", help="Where the largest cube is searched.")]
-Nearest = Annotated[float, typer.Option(metavar="MM", help="How far ahead the largest cube begins.")]
-Floor = Annotated[float, typer.Option(metavar="MM", help="How high the largest cube begins.")]
-TargetName = Annotated[
-    str | None, typer.Option(metavar="NAME", help="What goes to the poses.", show_default="the flange")
-]
-TipText = Annotated[
-    str | None,
-    typer.Option(
-        metavar="X,Y,Z", help="What goes to the poses, in the flange frame \\[mm].", show_default="the flange"
-    ),
-]

@@ -37,6 +37,7 @@ class Option:
     needed: bool  #: Whether the command needs it.
     is_argument: bool  #: Whether it is an argument of the command, and no option.
     repeated: bool  #: Whether it belongs to how a result was made, so that it is said again with the command.
+    panel: str | None = None  #: Heading under which the help shows it.
 
     @property
     def in_command(self) -> bool:
@@ -56,14 +57,16 @@ def option(
     needed: bool = False,
     repeated: bool = True,
     kw_only: bool = True,
+    is_argument: bool = False,
+    panel: str | None = None,
 ) -> Any:
     """Declare an option with a default; arguments as in :class:`Option`.
 
     Args:
         kw_only: Whether Python takes it by its name alone; the command has another as an argument if it has no word.
     """
-    argument = not kw_only and word is None
-    made = Option(kind, help, metavar, word, shown, more, needed, is_argument=argument, repeated=repeated)
+    argument = is_argument or (not kw_only and word is None)
+    made = Option(kind, help, metavar, word, shown, more, needed, argument, repeated, panel)
     return field(default=default, kw_only=kw_only, metadata={"option": made})
 
 
@@ -96,6 +99,10 @@ class Request:
     words: ClassVar[str | None] = None
     #: What is done where its job is a flag of the command; it takes some of the same options alone.
     instead: ClassVar[type[Request] | None] = None
+    #: The device for which this is asked instead of the request that the command has else; empty for none.
+    of_device: ClassVar[str] = ""
+    #: Whether the command ends with exit code 3 where its result is not finished.
+    judged: ClassVar[bool] = True
     #: What the docstring says under Raises.
     refuses: ClassVar[str] = "For anything that cannot be used, with a message that says what to do."
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -157,6 +164,8 @@ class Request:
         arguments, words = list[str](), list[str]()
         for name, declared, value in self.given():
             flag = flag_of(name, declared)
+            if name == "out":
+                continue
             if declared.is_argument:
                 arguments += declared.kind.typed_again(value)
             elif isinstance(declared.kind, ByFlags):
@@ -169,7 +178,8 @@ class Request:
         out = dict(self.options()).get("out")
         writes = out is not None and (out.needed or getattr(self, "out", None) is not None)
         words += [flag_of("out", out), metavar_of(out)] if out is not None and writes else []
-        return shlex.join(["truearm", *self.command_words().split(), *arguments, *words])
+        device = ["--device", self.of_device] if self.of_device else []
+        return shlex.join(["truearm", *self.command_words().split(), *arguments, *device, *words])
 
     def __repr__(self) -> str:
         return self.as_python()
@@ -232,9 +242,9 @@ def _indented(text: str) -> str:
 def _entry(declared: Option, default: Any) -> str:
     """Return what the docstring says of an option."""
     unit = f" [{declared.kind.unit}]" if declared.kind.unit else ""
-    text = f"{declared.help.rstrip('.')}{unit}."
-    if declared.kind.allowed:
-        text += f" {declared.kind.allowed}."
+    text = f"{declared.help.removesuffix('.')}{unit}."
+    if allowed := declared.kind.allowed:
+        text += f" {allowed[0].upper()}{allowed[1:]}."
     if default is None and isinstance(declared.shown, str):
         text += f" None: {declared.shown}."
     return f"{text} {declared.more}".strip()

@@ -476,6 +476,10 @@ def python_call(job: str, /, *given: object, **keywords: object) -> str:
     return f"truearm.{job}({', '.join(words)})"
 
 
+#: So many numbers of an array are written out.
+_FEW: Final = 16
+
+
 def written_in_python(value: object) -> str:
     """Return a value as Python writes it, an object by the kind it is."""
     if isinstance(value, np.generic):
@@ -484,6 +488,8 @@ def written_in_python(value: object) -> str:
         return repr(str(value))
     if isinstance(value, Payload | Wrench):
         return repr(value.text)
+    if isinstance(value, np.ndarray) and value.ndim == 1 and len(value) <= _FEW:
+        value = value.tolist()
     if isinstance(value, list | tuple):
         words = ", ".join(written_in_python(entry) for entry in value)
         return f"[{words}]"

@@ -83,11 +83,11 @@ def test_output_in_an_old_encoding_and_warnings_of_libraries(tmp_path: Path) -> 
         (LIBRARY / "irb120.yaml").read_text("utf-8").replace("title: ABB", "title: 日本"), "utf-8"
     )
     script = (
-        "import sys, warnings\nimport truearm.robot_files.command as library\nfrom truearm.__main__ import main\n"
+        "import sys, warnings\nfrom truearm.__main__ import main\n"
         f"sys.argv = ['truearm', 'show', {str(tmp_path / 'r.yaml')!r}]\n"
-        "import truearm.engine.command.loading as job\nright = job.load_robot\n"
+        "import truearm.robot_files.show as job\nright = job.robot_argument\n"
         "def warns(*given):\n    warnings.warn('overflow', RuntimeWarning)\n    return right(*given)\n"
-        "job.load_robot = warns\nmain()"
+        "job.robot_argument = warns\nmain()"
     )
     environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment)
@@ -141,7 +141,7 @@ def test_an_interrupted_run(truearm: Truearm, monkeypatch: pytest.MonkeyPatch) -
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("truearm.engine.command.loading.load_robot", interrupted)
+    monkeypatch.setattr("truearm.robot_files.show.robot_argument", interrupted)
     run = truearm("show", "irb120")
     assert (run.code, run.out, run.err) == (130, "", "")
 
@@ -161,7 +161,7 @@ def test_what_only_shows_while_running(
     def fails(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("truearm.engine.command.loading.load_robot", fails)
+    monkeypatch.setattr("truearm.robot_files.show.robot_argument", fails)
     run = truearm("show", "irb120")
     assert run.code == 2
     assert message in run.err
@@ -181,6 +181,6 @@ def test_a_fault_of_the_program_is_not_hidden(truearm: Truearm, monkeypatch: pyt
     def fails(*_: object) -> None:
         raise ValueError("a fault")
 
-    monkeypatch.setattr("truearm.engine.command.loading.load_robot", fails)
+    monkeypatch.setattr("truearm.robot_files.show.robot_argument", fails)
     with pytest.raises(ValueError, match="a fault"):
         truearm("show", "irb120")

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from truearm.compensation.advice import check_correction
-from truearm.compensation.jobs import TAUGHT_KIND
 from truearm.compensation.limit import (
     CorrectionLimit,
     check_size,
@@ -162,7 +161,7 @@ def _given(asked: Compensate) -> _Given:
         said, said_by = answers.controller_kinematics, "tools, frames"
     taught = asked.taught
     if taught is None and answers.taught is not None:
-        taught = TAUGHT_KIND.check(answers.taught, "taught")
+        taught = dict(asked.options())["taught"].kind.check(answers.taught, "taught")
     choice = Choice(
         joint_targets=asked.joint_targets == "correct",
         only=tuple(asked.only),

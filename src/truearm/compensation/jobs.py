@@ -34,10 +34,6 @@ if TYPE_CHECKING:
     from truearm.engine.robot.wrench import Wrench
 
 
-#: Every language at once.
-ALL = "all"
-
-
 def _taught() -> Collection[str]:
     from truearm.engine.programs.chosen_targets import TAUGHT
 
@@ -47,7 +43,7 @@ def _taught() -> Collection[str]:
 def _languages() -> Collection[str]:
     from truearm.engine.programs import BY_NAME
 
-    return [*BY_NAME, ALL]
+    return [*BY_NAME, "all"]
 
 
 @dataclass(frozen=True)
@@ -66,9 +62,6 @@ class TaughtKind(Names):
                 allowed=f"{none}, or some of {', '.join(some)}",
             )
         return named
-
-
-TAUGHT_KIND = TaughtKind("LIST", known=_taught, what="answer", repeated=False)
 
 
 class OfPrograms(Request):
@@ -177,7 +170,7 @@ class Compensate(
         Names(example="names of targets", commas=False), "Targets of this name or pattern stay.", default=()
     )
     taught: Sequence[str] | None = option(
-        TAUGHT_KIND,
+        TaughtKind("LIST", known=_taught, what="answer", repeated=False),
         "What was taught with this robot, and is right already: points, frames, tools, or none.",
         default=None,
         shown="as a cell file says, else asked",

@@ -21,7 +21,6 @@ from truearm.compensation.corrected_path import (
     correct_path,
     path_program,
 )
-from truearm.compensation.jobs import ALL
 from truearm.compensation.limit import (
     CorrectionLimit,
     check_size,
@@ -230,7 +229,7 @@ _FAR = 0.02e-3
 
 def follow(asked: FollowPath) -> FollowedPath:
     """Follow a path, correct it, and write what was asked for."""
-    chosen = [BY_NAME[one] for one in (BY_NAME if ALL in asked.programs else asked.programs)]
+    chosen = [BY_NAME[one] for one in (BY_NAME if "all" in asked.programs else asked.programs)]
     inputs = (asked.robot, asked.file, *kinematics_file(asked.controller_kinematics))
     folder = None
     if asked.out is not None:

@@ -372,12 +372,6 @@ def _text(value: object, parameter: str, what: str) -> str:
     raise wrong_kind(f"{what} belongs here", value, parameter, "a text")
 
 
-def progress_argument(progress: object) -> None:
-    """Refuse what cannot be called with a few words."""
-    if not callable(progress):
-        raise wrong_kind("a function belongs here", progress, "progress", "a function that takes a text")
-
-
 def executor_argument(executor: object) -> Executor | None:
     """Return who does parts of work; None for None."""
     if executor is None or isinstance(executor, Executor):
@@ -469,11 +463,8 @@ def paths_argument(paths: object, parameter: str, what: str) -> list[Path]:
     return [path_argument(path, parameter) for path in paths]
 
 
-def python_call(job: str, /, *given: object, **keywords: object) -> str:
-    """Return the call of a job in Python, objects by the kind they are; keywords that are None are left out."""
-    words = [written_in_python(value) for value in given]
-    words += [f"{name}={written_in_python(value)}" for name, value in keywords.items() if value is not None]
-    return f"truearm.{job}({', '.join(words)})"
+#: So many numbers of an array are written out.
+_FEW: Final = 16
 
 
 def written_in_python(value: object) -> str:
@@ -484,6 +475,8 @@ def written_in_python(value: object) -> str:
         return repr(str(value))
     if isinstance(value, Payload | Wrench):
         return repr(value.text)
+    if isinstance(value, np.ndarray) and value.ndim == 1 and len(value) <= _FEW:
+        value = value.tolist()
     if isinstance(value, list | tuple):
         words = ", ".join(written_in_python(entry) for entry in value)
         return f"[{words}]"

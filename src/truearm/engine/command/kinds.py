@@ -465,15 +465,7 @@ class TruthKind(Given):
 
 
 class Positions(Given):
-    """Joint positions by the model, or a text in deg and mm: only with the robot it is known what that is."""
-
-    def check(self, value: Any, name: str) -> Any:
-        """Refuse a text without numbers; the job counts them."""
-        from truearm.engine.command.texts import read_numbers
-
-        if isinstance(value, str):
-            read_numbers(value, name, "0,-30,45, ..")
-        return value
+    """Joint positions by the model, or a text in deg and mm: the job reads it with the robot at hand."""
 
     def typed_again(self, value: Any) -> list[str]:
         """Return a text; numbers are typed in units that only the robot knows."""

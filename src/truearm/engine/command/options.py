@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import inspect
 import json
-import shlex
 import typing
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import replace
-from functools import partial, wraps
+from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from typer.core import TyperArgument, TyperCommand
@@ -22,7 +21,6 @@ from truearm.engine.command.kinds import ByFlags
 from truearm.engine.command.request import Option, Request, flag_of
 
 if TYPE_CHECKING:
-    from truearm.engine.base.errors import Notice
     from truearm.engine.document.records import Record
 
 
@@ -30,9 +28,6 @@ C = TypeVar("C", bound=Callable[..., Any])
 
 #: The command that runs.
 _running: ContextVar[typer.Context | None] = ContextVar("_running", default=None)
-
-#: Parameters that say where results go or how they are printed: running again elsewhere is the same run.
-_OUTPUT = ("out", "replace", "details", "json", "token")
 
 
 class CommandError(Exception):
@@ -95,26 +90,6 @@ def spelled(text: str) -> str:
     return with_parameters(text, one)
 
 
-def command_line() -> str:
-    """Return the running command as it can be typed again: what was given, and a place for where results go."""
-    context = _running.get()
-    if context is None:
-        return ""
-    words, end = context.command_path.split(), list[str]()
-    for parameter in context.command.params:
-        name, value = parameter.name or "", context.params.get(parameter.name or "")
-        if isinstance(parameter, TyperArgument):
-            words += map(str, value if isinstance(value, list | tuple) else [value])
-        elif name in _OUTPUT:
-            end = [max(parameter.opts, key=len), str(parameter.metavar)] if name == "out" else end
-        elif value is True and _given(context, name):
-            words.append(max(parameter.opts, key=len))
-        elif value is not None and value is not False and _given(context, name):
-            for entry in value if isinstance(value, list | tuple) else [value]:
-                words += [max(parameter.opts, key=len), str(entry)]
-    return shlex.join([*words, *end])
-
-
 def _given(context: typer.Context, name: str) -> bool:
     source = context.get_parameter_source(name)
     return source is not None and source.name != "DEFAULT"
@@ -136,16 +111,6 @@ def _option(name: str) -> str:
         if parameter.name == name:
             return max(parameter.opts, key=len)
     return f"--{name.replace('_', '-')}"
-
-
-def by_device(command: C, others: Mapping[str, Callable[..., None]]) -> C:
-    """Return a command that leaves some devices, by their names, to other functions with the same parameters."""
-
-    @wraps(command)
-    def chosen(**given: Any) -> None:
-        others.get(given["device"], command)(**given)
-
-    return cast("C", chosen)
 
 
 # What commands print: results on standard output, progress on standard error.
@@ -171,14 +136,6 @@ def progress() -> Iterator[Callable[[str], None]]:
         return
     with console.status("starting") as status:
         yield lambda words: status.update(Text(with_short_words(printable(words))))
-
-
-def end_on_error(notices: Iterable[Notice]) -> None:
-    """End with exit code 3 if a notice says that the result should not be used as it is."""
-    from truearm.engine.base.errors import has_error
-
-    if has_error(notices):
-        raise typer.Exit(3)
 
 
 def print_record(record: Record, *, details: bool = True) -> None:
@@ -378,124 +335,3 @@ def _show(result: Any, *, as_json: bool, details: bool) -> None:
         print_json(result.as_json())
     else:
         print_record(result, details=details)
-
-
-# Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), and notes.
-PayloadText = Annotated[
-    str | None,
-    typer.Option(
-        "--payload",
-        metavar="MASS,X,Y,Z",
-        help='What the flange carries, with its centre of gravity in the flange frame: "2.7kg,50mm,25mm,100mm".',
-        show_default="as the robot file says",
-    ),
-]
-GravityText = Annotated[
-    str | None,
-    typer.Option(
-        "--gravity",
-        metavar="X,Y,Z",
-        help="Free fall in the robot's base frame \\[m/s^2], 0,0,9.81 for a robot that hangs.",
-        show_default="as the robot file says",
-    ),
-]
-WrenchText = Annotated[
-    str | None,
-    typer.Option(
-        "--wrench",
-        metavar="FX,FY,FZ,MX,MY,MZ",
-        help="What acts on the tool besides weight: a force \\[N] at its point and a moment \\[N m], or with units: "
-        '"0N,0N,80N,0Nm,0Nm,1.5Nm".',
-        show_default="nothing",
-    ),
-]
-WrenchFrameText = Annotated[
-    str | None,
-    typer.Option(
-        "--wrench-frame",
-        metavar="base|tool|world|controller",
-        help="Whose axes --wrench is given in.",
-        show_default="base",
-    ),
-]
-NoteTexts = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--note",
-        metavar="KEY=VALUE",
-        help="What the result shall say beside the figures: date, serial, operator, instrument, ...; repeatable.",
-        show_default=False,
-    ),
-]
-
-Pull = Annotated[
-    float | None,
-    typer.Option(
-        metavar="N",
-        min=0.0,
-        help="Of a string or weight on the flange under which inclinometers are read; 0: gravity alone.",
-        show_default="20",
-    ),
-]
-JointsText = Annotated[
-    str | None,
-    typer.Option(
-        "--joints",
-        metavar="controller|model",
-        help="Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
-        show_default="the controller's where the robot file says that they differ",
-    ),
-]
-
-
-def read_notes(texts: list[str] | None) -> dict[str, str] | None:
-    """Return the notes that texts such as ``serial=1234`` hold, None for None."""
-    if not texts:
-        return None
-    notes: dict[str, str] = {}
-    for text in texts:
-        name, given, said = text.partition("=")
-        if not given or name.strip() in notes:
-            what = "a note was given twice" if given else "a note is a name and a text"
-            raise InputError(what, parameter="notes", came=text, allowed="NAME=TEXT, such as serial=1234")
-        notes[name.strip()] = said
-    return notes
-
-
-def read_gravity(text: str | None) -> tuple[float, float, float] | None:
-    """Return the acceleration of free fall that a text names, None for None."""
-    from truearm.engine.base.units import as_number
-
-    if text is None:
-        return None
-    numbers = [as_number(part.strip()) for part in text.split(",")]
-    if len(numbers) != 3 or any(number is None for number in numbers):
-        raise InputError(
-            "three numbers belong here", parameter="gravity", came=text, allowed="0,0,-9.81 for a robot that stands"
-        )
-    x, y, z = (float(number) for number in numbers if number is not None)
-    return x, y, z
-
-
-def number_or(text: str | None) -> Any:
-    """Return a number where the text is one, else the text."""
-    try:
-        return text if text is None else int(text)
-    except ValueError:
-        return text
-
-
-def read_train(text: str | None) -> Any:
-    """Return a number where the text is one; the job refuses what is neither that nor all."""
-    return number_or(text)
-
-
-def refuse_pull(pull: float | None) -> None:
-    """Refuse a pull for devices that are not read under one."""
-    if pull is not None:
-        raise InputError(
-            "only inclinometers are read under a pull",
-            parameter="pull",
-            came=pull,
-            cure="Leave `pull` out, or use `device=inclinometers`.",
-        )

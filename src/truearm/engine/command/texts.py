@@ -36,14 +36,6 @@ def read_joints(text: str, robot: Robot, parameter: str) -> list[float]:
     return [to_si(value, unit) for value, unit in zip(numbers, units, strict=True)]
 
 
-def read_lengths(text: str, parameter: str) -> float | list[float]:
-    """Return lengths [m] of a text in mm, a single one as a number."""
-    from truearm.engine.base.units import sized_si
-
-    found = [sized_si(number, "mm", parameter=parameter) for number in read_numbers(text, parameter, "numbers in mm")]
-    return found[0] if len(found) == 1 else found
-
-
 def read_numbers(text: str, parameter: str, allowed: str) -> list[float]:
     """Return the numbers of a text in which commas separate them."""
     from truearm.engine.base.units import as_number

@@ -13,9 +13,12 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 Words = tuple[str, ...]
+#: Modules of functions that are called with the words of a command.
+RUNNING: Final = ("tests.commanding.", "tests.honesty.telling.")
 
 
 @dataclass
@@ -92,7 +95,7 @@ class Pruned:
         meant = Counter(name for name, _ in {*self.imported})  # what functions import under one name is looked at there
         self._known = {name: dotted for name, dotted in self.imported if "." not in name and meant[name] == 1}
         self._known |= {name.partition(".")[0]: name.partition(".")[0] for name, _ in self.imported if "." in name}
-        self._commanding = any(dotted.startswith("tests.commanding.") for _, dotted in self.imported)
+        self._commanding = any(dotted.startswith(RUNNING) for _, dotted in self.imported)
         self._docs = {
             id(node.body[0].value)
             for node in nodes
@@ -158,12 +161,14 @@ class Pruned:
             return any(gone.has(dotted) for _, dotted, _ in imported([node]))
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in self._docs:
             return gone.in_text(node.value)
+        if isinstance(node, ast.Subscript):
+            return _is_constant(node.value) and self._names(node.slice, gone)
         return isinstance(node, ast.Call | ast.List | ast.Tuple) and gone.called(self._words(node))
 
     def _names(self, entry: ast.AST, gone: Gone) -> bool:
         """Whether an entry of a registry names what is gone."""
-        if isinstance(entry, ast.Tuple):
-            return any(self._names(part, gone) for part in entry.elts)
+        if isinstance(entry, ast.Tuple | ast.Call):
+            return any(self._names(part, gone) for part in (entry.elts if isinstance(entry, ast.Tuple) else entry.args))
         return (
             self.registry
             and isinstance(entry, ast.Constant)
@@ -281,6 +286,10 @@ class Pruned:
 
 def _is_fixture(node: ast.FunctionDef) -> bool:
     return any("fixture" in ast.dump(one) for one in node.decorator_list)
+
+
+def _is_constant(node: ast.expr) -> bool:
+    return _dotted(node).rpartition(".")[2].isupper()
 
 
 def _keys(node: ast.expr | None) -> set[str]:

@@ -167,8 +167,9 @@ class Pruned:
 
     def _names(self, entry: ast.AST, gone: Gone) -> bool:
         """Whether an entry of a registry names what is gone."""
-        if isinstance(entry, ast.Tuple | ast.Call):
-            return any(self._names(part, gone) for part in (entry.elts if isinstance(entry, ast.Tuple) else entry.args))
+        if isinstance(entry, ast.Tuple | ast.Call | ast.Dict):
+            kind = "elts" if isinstance(entry, ast.Tuple) else "args" if isinstance(entry, ast.Call) else "values"
+            return any(self._names(part, gone) for part in getattr(entry, kind))
         return (
             self.registry
             and isinstance(entry, ast.Constant)

@@ -33,6 +33,7 @@ from tests.commanding import Truearm
 from tests.helper import FRICTION, turned
 SLOW = ("turn", "roll")
 CASES = (Case("turn", 1), Case("roll", 2))
+FILES = {"a": Case({"x": "turn"}), "b": Case({"x": "roll"})}
 @pytest.fixture
 def geared():
     return turned()
@@ -67,6 +68,7 @@ def test_what_uses_a_deleted_module_goes_and_nothing_else() -> None:
     assert test.written() == (
         "import pytest\nimport truearm\nfrom tests.commanding import Truearm\n"
         "from tests.helper import FRICTION\nSLOW = ('roll',)\nCASES = (Case('roll', 2),)\n"
+        "FILES = {'b': Case({'x': 'roll'})}\n"
         "@pytest.mark.parametrize('job', ['roll'])\ndef test_of_both(job):\n    assert FRICTION[job]  # of each\n"
         "def test_of_another():\n    turned = 3\n    truearm.roll(turned)\n"
     )

@@ -17,8 +17,8 @@ from typing import Final
 
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 Words = tuple[str, ...]
-#: Modules of functions that are called with the words of a command.
-RUNNING: Final = ("tests.commanding.", "tests.honesty.telling.")
+#: Modules of functions that take the words of a command, or run what stands in a list.
+RUNNING: Final = ("tests.commanding.", "tests.honesty.telling.", "truearm.commands.")
 
 
 @dataclass

@@ -96,6 +96,11 @@ class Pruned:
         self._known = {name: dotted for name, dotted in self.imported if "." not in name and meant[name] == 1}
         self._known |= {name.partition(".")[0]: name.partition(".")[0] for name, _ in self.imported if "." in name}
         self._commanding = any(dotted.startswith(RUNNING) for _, dotted in self.imported)
+        self._starting = {
+            _dotted(node.targets[0])
+            for node in nodes
+            if isinstance(node, ast.Assign) and isinstance(node.value, ast.List) and _last(node.value) == "truearm"
+        }
         self._docs = {
             id(node.body[0].value)
             for node in nodes
@@ -117,11 +122,15 @@ class Pruned:
     def _words(self, node: ast.Call | ast.List | ast.Tuple) -> list[object]:
         """Return the words of the command that a call or a list is, if it is one."""
         nodes = node.args if isinstance(node, ast.Call) else node.elts
-        words: list[object] = [n.value if isinstance(n, ast.Constant) else _dotted(n) for n in nodes]
+        words: list[object] = [n.value if isinstance(n, ast.Constant) else self._ends(n) or _dotted(n) for n in nodes]
         if "truearm" in words:
             return words[words.index("truearm") + 1 :]
         called = not isinstance(node, ast.Call) or isinstance(node.func, ast.Name)
         return words if called and self._commanding else []
+
+    def _ends(self, node: ast.AST) -> str:
+        """Return ``truearm`` where a list is put in that ends with it."""
+        return "truearm" if isinstance(node, ast.Starred) and _dotted(node.value) in self._starting else ""
 
     def touched(self, gone: Gone) -> bool:
         """Whether the file may use what is gone."""
@@ -287,6 +296,10 @@ class Pruned:
 
 def _is_fixture(node: ast.FunctionDef) -> bool:
     return any("fixture" in ast.dump(one) for one in node.decorator_list)
+
+
+def _last(node: ast.List) -> object:
+    return node.elts[-1].value if node.elts and isinstance(node.elts[-1], ast.Constant) else None
 
 
 def _is_constant(node: ast.expr) -> bool:

@@ -122,15 +122,16 @@ class Pruned:
     def _words(self, node: ast.Call | ast.List | ast.Tuple) -> list[object]:
         """Return the words of the command that a call or a list is, if it is one."""
         nodes = node.args if isinstance(node, ast.Call) else node.elts
-        words: list[object] = [n.value if isinstance(n, ast.Constant) else self._ends(n) or _dotted(n) for n in nodes]
+        words: list[object] = [n.value if isinstance(n, ast.Constant) else self._starts(n) for n in nodes]
         if "truearm" in words:
             return words[words.index("truearm") + 1 :]
         called = not isinstance(node, ast.Call) or isinstance(node.func, ast.Name)
         return words if called and self._commanding else []
 
-    def _ends(self, node: ast.AST) -> str:
-        """Return ``truearm`` where a list is put in that ends with it."""
-        return "truearm" if isinstance(node, ast.Starred) and _dotted(node.value) in self._starting else ""
+    def _starts(self, node: ast.AST) -> str | None:
+        """Return ``truearm`` where a list is put in that ends with it, or what is called so; no other name is a word."""
+        started = isinstance(node, ast.Starred) and _dotted(node.value) in self._starting
+        return "truearm" if started or _dotted(node) == "truearm" else None
 
     def touched(self, gone: Gone) -> bool:
         """Whether the file may use what is gone."""

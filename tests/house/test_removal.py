@@ -56,8 +56,9 @@ def test_in_a_text(): run("from truearm import turn")
 def test_inside():
     from truearm.gears import gear
 def test_of_another():
-    turned = 3
+    turned = gears = 3
     truearm.roll(turned)
+    print(gears, turned)
 """
 
 
@@ -73,7 +74,7 @@ def test_what_uses_a_deleted_module_goes_and_nothing_else() -> None:
         'COMMAND = ["python", "-m", "truearm"]\n'
         "FILES = {'b': Case({'x': 'roll'})}\n"
         "@pytest.mark.parametrize('job', ['roll'])\ndef test_of_both(job):\n    assert FRICTION[job]  # of each\n"
-        "def test_of_another():\n    turned = 3\n    truearm.roll(turned)\n"
+        "def test_of_another():\n    turned = gears = 3\n    truearm.roll(turned)\n    print(gears, turned)\n"
     )
     went = (
         "of_one",

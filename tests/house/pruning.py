@@ -129,7 +129,7 @@ class Pruned:
         return words if called and self._commanding else []
 
     def _starts(self, node: ast.AST) -> str | None:
-        """Return ``truearm`` where a list is put in that ends with it, or what is called so; no other name is a word."""
+        """Return ``truearm`` for what is called so, or a list put in that ends with it; no other name is a word."""
         started = isinstance(node, ast.Starred) and _dotted(node.value) in self._starting
         return "truearm" if started or _dotted(node) == "truearm" else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,35 +27,54 @@ Corruption = Callable[[Dataset, np.random.Generator], Dataset]
 SEEDS = range(3)
 
 
-@pytest.fixture(scope="module")
-def with_references(measured_data: Path) -> Dataset:
-    folder = measured_data / "irb120-faro"
+@cache
+def with_all_references(folder: Path) -> Dataset:
+    folder = folder / "irb120-faro"
     targets = {str(i): folder / f"target_{i}.txt" for i in (1, 2, 3)}
     references = {f"base_{i}": folder / f"base_{i}.txt" for i in (1, 2, 3)}
     return read_matrices(folder / "joints_commanded.txt", targets, references, "deg", "mm")[0]
 
 
-@pytest.fixture(scope="module")
-def measured(with_references: Dataset) -> Dataset:
+@cache
+def with_good_references(folder: Path) -> Dataset:
     """The measured IRB 120 with its reference points where all of these are good."""
-    points = with_references.references
+    data = with_all_references(folder)
+    points = data.references
     assert points is not None
     usual = [np.nanmedian(points.position[points.target == t], axis=0) for t in range(3)]
     off = np.linalg.norm(points.position - np.array(usual)[points.target], axis=1)
     bad = set(points.configuration[~(off < 1e-3)].tolist())
-    return with_references.of_configurations([c for c in range(500) if c not in bad])
+    return data.of_configurations([c for c in range(500) if c not in bad])
 
 
-#: Of faults, by the data that these are put into: every seed is tried twice, with another robot.
-SEEDS_OF = {"measured": SEEDS, "ur5": (0,), "kr5": (1,), "lrmate200ic": (2,)}
+@pytest.fixture(scope="module")
+def with_references(measured_data: Path) -> Dataset:
+    return with_all_references(measured_data)
 
 
-@pytest.fixture(scope="module", params=SEEDS_OF)
-def clean(request: pytest.FixtureRequest) -> tuple[str, Dataset]:
-    if request.param == "measured":
-        data: Dataset = request.getfixturevalue("measured")
-        return "irb120", data.of_configurations(range(0, data.configurations, 6))
+@pytest.fixture(scope="module")
+def measured(measured_data: Path) -> Dataset:
+    return with_good_references(measured_data)
+
+
+def thinned(request: pytest.FixtureRequest) -> tuple[str, Dataset]:
+    data = with_good_references(request.getfixturevalue("measured_data"))
+    return "irb120", data.of_configurations(range(0, data.configurations, 6))
+
+
+def simulated(request: pytest.FixtureRequest) -> tuple[str, Dataset]:
     return request.param, campaign(request.param, 40, 0.05e-3, 17)[1]
+
+
+#: Data without a fault, and what gives them with their robot.
+CLEAN = {"measured": thinned, "ur5": simulated, "kr5": simulated, "lrmate200ic": simulated}
+#: Of faults, by the robot into whose data these are put: every seed is tried twice, with another robot.
+SEEDS_OF = {"ur5": (0,), "kr5": (1,), "lrmate200ic": (2,)}
+
+
+@pytest.fixture(scope="module", params=CLEAN)
+def clean(request: pytest.FixtureRequest) -> tuple[str, Dataset]:
+    return CLEAN[request.param](request)
 
 
 def codes(data: Dataset, robot: str | None) -> set[str]:

@@ -315,7 +315,7 @@ def test_what_was_left_or_is_on_an_edge_is_said_with_its_file(truearm: Truearm, 
     ]
     text = program.read_text().replace("ENDMODULE", "\n".join(lines))
     program.write_text(text)
-    code, said = run(truearm, cell, "--accept", "skipped")
+    code, said = run(truearm, cell, "--accept", "skipped", "--details")
     assert code == 0
     number = next(i for i, line in enumerate(text.splitlines(), 1) if "[374,0,500]" in line)
     assert "Warning (targets-skipped): 1 target was left unchanged, as listed with the reason." in said

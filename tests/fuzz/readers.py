@@ -304,6 +304,6 @@ READERS: Final[Mapping[str, Reader]] = {
     "jbi-cell": _programs("jbi/cell", "main.jbi", "track.jbi"),
     "val3": _programs("val3/cell", "cell.pjx", "cell.dtx", "start.pgx", "pick.pgx"),
     "val3-points": _programs("val3", "points.dtx"),
-    "record": Reader({name: name for name in ("done.mod", "done.mod.truearm.json")}, _record),
+    "record": Reader({"done.mod": "done.mod", "done.mod.truearm.json": "done.mod.truearm.json"}, _record),
     "ledger": Reader({LEDGER: LEDGER}, _ledger),
 }

@@ -14,7 +14,20 @@ from pathlib import Path
 import numpy as np
 from tests.engine.data.test_fixture_rows import MIXED
 from tests.engine.data.test_table import JOINTS, POINTS, SPATIAL
-from tests.house.examples import EXAMPLES, performance_files
+from tests.house.examples import (
+    EXAMPLES,
+    FORCES,
+    PATH,
+    ROBODK,
+    calibrated,
+    cell,
+    corrected,
+    data_file,
+    joint_errors,
+    performance_files,
+    program,
+    table,
+)
 
 import truearm
 from truearm.engine.data.hexapod import poses, triangle
@@ -26,16 +39,6 @@ from truearm.hexapod.sheet import PlannedRow, sheet_csv
 
 PROGRAMS = Path(__file__).parents[1] / "engine" / "programs" / "samples"
 
-#: What its files are called here.
-PERFORMANCE = {
-    "plan.yaml": "performance.yaml",
-    "robot.yaml": "tested.yaml",
-    "poses.csv": "attained.csv",
-    "paths.csv": "along.csv",
-    "settling.csv": "settling.csv",
-    "forces.csv": "pushes.csv",
-    "alignment.yaml": "alignment.yaml",
-}
 CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 BOUNDS = """\
 truearm: truearm-bounds/1
@@ -169,24 +172,6 @@ def _workbook(path: Path) -> None:
     book.save(path)
 
 
-#: Jobs that write samples, and what else they write or use is called here.
-WRITING: dict[str, dict[str, str]] = {
-    "calibrate": {},
-    "import_table": {},
-    "import_matrices": {},
-    "import_robodk": {},
-    "import_circle": {},
-    "import_sockets": {},
-    "import_hand_eye": {},
-    "import_ros": {},
-    "axes": {},
-    "tolerance": {"axes/joint-errors.yaml": "joint-errors.yaml"},
-    "tilting": {},
-    "compensate": {"result/calibrated.yaml": "calibrated.yaml"},
-    "revert": {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"},
-    "path": {"result/calibrated.yaml": "calibrated.yaml"},
-    "sphere": {},
-}
 #: What samples hold that are nothing but a text.
 TEXTS = {
     "fixtures.csv": MIXED,
@@ -198,6 +183,9 @@ TEXTS = {
     "robots.csv": ROBOTS,
     "experiment.yaml": EXPERIMENT,
     "zones.yaml": ZONES,
+    "robodk.csv": ROBODK,
+    "path.yaml": PATH,
+    "forces.yaml": FORCES,
     "excluded.csv": "configuration,target,reason\n1,1,beam broken\n2,2,touched\n",
     "constraints.yaml": CONSTRAINTS,
     "cube.yaml": CUBE,
@@ -216,14 +204,12 @@ def folder() -> Path:
     """Return a folder with all of them, made once."""
     place = Path(tempfile.mkdtemp(prefix="truearm-fuzz-"))
     atexit.register(shutil.rmtree, place, ignore_errors=True)
-    for job, names in WRITING.items():
-        EXAMPLES[job](place)
-        _rename(place, names)
     remember(place / LEDGER, [LedgerEntry(program="plate.mod", date="2026-11-27", robot="irb120", targets="AAAAAAAA")])
     for name in ("irb120", "kr5"):
         (place / f"{name}.yaml").write_text((files("truearm.engine.robot.library") / f"{name}.yaml").read_text())
-    for make in MAKING:
-        make(place)
+    for name, make in MADE.items():
+        if not (place / name).exists():
+            make(place)
     for name, text in TEXTS.items():
         (place / name).write_text(text)
     # the same readings twice are refused
@@ -241,7 +227,7 @@ def _pose_set(place: Path) -> None:
 
 def _log(place: Path) -> None:
     truearm.measure(**EXAMPLES["measure"](place))
-    _rename(place, {"measured/readings.csv": "log.csv"})
+    shutil.copyfile(place / "measured" / "readings.csv", place / "log.csv")
 
 
 def _robots(place: Path) -> None:
@@ -263,17 +249,22 @@ def content(name: str) -> bytes:
     return path.read_bytes()
 
 
-def _rename(place: Path, names: dict[str, str]) -> None:
-    for old, new in names.items():
-        (place / new).write_bytes((place / old).read_bytes())
+def _corrected(place: Path) -> None:
+    """Write a corrected program and its record."""
+    program = corrected(place)
+    for path in program.parent.glob(f"{program.name}*"):
+        shutil.copyfile(path, place / path.name.replace(program.name, "done.mod"))
 
 
 def _performance(place: Path) -> None:
     """Write a plan of tests by ISO 9283 and what was read for it, few samples of each cycle."""
+    here = {"plan": "performance", "robot": "tested", "poses": "attained", "paths": "along", "forces": "pushes"}
     texts = performance_files()
     texts = texts | {name: _thinned(texts[name]) for name in ("paths.csv", "settling.csv")}
     for name, text in texts.items():
-        (place / PERFORMANCE[name]).write_text(text.replace("robot: robot.yaml", "robot: tested.yaml"))
+        path = Path(name)
+        text = text.replace("robot: robot.yaml", "robot: tested.yaml")
+        (place / path.with_stem(here.get(path.stem, path.stem))).write_text(text)
 
 
 def _thinned(text: str) -> str:
@@ -308,5 +299,45 @@ def _touches(place: Path) -> None:
     (place / "touches.csv").write_text("\n".join([header, *rows]) + "\n")
 
 
-#: What writes samples after all others.
-MAKING: tuple[Callable[[Path], None], ...] = (_log, _new_robot, _robots, _performance, _sheet, _touches)
+#: What makes a sample that is more than a text; some make several at once. A reader goes with its sample, and a sample
+#: with what makes it.
+MADE: dict[str, Callable[[Path], object]] = {
+    "data.csv": data_file,
+    "table.csv": table,
+    "mapping.yaml": table,
+    "joints.txt": EXAMPLES["import_matrices"],
+    "points.txt": EXAMPLES["import_matrices"],
+    "page.csv": EXAMPLES["import_circle"],
+    "page.png": EXAMPLES["import_circle"],
+    "sockets.csv": EXAMPLES["import_sockets"],
+    "views.csv": EXAMPLES["import_hand_eye"],
+    "cell.bag": EXAMPLES["import_ros"],
+    "axes.csv": EXAMPLES["axes"],
+    "inclinations.csv": EXAMPLES["tilting"],
+    "ballbar.csv": EXAMPLES["sphere"],
+    "cell.yaml": cell,
+    "plate.mod": program,
+    "calibrated.yaml": lambda place: shutil.copyfile(calibrated(place), place / "calibrated.yaml"),
+    "joint-errors.yaml": lambda place: shutil.copyfile(joint_errors(place), place / "joint-errors.yaml"),
+    "done.mod": _corrected,
+    "done.mod.truearm.json": _corrected,
+    "measured-plan.csv": _log,
+    "log.csv": _log,
+    "robot.yaml": _new_robot,
+    "calibration.conf": _robots,
+    "ur10-controller.yaml": _robots,
+    "ros-kinematics.yaml": _robots,
+    "arm.urdf": _robots,
+    "dh.csv": _robots,
+    "mdh.csv": _robots,
+    "hayati.csv": _robots,
+    "performance.yaml": _performance,
+    "tested.yaml": _performance,
+    "attained.csv": _performance,
+    "along.csv": _performance,
+    "settling.csv": _performance,
+    "pushes.csv": _performance,
+    "alignment.yaml": _performance,
+    "sheet.csv": _sheet,
+    "touches.csv": _touches,
+}

@@ -361,7 +361,8 @@ LIES: Final[dict[str, Lie]] = {
 @cache
 def said(command: str, data: Change, folder: Path) -> Told:
     file = written(folder, data(honest()[1]))
-    return told("check", "irb120", file) if command == "check" else told("calibrate", "irb120", file, "--out", folder)
+    out = () if command == "check" else ("--out", folder)
+    return told(command, "irb120", file, *out)
 
 
 @pytest.mark.parametrize("lie", LIES)

@@ -33,7 +33,7 @@ from truearm.iso9283.simulating.simulate import FILES as SIMULATED_FILES
 Arguments = dict[str, Any]
 
 
-def _data(folder: Path) -> Path:
+def data_file(folder: Path) -> Path:
     path = folder / "data.csv"
     if not path.exists():
         _, data = campaign("irb120", 20, 0.05e-3, 1)
@@ -50,7 +50,7 @@ def _recorded(folder: Path, name: str) -> Path:
     return path
 
 
-def _calibrated(folder: Path) -> Path:
+def calibrated(folder: Path) -> Path:
     return _recorded(folder, "result/calibrated.yaml")
 
 
@@ -84,6 +84,9 @@ tools:
 """
 
 
+ROBODK = "J1,J2,J3,J4,J5,J6,X,Y,Z,RX,RY,RZ,TX,TY,TZ,TRX,TRY,TRZ\n10,20,30,0,45,90,500,20,800,0,0,90,0,0,50,0,0,0\n"
+
+
 def _matrices(folder: Path) -> Arguments:
     joints = _written(folder / "joints.txt", "0 10 20 30 40 50\n5 10 25 30 45 50\n")
     points = _written(folder / "points.txt", "100 200 300\n0 0 0\n")
@@ -91,7 +94,7 @@ def _matrices(folder: Path) -> Arguments:
     return {"joints": joints, **names, "angle_unit": "deg", "length_unit": "mm"}
 
 
-def _table(folder: Path) -> Arguments:
+def table(folder: Path) -> Arguments:
     mapping = """\
 truearm: truearm-mapping/1
 length_unit: mm
@@ -155,7 +158,7 @@ def _axis_runs(folder: Path) -> Path:
     return path
 
 
-def _joint_errors(folder: Path) -> Path:
+def joint_errors(folder: Path) -> Path:
     return _recorded(folder, "axes/joint-errors.yaml")
 
 
@@ -193,11 +196,11 @@ def _touches() -> Arguments:
     return {"robot": "irb120", "touches": found.joints, "base": (0.3003, 0.3, 0.2996), "target": "1"}
 
 
-def _program(folder: Path) -> Path:
+def program(folder: Path) -> Path:
     return _recorded(folder, "plate.mod")
 
 
-def _cell(folder: Path) -> Path:
+def cell(folder: Path) -> Path:
     path = folder / "cell.yaml"
     path.write_text(
         "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
@@ -207,16 +210,16 @@ def _cell(folder: Path) -> Path:
     return path
 
 
-_FORCES = (
+FORCES = (
     "truearm: truearm-cell/1\nunits: {length: mm, angle: deg, force: N}\n"
     "wrenches:\n  - {targets: [pHole1], force: [0, 5, 0]}\n"
 )
 
 
-def _corrected(folder: Path) -> Path:
+def corrected(folder: Path) -> Path:
     path = folder / "corrected" / "plate.mod"
     if not path.exists():
-        compensate(_calibrated(folder), [_program(folder)], out=path.parent)
+        compensate(calibrated(folder), [program(folder)], out=path.parent)
     return path
 
 
@@ -261,11 +264,11 @@ MEASURED_PLAN += "".join(f"P{k},{10 * k},10,{5 * k},20,{30 - k},40\n" for k in r
 EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "load_robot": lambda _: {"robot": "irb120"},
     "show": lambda _: {"robot": "lrmate200ic", "joints": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "joints_are": "model"},
-    "load_data": lambda folder: {"data": _data(folder), "robot": "irb120"},
-    "check": lambda folder: {"robot": load_robot("irb120"), "data": _data(folder), "device": "tracker"},
+    "load_data": lambda folder: {"data": data_file(folder), "robot": "irb120"},
+    "check": lambda folder: {"robot": load_robot("irb120"), "data": data_file(folder), "device": "tracker"},
     "calibrate": lambda folder: {
         "robot": "irb120",
-        "data": _data(folder),
+        "data": data_file(folder),
         "model": "offsets",
         "train": 14,
         "seed": 1,
@@ -280,23 +283,24 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     },
     "tilting": lambda folder: {"robot": "katana450", "inclinations": _inclinations(folder)},
     "validate": lambda folder: {
-        "robot": _calibrated(folder),
-        "data": _data(folder),
+        "robot": calibrated(folder),
+        "data": data_file(folder),
         "wrench": "0N,5N,0N,0Nm,0Nm,0Nm",
         "wrench_frame": "world",
         "wrench_at": "1",
     },
-    "import_table": _table,
-    "import_guess": lambda folder: {"file": _table(folder)["file"], "out": _new(folder, "guessed.yaml")},
+    "import_table": table,
+    "import_guess": lambda folder: {"file": table(folder)["file"], "out": _new(folder, "guessed.yaml")},
     "import_matrices": _matrices,
     "import_robodk": lambda folder: {
-        "file": _written(
-            folder / "robodk.csv",
-            "J1,J2,J3,J4,J5,J6,X,Y,Z,RX,RY,RZ,TX,TY,TZ,TRX,TRY,TRZ\n10,20,30,0,45,90,500,20,800,0,0,90,0,0,50,0,0,0\n",
-        ),
+        "file": _written(folder / "robodk.csv", ROBODK),
         "angle_unit": "deg",
     },
-    "export_robodk": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "out": _new(folder, "r.csv")},
+    "export_robodk": lambda folder: {
+        "robot": calibrated(folder),
+        "data": data_file(folder),
+        "out": _new(folder, "r.csv"),
+    },
     "import_circle": _circle,
     "import_sockets": _sockets,
     "import_hand_eye": _views,
@@ -306,7 +310,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "robot": "ur10",
         "out": _new(folder, "ur10-controller.yaml"),
     },
-    "distances": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "payload": "1kg,0mm,0mm,50mm"},
+    "distances": lambda folder: {"robot": calibrated(folder), "data": data_file(folder), "payload": "1kg,0mm,0mm,50mm"},
     "plan": lambda _: {
         "robot": "irb120",
         "poses": 12,
@@ -331,7 +335,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "seed": 1,
     },
     "path": lambda folder: {
-        "robot": _calibrated(folder),
+        "robot": calibrated(folder),
         "file": _written(folder / "path.yaml", PATH),
         "seed": (0.0, 0.2, 0.4, 0.0, 0.9, 0.0),
         "programs": ["rapid", "krl"],
@@ -374,19 +378,19 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "robots": lambda _: {"text": "irb1200", "maker": "ABB", "axes": 6},
     "devices": lambda _: {},
     "axes": lambda folder: {"robot": "kr5", "data": _axis_runs(folder), "frame": "robot"},
-    "tolerance": lambda folder: {"robot": _joint_errors(folder), "depth": 0.05, "lean": (1e-5,) * 6, "position": 1e-4},
+    "tolerance": lambda folder: {"robot": joint_errors(folder), "depth": 0.05, "lean": (1e-5,) * 6, "position": 1e-4},
     "lines": lambda folder: {
         "robot": "kr5",
         "centre": (0.85, 0.0, 0.6),
         "size": (0.3, 0.4, 0.2),
-        "joint_errors": _joint_errors(folder),
+        "joint_errors": joint_errors(folder),
         "truth": "axis-tests",
         "noise": 1e-5,
         "repeats": 2,
     },
     "influence": lambda folder: {
         "robot": "irb120",
-        "data": _data(folder),
+        "data": data_file(folder),
         "model": "offsets",
         "train": 14,
         "target": "2",
@@ -426,19 +430,19 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     },
     "iso9283_evaluate": lambda folder: _performance(folder) | {"noise": 1e-5, "noise_rot": 1e-4},
     "compensate": lambda folder: {
-        "robot": _calibrated(folder),
-        "programs": [_program(folder)],
+        "robot": calibrated(folder),
+        "programs": [program(folder)],
         "out": folder / "compensated",
-        "tools": _cell(folder),
-        "frames": _cell(folder),
+        "tools": cell(folder),
+        "frames": cell(folder),
         "payload": "1kg,0mm,0mm,50mm",
-        "wrench": _written(folder / "forces.yaml", _FORCES),
+        "wrench": _written(folder / "forces.yaml", FORCES),
         "controller_kinematics": "nominal",
         "taught": ["none"],
         "split": 5e-5,
         "accept": ["not-better-here"],
     },
-    "revert": lambda folder: {"programs": [_corrected(folder)], "out": folder / "reverted"},
+    "revert": lambda folder: {"programs": [corrected(folder)], "out": folder / "reverted"},
     "convert": lambda folder: {"robot": "irb120", "convention": "hayati", "out": _new(folder, "hayati.yaml")},
     "export": lambda folder: {"robot": "irb120", "format": "hayati", "out": _new(folder, "hayati.csv")},
     "study": lambda folder: {"name": "irb120-simulation", "seeds": 1, "out": folder / "study"},

@@ -13,9 +13,12 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 Words = tuple[str, ...]
+#: Modules of functions that take the words of a command, or run what stands in a list.
+RUNNING: Final = ("tests.commanding.", "tests.honesty.telling.", "truearm.commands.")
 
 
 @dataclass
@@ -92,7 +95,12 @@ class Pruned:
         meant = Counter(name for name, _ in {*self.imported})  # what functions import under one name is looked at there
         self._known = {name: dotted for name, dotted in self.imported if "." not in name and meant[name] == 1}
         self._known |= {name.partition(".")[0]: name.partition(".")[0] for name, _ in self.imported if "." in name}
-        self._commanding = any(dotted.startswith("tests.commanding.") for _, dotted in self.imported)
+        self._commanding = any(dotted.startswith(RUNNING) for _, dotted in self.imported)
+        self._starting = {
+            _dotted(node.targets[0])
+            for node in nodes
+            if isinstance(node, ast.Assign) and isinstance(node.value, ast.List) and _last(node.value) == "truearm"
+        }
         self._docs = {
             id(node.body[0].value)
             for node in nodes
@@ -114,11 +122,16 @@ class Pruned:
     def _words(self, node: ast.Call | ast.List | ast.Tuple) -> list[object]:
         """Return the words of the command that a call or a list is, if it is one."""
         nodes = node.args if isinstance(node, ast.Call) else node.elts
-        words: list[object] = [n.value if isinstance(n, ast.Constant) else _dotted(n) for n in nodes]
+        words: list[object] = [n.value if isinstance(n, ast.Constant) else self._starts(n) for n in nodes]
         if "truearm" in words:
             return words[words.index("truearm") + 1 :]
         called = not isinstance(node, ast.Call) or isinstance(node.func, ast.Name)
         return words if called and self._commanding else []
+
+    def _starts(self, node: ast.AST) -> str | None:
+        """Return ``truearm`` for what is called so, or a list put in that ends with it; no other name is a word."""
+        started = isinstance(node, ast.Starred) and _dotted(node.value) in self._starting
+        return "truearm" if started or _dotted(node) == "truearm" else None
 
     def touched(self, gone: Gone) -> bool:
         """Whether the file may use what is gone."""
@@ -158,12 +171,15 @@ class Pruned:
             return any(gone.has(dotted) for _, dotted, _ in imported([node]))
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in self._docs:
             return gone.in_text(node.value)
+        if isinstance(node, ast.Subscript):
+            return _is_constant(node.value) and self._names(node.slice, gone)
         return isinstance(node, ast.Call | ast.List | ast.Tuple) and gone.called(self._words(node))
 
     def _names(self, entry: ast.AST, gone: Gone) -> bool:
         """Whether an entry of a registry names what is gone."""
-        if isinstance(entry, ast.Tuple):
-            return any(self._names(part, gone) for part in entry.elts)
+        if isinstance(entry, ast.Tuple | ast.Call | ast.Dict):
+            kind = "elts" if isinstance(entry, ast.Tuple) else "args" if isinstance(entry, ast.Call) else "values"
+            return any(self._names(part, gone) for part in getattr(entry, kind))
         return (
             self.registry
             and isinstance(entry, ast.Constant)
@@ -281,6 +297,14 @@ class Pruned:
 
 def _is_fixture(node: ast.FunctionDef) -> bool:
     return any("fixture" in ast.dump(one) for one in node.decorator_list)
+
+
+def _last(node: ast.List) -> object:
+    return node.elts[-1].value if node.elts and isinstance(node.elts[-1], ast.Constant) else None
+
+
+def _is_constant(node: ast.expr) -> bool:
+    return _dotted(node).rpartition(".")[2].isupper()
 
 
 def _keys(node: ast.expr | None) -> set[str]:

@@ -2,6 +2,8 @@
 
     python -m tests.house.removal [--whole] [FEATURE ...]
 
+Of the rest the quick tests of the registries are run, or with ``--whole`` all that are not slow.
+
 What goes: the folder of the feature, the folders that import it, their tests, and what names them in registries and
 other tests (:mod:`tests.house.pruning`). Of the studio and of the papers single files go, as long as enough is left.
 """
@@ -34,8 +36,8 @@ REGISTRIES: Final = ("truearm", "truearm.commands", "truearm.starting.command", 
 IN_PARTS: Final = {"truearm.studio": ("truearm.studio.command",), "papers": ("papers.study",)}
 #: What belongs to the papers and lies elsewhere: what runs them.
 OF_PAPERS: Final = ("truearm.starting.published", "truearm.starting.study", "truearm.starting.studying")
-#: Files of tests whose lists name jobs.
-LISTS: Final = ("tests/house/", "tests/fuzz/", "tests/honesty/", "tests/kill_every_job.py")
+#: Files whose lists name jobs or studies.
+LISTS: Final = ("papers/__init__.py", "tests/house/", "tests/fuzz/", "tests/honesty/", "tests/kill_every_job.py")
 #: Tests that go through the registries, and are quick; and those of the whole tree, which is not what is here.
 QUICK: Final = ("test_contract.py", "test_every_job.py", "test_package.py", "test_refusals.py", "test_slow.py")
 OF_THE_WHOLE: Final = ("tests/mutants", "tests/house/test_documents.py", "tests/house/test_removal.py")
@@ -240,7 +242,8 @@ def faults(copy: Path, gone: Gone, *, whole: bool) -> dict[str, str]:
         sys.stdout.write(f"    {name} {time.monotonic() - begun:.0f} s\n")
     ignored = [f"--ignore={name}" for name in OF_THE_WHOLE]
     begun = time.monotonic()
-    code, printed = pytest(copy, *ignored, "tests", *(() if whole else ("-m", "not slow", "-k", " or ".join(QUICK))))
+    which = ("-n", "auto", "--dist", "worksteal") if whole else ("-k", " or ".join(QUICK))
+    code, printed = pytest(copy, *ignored, "tests", "-m", "not slow", *which)
     if code:
         found["tests"] = printed[-6000:]
     sys.stdout.write(f"    tests {time.monotonic() - begun:.0f} s: {printed.splitlines()[-1]}\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from pathlib import Path
 
@@ -16,7 +17,7 @@ ROWS = [
     for number in range(1, count + 1)
 ]
 #: What runs until it is stopped, and is tested by clicking through it.
-CLICKED = {"U2": Path(__file__).parents[1] / "studio" / "test_story.py"}
+CLICKED = "U2"
 TABLE = re.compile(r"^\| (?P<row>[A-Z]\d+) \| (?P<what>[^|]+) \| [^|]+ \|(?P<command>[^|]*)\|(?P<page>[^|]*)\|$", re.M)
 LISTED = {match["row"]: match for match in TABLE.finditer(PAGE.read_text())}
 
@@ -33,18 +34,29 @@ def test_every_capability_is_listed_once() -> None:
     assert len(TABLE.findall(PAGE.read_text())) == len(ROWS) == 53
 
 
-@pytest.mark.parametrize("row", ROWS)
-def test_the_tests_run_its_command(row: str) -> None:
-    listed = LISTED[row]
-    commands = re.findall(r"`(truearm [^`]+)`", listed["command"])
+def shown(row: str) -> tuple[list[str], Path | None]:
+    """Return the commands of a capability, and the page of the guide that shows them; none of an open one."""
+    commands = re.findall(r"`(truearm [^`]+)`", LISTED[row]["command"])
     if not commands:
-        assert listed["what"].startswith("open: ")
-        return
-    (page,) = re.findall(r"\((guide/[a-z0-9-]+\.md)\)", listed["page"])
-    if row in CLICKED:
-        assert all(f"{command} " in (DOCS / page).read_text() for command in commands)
-        assert "serve(folder, port=0, demo=True" in CLICKED[row].read_text()
-        return
-    run = sessions(DOCS / page)
+        assert LISTED[row]["what"].startswith("open: ")
+        return [], None
+    (page,) = re.findall(r"\((guide/[a-z0-9-]+\.md)\)", LISTED[row]["page"])
+    return commands, DOCS / page
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if row != CLICKED])
+def test_the_tests_run_its_command(row: str) -> None:
+    commands, page = shown(row)
+    run = sessions(page) if page else []
     for command in commands:
         assert any(one.removeprefix("cd cell && ") == command for one in run), command
+
+
+def test_what_runs_until_it_is_stopped_is_clicked_through() -> None:
+    from tests.studio import test_story
+
+    commands, page = shown(CLICKED)
+    assert commands
+    assert page is not None
+    assert all(f"{command} " in page.read_text() for command in commands)
+    assert "serve(folder, port=0, demo=True" in inspect.getsource(test_story)

@@ -62,7 +62,7 @@ class Pressed:
             except KeyboardInterrupt:
                 raise {error}
 sys.meta_path.insert(0, Pressed())
-sys.argv = ["truearm", "show", "irb120"]
+sys.argv = "truearm show irb120".split()
 from truearm.__main__ import main
 main()
 """

@@ -32,6 +32,9 @@ import truearm
 from tests.commanding import Truearm
 from tests.helper import FRICTION, turned
 SLOW = ("turn", "roll")
+CASES = (Case("turn", 1), Case("roll", 2))
+COMMAND = ["python", "-m", "truearm"]
+FILES = {"a": Case({"x": "turn"}), "b": Case({"x": "roll"})}
 @pytest.fixture
 def geared():
     return turned()
@@ -47,12 +50,15 @@ def test_by_a_command(truearm): truearm("gears", "turn", "x")
 def test_by_words(truearm):
     for words in (["show", 1], ["gears", "turn"]):
         truearm(*words)
+def test_by_words_put_after_others(): run([*COMMAND, "gears", "turn"])
+def test_by_a_key(): FRICTION["turn"](1)
 def test_in_a_text(): run("from truearm import turn")
 def test_inside():
     from truearm.gears import gear
 def test_of_another():
-    turned = 3
+    turned = gears = 3
     truearm.roll(turned)
+    print(gears, turned)
 """
 
 
@@ -64,9 +70,21 @@ def test_what_uses_a_deleted_module_goes_and_nothing_else() -> None:
     assert helper.written() == ("from truearm.wheels.wheel import roll\nFRICTION = {'roll': lambda: roll(2)}\n")
     assert test.written() == (
         "import pytest\nimport truearm\nfrom tests.commanding import Truearm\n"
-        "from tests.helper import FRICTION\nSLOW = ('roll',)\n"
+        "from tests.helper import FRICTION\nSLOW = ('roll',)\nCASES = (Case('roll', 2),)\n"
+        'COMMAND = ["python", "-m", "truearm"]\n'
+        "FILES = {'b': Case({'x': 'roll'})}\n"
         "@pytest.mark.parametrize('job', ['roll'])\ndef test_of_both(job):\n    assert FRICTION[job]  # of each\n"
-        "def test_of_another():\n    turned = 3\n    truearm.roll(turned)\n"
+        "def test_of_another():\n    turned = gears = 3\n    truearm.roll(turned)\n    print(gears, turned)\n"
     )
-    went = ("of_one", "with_a_fixture", "by_the_package", "by_a_command", "by_words", "in_a_text", "inside")
+    went = (
+        "of_one",
+        "with_a_fixture",
+        "by_the_package",
+        "by_a_command",
+        "by_words",
+        "by_a_key",
+        "in_a_text",
+        "inside",
+        "by_words_put_after_others",
+    )
     assert sorted(gone.tests) == sorted(f"tests/house/test_gears.py::test_{name}" for name in went)

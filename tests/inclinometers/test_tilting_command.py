@@ -120,6 +120,7 @@ def test_inclinometers_are_planned_and_simulated(truearm: Truearm, tmp_path: Pat
         (("plan", "--poses", 8, "--model", "full"), "--model: this says nothing"),
         (("plan", "--poses", 8, "--program", "rapid"), "--program: this says nothing for inclinometers"),
         (("plan", "--poses", 8, "--approach"), "--approach: this says nothing for inclinometers"),
+        (("plan", "--poses", 8, "--floor", "5"), "--floor: the floor is above the base"),
         (("simulate", "--truth", "nominal", "--poses", 8, "--noise", 0.1), "--noise: this says nothing"),
         (("simulate", "--truth", "nominal", "--poses", 8, "--wrench", "1N,0N,0N,0Nm,0Nm,0Nm"), "--wrench: this says"),
     ],

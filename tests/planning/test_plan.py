@@ -146,7 +146,6 @@ def test_floor_room_and_home_of_the_command_line(truearm: Truearm, tmp_path: Pat
         (("--home", "0,0,0"), "--home: there are not as many numbers as joints"),
         (("--home", "0,100,0,0,0,0"), "--home: the safe configuration is not clear"),
         (("--home", "0,0,0,0,0,300"), "--home: joint 6 of the safe configuration is not where the plan keeps it"),
-        (("--device", "inclinometers", "--floor", "5"), "--floor: the floor is above the base"),
     ],
 )
 def test_what_cannot_be_driven_is_refused(

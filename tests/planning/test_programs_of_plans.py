@@ -103,7 +103,10 @@ def test_the_sheet_has_every_configuration_and_room_to_write(planned: Plan, fold
     page = (folder / "plan.html").read_text()
     assert "`" not in page.split("<main>")[1].split("</main>")[0]
     assert "give <code>noise</code> where you know better" in page
-    assert '<p class="notice warning"><strong>Warning (tool-assumed):</strong> Nobody said' in page
+    assert (
+        '<p class="notice warning" data-code="tool-assumed"><strong>Warning</strong> (tool-assumed): Nobody said'
+        in page
+    )
     assert len(sheet) < 60_000
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
 from tests.commanding import Truearm
 
+import papers
 from papers import STUDIES, irb120_simulation
 from papers.study import Study
 from truearm.engine.base.manifest import MANIFEST
@@ -52,12 +54,16 @@ def test_json_is_what_the_file_holds(truearm: Truearm, quick: None, tmp_path: Pa
     ("words", "said"),
     [
         (("irb120-sim",), "NAME: there is no study of this name"),
-        (("irb120-faro",), "--data: this study needs measured data"),
-        (("irb120-faro", "--data", "nowhere"), "a file of the measured data is missing"),
-        (("irb120-axes", "--data", "nowhere"), "--data: this study simulates its data; got 'nowhere'. Leave --data"),
+        (("irb120-simulation",), "--data: this study needs measured data"),
+        (("irb120-simulation", "--data", "nowhere"), "a file of the measured data is missing"),
+        (("li-table", "--data", "nowhere"), "--data: this study simulates its data; got 'nowhere'. Leave --data"),
     ],
 )
-def test_refusals(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], said: str) -> None:
+def test_refusals(
+    truearm: Truearm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], said: str
+) -> None:
+    needy = [replace(e, files=("joints.txt",)) if e.name == "irb120-simulation" else e for e in STUDIES]
+    monkeypatch.setattr(papers, "STUDIES", needy)
     run = truearm("study", *words, "--out", tmp_path)
     assert run.code == 2
     assert run.out == ""
@@ -66,4 +72,4 @@ def test_refusals(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], said
 
 
 def test_no_seed_is_refused(truearm: Truearm, tmp_path: Path) -> None:
-    assert truearm("study", "irb120-axes", "--seeds", "0", "--out", tmp_path).code == 2
+    assert truearm("study", "li-table", "--seeds", "0", "--out", tmp_path).code == 2

@@ -16,6 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 from websockets.typing import Subprotocol
 
+from truearm.studio.page import Page
 from truearm.studio.serving import Studio
 
 #: Headers of a browser that asks for a connection.
@@ -135,8 +136,9 @@ def shown(studio: Studio) -> str:
     return found
 
 
-def element(studio: Studio, label: str) -> str:
-    """Return the name by which messages call an element."""
+def element(studio: Studio, page: type[Page], label: str) -> str:
+    """Return the name by which messages call an element of a page."""
+    assert any(isinstance(one, page) for one in studio.window.pages)
     handles = studio.window.gui._gui_input_handle_from_uuid
     return next(name for name, handle in handles.items() if getattr(handle, "label", None) == label)
 

@@ -38,6 +38,8 @@ from truearm.engine.robot.transform import Transform
 from truearm.studio import gate as module
 from truearm.studio.access import Access, listening_socket
 from truearm.studio.gate import Gate, start_server
+from truearm.studio.pages.cell import CellPage
+from truearm.studio.pages.jog import JogPage
 from truearm.studio.project import PROJECT_FILE
 from truearm.studio.serving import Studio
 from truearm.studio.uploads import Uploads
@@ -118,7 +120,7 @@ def test_messages_that_no_window_sends_are_dropped(serving: Serving, kind: str) 
 def test_only_the_value_of_an_element_can_be_changed_and_to_one_that_it_offers(serving: Serving) -> None:
     said: list[str] = []
     studio = serving(say=said.append)
-    robot = element(studio, "Robot")
+    robot = element(studio, CellPage, "Robot")
     with window(studio) as line:
         working(studio, line)
         send(line, type="GuiUpdateMessage", uuid=robot, updates={"removed": True, "update_cb": []})
@@ -137,7 +139,7 @@ def test_a_name_that_is_typed_leads_nowhere_and_is_shown_as_it_is(serving: Servi
     studio = serving()
     with window(studio) as line:
         working(studio, line)
-        send(line, type="GuiUpdateMessage", uuid=element(studio, "File"), updates={"value": name})
+        send(line, type="GuiUpdateMessage", uuid=element(studio, JogPage, "File"), updates={"value": name})
         refused = "a table of configurations" if name.endswith("exe") else "no place in the project&#x27;s folder"
         assert eventually(lambda: refused in shown(studio))
     assert "<script>" not in shown(studio)
@@ -170,7 +172,7 @@ def test_values_of_no_kind_that_an_element_has_are_refused_and_harm_nothing(
                 send(line, type="GuiUpdateMessage", uuid=uuid, updates={"value": value})
 
         def chosen() -> bool:  # numbers that a job refuses are taken before, and hold this up
-            send(line, type="GuiUpdateMessage", uuid=element(studio, "Robot"), updates={"value": "kr5"})
+            send(line, type="GuiUpdateMessage", uuid=element(studio, CellPage, "Robot"), updates={"value": "kr5"})
             return studio.window.project.settings.robot == "kr5"
 
         assert eventually(chosen)
@@ -217,13 +219,14 @@ def test_a_script_in_the_name_of_a_target_or_fixture_stays_a_name(serving: Servi
     robot = robot.with_fixtures({name: ("point", Transform((0.2, 0.0, 0.1)))})
     (studio.window.project.folder / "arm.yaml").write_text(robot_text(robot))
     studio.window.edit(robot="arm.yaml")
-    assert "&lt;img" in shown(studio)
+    cell = next(page for page in studio.window.pages if isinstance(page, CellPage))
+    assert "&lt;img" in cell._about.content
     assert "<img" not in shown(studio)
 
 
 def test_a_second_window_reads_until_it_takes_over(serving: Serving) -> None:
     studio = serving()
-    robot = element(studio, "Robot")
+    robot = element(studio, CellPage, "Robot")
     with window(studio) as first, window(studio) as second:
         working(studio, first)
         send(second, **CAMERA)
@@ -248,7 +251,7 @@ def test_a_window_that_reads_shows_again_what_holds_and_bothers_nobody(serving: 
     said: list[str] = []
     studio = serving(say=said.append)
     handle = studio.window.server.scene.add_transform_controls("/tip", position=(0.1, 0.2, 0.3))
-    payload = element(studio, "Payload")
+    payload = element(studio, CellPage, "Payload")
     with window(studio) as first, window(studio) as second:
         working(studio, first)
         send(second, **CAMERA)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, notices
 
+from truearm.engine.base.errors import InputError
 from truearm.studio.pages.cell import CellPage
 from truearm.studio.project import PROJECT_FILE
 from truearm.studio.serving import Studio
@@ -35,13 +37,20 @@ def test_it_is_told_above_the_pages_until_they_show_it_and_among_the_notices_the
     assert warning(studio) == ""
 
 
-def test_a_page_that_cannot_be_shown_leaves_the_warning(serving: Serving) -> None:
+def test_a_page_that_cannot_be_shown_leaves_the_warning(serving: Serving, monkeypatch: pytest.MonkeyPatch) -> None:
     studio = serving()
-    file = studio.window.project.folder / "excluded.csv"
-    studio.window.edit({"excluded.csv": "configuration,target,reason\n"}, exclude="excluded.csv")
-    file.write_text("nothing of the kind\n")
+    (studio.window.project.folder / "a.csv").write_text("1")
+
+    def refused() -> None:
+        raise InputError("nothing of the kind")
+
+    monkeypatch.setattr(studio.window.pages[0], "refresh", refused)
     studio.window.refresh()
-    assert "excluded.csv (changed). Press reload" in warning(studio)
+    assert "nothing of the kind" in notices(studio.window)
+    assert "a.csv (new). Press reload" in warning(studio)
+    monkeypatch.undo()
+    studio.window.refresh()
+    assert warning(studio) == ""
 
 
 def test_what_is_changed_once_more_while_pages_are_shown_stays_told(serving: Serving) -> None:

@@ -151,9 +151,9 @@ def test_a_file_that_is_refused_is_so_below_the_button_that_takes_it(studio: Stu
     button: Any = page(studio, CellPage)._upload
     with window(studio) as line:
         working(studio, line)
-        upload(line, element(studio, button.label), "../a.csv", b"x", 1)
+        upload(line, element(studio, CellPage, button.label), "../a.csv", b"x", 1)
         assert eventually(lambda: "under this name" in below(studio.window, button))
-        upload(line, element(studio, button.label), "a.csv", b"x", 1)
+        upload(line, element(studio, CellPage, button.label), "a.csv", b"x", 1)
         assert eventually(lambda: below(studio.window, button) == "")
 
 

@@ -14,11 +14,15 @@ from tests.studio.talking import alive, element, eventually, is_closed, messages
 from websockets.exceptions import ConnectionClosed
 
 from truearm.studio import uploads as module
+from truearm.studio.pages.cell import CellPage
 from truearm.studio.project import PROJECT_FILE, open_project
 from truearm.studio.serving import Studio
 from truearm.studio.uploads import Uploads
 
-BUTTON = "Take a file into the project"
+
+def taking(studio: Studio) -> str:
+    """Return the button that takes files."""
+    return element(studio, CellPage, "Take a file into the project")
 
 
 def begin(line: Any, button: str, name: str, size: int, parts: int = 1) -> None:
@@ -64,7 +68,7 @@ def coming(studio: Studio) -> list[int]:
 def test_files_are_taken_in_and_those_too_large_are_refused_before_they_come(serving: Serving) -> None:
     said: list[str] = []
     studio = serving(say=said.append)
-    button = element(studio, BUTTON)
+    button = taking(studio)
     with window(studio) as line:
         working(studio, line)
         upload(line, button, "a.csv", b"one,two\n", 8)
@@ -96,7 +100,7 @@ def test_files_are_taken_in_and_those_too_large_are_refused_before_they_come(ser
 
 def test_a_file_of_many_parts_is_on_disk_as_it_comes_and_the_window_is_told_how_much(serving: Serving) -> None:
     studio = serving()
-    button = element(studio, BUTTON)
+    button = taking(studio)
     with window(studio) as line:
         working(studio, line)
         begin(line, button, "long.csv", 3_000, 300)
@@ -116,7 +120,7 @@ def test_a_file_that_is_refused_is_forgotten_by_the_window(serving: Serving) -> 
     studio = serving()
     with window(studio) as line:
         working(studio, line)
-        begin(line, element(studio, BUTTON), "huge.csv", 10**9, 2_000)
+        begin(line, taking(studio), "huge.csv", 10**9, 2_000)
         (told,) = messages_of(line, "FileTransferPartAck", until=lambda _: True)
     assert (told["transfer_uuid"], told["transferred_bytes"], told["total_bytes"]) == ("huge.csv", 0, 0)
 
@@ -126,7 +130,7 @@ def test_a_script_in_the_name_of_a_file_stays_a_name(serving: Serving) -> None:
     name = "<img src=x onerror=alert(1)>.csv"
     with window(studio) as line:
         working(studio, line)
-        upload(line, element(studio, BUTTON), name, b"x", 1)
+        upload(line, taking(studio), name, b"x", 1)
         assert eventually(lambda: "Taken into the project" in studio.window._notices.content)
         assert eventually(lambda: studio.window.project.names() == [name])
 
@@ -142,7 +146,7 @@ def test_another_size_than_was_announced_closes_the_connection(
     studio = serving(say=said.append)
     with window(studio) as line:
         working(studio, line)
-        upload(line, element(studio, BUTTON), "lie.csv", bytes(200_000), size, parts)
+        upload(line, taking(studio), "lie.csv", bytes(200_000), size, parts)
         assert is_closed(line)
     assert any(f"{said_of_it} than was announced" in text for text in said)
     assert coming(studio) == []
@@ -165,7 +169,7 @@ def test_a_file_that_the_page_would_not_send_closes_the_connection(serving: Serv
     studio = serving()
     with window(studio) as line:
         working(studio, line)
-        start: dict[str, Any] = {"type": "FileTransferStartUpload", "source_component_uuid": element(studio, BUTTON)}
+        start: dict[str, Any] = {"type": "FileTransferStartUpload", "source_component_uuid": taking(studio)}
         start |= {"transfer_uuid": "1", "filename": "a", "mime_type": "", "part_count": 1, "size_bytes": 8}
         send(line, **{**start, **changes})
         assert is_closed(line)
@@ -175,7 +179,7 @@ def test_a_file_that_the_page_would_not_send_closes_the_connection(serving: Serv
 
 def test_what_has_not_come_whole_is_removed_with_its_window_and_with_the_studio(serving: Serving) -> None:
     studio = serving()
-    button = element(studio, BUTTON)
+    button = taking(studio)
     for way in ("window", "studio"):
         with window(studio) as line:
             working(studio, line)
@@ -194,7 +198,7 @@ def test_so_many_files_come_at_once_and_those_that_have_stopped_make_room(
 ) -> None:
     said: list[str] = []
     studio = serving(say=said.append)
-    button = element(studio, BUTTON)
+    button = taking(studio)
     with window(studio) as line:
         working(studio, line)
         for name in "abcde":
@@ -217,9 +221,9 @@ def test_nothing_that_takes_no_file_is_sent_one_nor_is_one_taken_of_a_window_tha
     studio.window.gate.blocked = lambda _, why, message: blocked.append(why)
     with window(studio) as first, window(studio) as second:
         working(studio, first)
-        upload(first, element(studio, "Robot"), "a.csv", b"x", 1)
+        upload(first, element(studio, CellPage, "Robot"), "a.csv", b"x", 1)
         assert eventually(lambda: any("a file for nothing that takes files" in text for text in said))
-        upload(second, element(studio, BUTTON), "b.csv", b"x", 1)
+        upload(second, taking(studio), "b.csv", b"x", 1)
         assert eventually(lambda: any("this window only reads" in text for text in blocked))
     assert not any("only reads" in text for text in said)
     assert studio.window.project.names() == []
@@ -248,7 +252,7 @@ def test_a_full_disk_is_named(serving: Serving, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(Uploads, "_opened", full)
     with window(studio) as line:
         working(studio, line)
-        upload(line, element(studio, BUTTON), "a.csv", b"x", 1)
+        upload(line, taking(studio), "a.csv", b"x", 1)
         assert eventually(lambda: any("the file cannot be written (No space left on device)" in text for text in said))
     assert coming(studio) == []
     assert alive(studio)

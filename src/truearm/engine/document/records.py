@@ -113,10 +113,13 @@ def notice_lines(notices: Sequence[Notice]) -> list[str]:
 
 
 def first_screen(record: Record) -> list[str]:
-    """Return the lines of a result with its three gravest notices, and a line that counts the others."""
+    """Return the lines of a result with its three gravest notices, and a line that counts the others.
+
+    What goes to standard error, as what a file cannot hold, is told as a whole.
+    """
     notices = worst_first(getattr(record, "warnings", ()))
     rest = notices[_FIRST:]
-    if not rest:
+    if not rest or record.asides:
         return record.lines()
     hidden = notice_lines(rest)
     levels = Counter(notice.level for notice in rest)

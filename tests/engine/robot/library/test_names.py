@@ -104,10 +104,10 @@ def test_the_list_is_narrowed(given: dict[str, Any], found: list[str]) -> None:
     [
         ({"text": "irb12O"}, "text", "none of these robots is called so; got 'irb12O'. Did you mean irb120"),
         ({"text": ""}, "text", "Run 'truearm robots' for all"),
-        ({"text": 5}, "text", "a part of a name"),
+        ({"text": 5}, "text", "a name belongs here"),
         ({"maker": "Yaskava"}, "maker", "Did you mean Yaskawa"),
         ({"maker": "-"}, "maker", "allowed: ABB, "),
-        ({"maker": 5}, "maker", "a maker belongs here"),
+        ({"maker": 5}, "maker", "a name belongs here"),
         ({"axes": 0}, "axes", "1 or more"),
         ({"axes": 9}, "axes", "got 9; allowed: 3, "),
     ],

@@ -33,7 +33,7 @@ def simulate_tests(folder: Path, robot: str, plan: str, out: str, progress: Prog
     os.chdir(folder)
     with confined_reads(folder):
         made = done(SimulateTests(robot, plan, out=out, progress=progress, **given(options)))
-    return Outcome(tuple(made.lines()), (), tuple(made.written))
+    return Outcome(tuple(made.lines()), (), made.files())
 
 
 def evaluate_tests(folder: Path, plan: str, out: str, progress: Progress, **options: Any) -> Outcome:

@@ -12,7 +12,7 @@ from tests.simulated import campaign
 from tests.studio.conftest import Serving
 from tests.studio.pressing import act, at_once, notices
 
-from truearm.calibration import calibrate as following
+from truearm.calibration import calibrating as following
 from truearm.calibration.calibrate import calibrate
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.data.readers.canonical import csv_text

@@ -61,7 +61,7 @@ class _Folder(File):
 
     def check(self, value: Any, name: str) -> Any:
         """Refuse what is none."""
-        if value == "":  # a variable of the shell that is not set
+        if isinstance(value, str) and not value:  # a variable of the shell that is not set
             raise InputError("no folder is given", parameter=name, came=value)
         return super().check(value, name)
 

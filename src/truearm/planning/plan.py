@@ -221,7 +221,8 @@ class PlanPoses(
                 cure="Leave one of them out; `constraints` narrows the choice.",
             )
         for name in ("approach", "speed", "dwell", "wait") if self.program is None else ():
-            if getattr(self, name) not in (None, False):
+            given = getattr(self, name)
+            if given is not None and given is not False:
                 raise InputError(
                     "this is said of a measuring program, and none is asked for",
                     parameter=name,

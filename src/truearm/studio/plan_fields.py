@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.engine.base.units import sized_si
-from truearm.engine.command.texts import read_region, read_seed, read_speed
+from truearm.engine.command.texts import read_region, read_speed
 
 _Text = Annotated[str, Field(min_length=1)]
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -88,8 +88,8 @@ class PlanFields(BaseModel):
         return {name: value for name, value in given.items() if value is not None and value != UNSAID.get(name)}
 
 
-def plan_arguments(robot: str, said: dict[str, Any]) -> dict[str, Any]:
-    """Return what :func:`truearm.plan` takes of what its command is given: lengths in m, joints in rad or m.
+def plan_arguments(said: dict[str, Any]) -> dict[str, Any]:
+    """Return what :func:`truearm.plan` takes of what its command is given: lengths in m.
 
     Raises:
         InputError: If a text or a length is none, with the parameter.
@@ -102,6 +102,4 @@ def plan_arguments(robot: str, said: dict[str, Any]) -> dict[str, Any]:
         given["region"] = read_region(given["region"])
     if "speed" in given:
         given["speed"] = read_speed(given["speed"])
-    if "home" in given:
-        given["home"] = read_seed(robot, given["home"], None, "home")
     return given

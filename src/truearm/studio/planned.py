@@ -6,7 +6,7 @@ import os
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from truearm.engine.base.files import confined_reads
 from truearm.engine.robot.chain import Array
 from truearm.studio.corrected import cell_parts
 from truearm.studio.plan_fields import PlanFields, plan_arguments
-from truearm.studio.tasks import Outcome, Progress, option_words
+from truearm.studio.tasks import Outcome, Progress, done
 
 #: Options that are not called as their parameters.
 _OPTIONS: Final = {"candidates_from": "from", "accurate_at": "for"}
@@ -53,21 +53,15 @@ def planned(
         cell, constraints, payload: Of the project.
     """
     from truearm.engine.command.texts import read_poses
-    from truearm.planning.plan import plan
+    from truearm.planning.plan import PlanPoses
 
     os.chdir(folder)
     poses = fields.poses.strip()
     with confined_reads(folder):
         places = cell_places(folder, fields, cell)
         said = fields.said(places, constraints, payload)
-        found = plan(
-            robot,
-            poses=read_poses(poses),
-            out=fields.place,
-            command=plan_command(robot, poses, said),
-            progress=progress,
-            **plan_arguments(robot, said),
-        )
+        asked = PlanPoses(robot, poses=read_poses(poses), out=fields.place, progress=progress, **plan_arguments(said))
+        found = done(asked)
     made, base = found.made, found.made.robot.base
     if found.program is not None:
         files = tuple(f"{fields.place}/{name}" for name in found.contents())
@@ -85,12 +79,6 @@ def planned(
         (made.prediction.places - np.array(base.translation)) @ base.rotation,
         made.prediction.error,
     )
-
-
-def plan_command(robot: str, poses: str, said: dict[str, Any]) -> str:
-    """Return the command that does the same in the project's folder, as the page shows it."""
-    options = {_OPTIONS.get(name, name): value for name, value in said.items()}
-    return shlex.join(["truearm", "plan", robot, "--poses", poses, *option_words(options), "--out", "PLAN"])
 
 
 def asked_by(command: str) -> dict[str, str] | None:

@@ -67,11 +67,3 @@ def given(options: Mapping[str, Any]) -> dict[str, Any]:
 def done(asked: Request) -> Any:
     """Do what is asked for; the result names the command that does the same in the project's folder."""
     return dataclasses.replace(asked, command=asked.as_command()).run()
-
-
-def option_words(options: Mapping[str, Any]) -> list[str]:
-    """Return parameters of a job as the words of its command; what is true is a flag."""
-    words: list[str] = []
-    for name, value in options.items():
-        words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-    return words

@@ -8,7 +8,6 @@ from truearm.engine.base.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from truearm.engine.robot.chain import Array
     from truearm.engine.robot.controller import JointsOf
@@ -64,16 +63,6 @@ def read_poses(text: str) -> int | Literal["auto"]:
             "a number of poses belongs here", parameter="poses", came=text, allowed="a whole number, or auto"
         )
     return count_argument(int(number), "poses")
-
-
-def read_seed(robot: str | Path, text: str | None, joints: str | None, parameter: str = "seed") -> list[float] | None:
-    """Return the model's joint positions [rad or m] that a text in deg or mm names, of the kind that is written."""
-    if text is None:
-        return None
-    from truearm.engine.command.arguments import joints_argument, robot_argument
-
-    loaded = robot_argument(robot)
-    return [*positions_of(text, loaded, joints_argument(joints, loaded), parameter)]
 
 
 def positions_of(

@@ -20,7 +20,7 @@ from truearm.engine.command.groups import (
     Programmed,
     Repeatable,
 )
-from truearm.engine.command.kinds import File, Given, Names, Number, Numbers
+from truearm.engine.command.kinds import File, Given, Names, Number, Numbers, TruthKind
 from truearm.engine.command.request import job, option, required
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ class SimulateTests(OfRobot, Instrument, Drawn, IntoFolder, Repeatable, Long):
         Given("PLAN.yaml"), "Of 'truearm iso9283 plan'.", kw_only=False, word="plan"
     )
     truth: Robot | str | Path = option(
-        Given("NAME|FILE"),
+        TruthKind("NAME|FILE"),
         "What the robot truly is, as in 'truearm simulate'.",
         default="random",
         more="Robots that are exchanged are drawn in the same way; where the truth is not drawn, by the priors of "

@@ -13,20 +13,19 @@ from truearm.engine.command.groups import (
     Drawn,
     ForcedAt,
     IntoFile,
-    JointsOfModel,
     Loaded,
     Long,
     OfRobot,
+    OfTruth,
     Repeatable,
     SeenBy,
     Split,
 )
-from truearm.engine.command.kinds import Choice, CountOr, Given, Number, Text, Truth, Whole
+from truearm.engine.command.kinds import Choice, CountOr, Given, Number, Text, Whole
 from truearm.engine.command.request import Request, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
-    from truearm.engine.robot.robot import Robot
     from truearm.simulation.influence import Frames, InfluenceResult
     from truearm.simulation.influences import Combination
     from truearm.simulation.simulate import DeviceList, Simulation
@@ -38,7 +37,7 @@ def _models() -> Collection[str]:
     return [model.name for model in MODELS]
 
 
-class Simulate(OfRobot, SeenBy, Drawn, Loaded, ForcedAt, JointsOfModel, IntoFile, Long):
+class Simulate(OfTruth, OfRobot, SeenBy, Drawn, Loaded, ForcedAt, IntoFile, Long):
     """Measure a digital twin whose truth is known, with a simulated instrument.
 
     Configurations are measured in their order: what depends on the way the arm came, or on how long it has been moving,
@@ -49,15 +48,6 @@ class Simulate(OfRobot, SeenBy, Drawn, Loaded, ForcedAt, JointsOfModel, IntoFile
     """
 
     job = "simulate"
-    truth: Robot | str | Path = required(
-        Truth("NAME|FILE"),
-        "nominal, random, gear-errors, tooth-errors, a truth of the robot file ('truearm show'), or a file.",
-        kw_only=True,
-        word="truth",
-        more="``random``: geometry and joint zeros drawn from their priors; ``gear-errors`` and ``tooth-errors`` have "
-        "errors of encoders and gears beside them. Another robot or its file keeps its own base and targets, if it has "
-        "targets.",
-    )
     poses: int | Dataset | str | Path = required(
         CountOr("N|FILE.csv"),
         "Configurations, drawn evenly within the limits; or those of a file.",

@@ -339,16 +339,6 @@ class JointsWritten(Request):
     )
 
 
-class JointsOfModel(Request):
-    """Whose joint positions data hold, where those of the model are the usual ones."""
-
-    joints: JointsOf = option(
-        Choice(known=("controller", "model")),
-        "Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
-        default="model",
-    )
-
-
 class Programmed(Request):
     """A program that drives what is planned."""
 

@@ -347,23 +347,6 @@ class CountOr(NumberOr):
         return value if isinstance(value, Dataset | str | Path) else count_argument(value, name)
 
 
-class Truth(Given):
-    """What a simulated robot truly is: a robot, its file, or a name."""
-
-    def check(self, value: Any, name: str) -> Any:
-        """Refuse what is neither a robot nor a text."""
-        from truearm.engine.base.files import path_argument
-        from truearm.engine.robot.robot import Robot
-
-        if isinstance(value, Robot):
-            return value
-        if not isinstance(value, str | Path):
-            allowed = "nominal, random, gear-errors, tooth-errors, a truth's name, or a robot"
-            raise wrong_kind("a truth belongs here", value, name, allowed)
-        path_argument(value, name)
-        return value
-
-
 class PayloadKind(Given):
     """What a robot carries: an object, or a text with its mass and centre of gravity."""
 

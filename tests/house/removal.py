@@ -1,8 +1,9 @@
 """Deletes a feature in a copy of the tree, and looks whether the rest still stands: ``python -m tests.house.removal``.
 
-    python -m tests.house.removal [--whole] [FEATURE ...]
+    python -m tests.house.removal [--whole] [FEATURE ...] [FEATURE,FEATURE ...]
 
-Of the rest the quick tests of the registries are run, or with ``--whole`` all that are not slow.
+Of the rest the quick tests of the registries are run, or with ``--whole`` all that are not slow. Features with commas
+between them are deleted from one copy.
 
 What goes: the folder of the feature, the folders that import it, their tests, and what names them in registries and
 other tests (:mod:`tests.house.pruning`). Of the studio and of the papers single files go, as long as enough is left.
@@ -22,6 +23,7 @@ import tempfile
 import time
 import tomllib
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -84,9 +86,9 @@ def _piece(module: str, studies: set[str]) -> str:
     return study if study in studies else module if part in IN_PARTS else part
 
 
-def _gone(feature: str, files: dict[str, Pruned]) -> Gone:
-    """Return the modules that go with a feature, and their tests."""
-    gone = Gone({"papers", *OF_PAPERS} if feature == "papers" else {f"truearm.{feature}"})
+def _gone(features: Sequence[str], files: dict[str, Pruned]) -> Gone:
+    """Return the modules that go with features, and their tests."""
+    gone = Gone({name for f in features for name in (("papers", *OF_PAPERS) if f == "papers" else (f"truearm.{f}",))})
     names = {
         n.value for n in ast.walk(files["papers"].tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)
     }
@@ -105,7 +107,7 @@ def _gone(feature: str, files: dict[str, Pruned]) -> Gone:
             if module in REGISTRIES or gone.has(module):
                 continue
             if file.touched(gone):
-                assert not module.startswith("truearm.engine"), f"{module} uses {feature}"
+                assert not module.startswith("truearm.engine"), f"{module} uses {features}"
                 gone.modules.add(_piece(module, studies))
         pages = {dotted for _, dotted in files["truearm.studio.pages"].imported if ".pages." in dotted}
         for part, needed in IN_PARTS.items():
@@ -131,8 +133,8 @@ def _commands(tree: Path) -> set[tuple[str, ...]]:
     return {tuple(words) for words in json.loads(run.stdout)}
 
 
-def removed(feature: str, copy: Path) -> Gone:
-    """Delete a feature in a copy of the tree, and what names it."""
+def removed(copy: Path, *features: str) -> Gone:
+    """Delete features in a copy of the tree, and what names them."""
     before = _commands(copy)
     gc.disable()  # nothing of the trees is garbage before the end
     files = {
@@ -145,7 +147,7 @@ def removed(feature: str, copy: Path) -> Gone:
         for path, text in files.items()
     ]
     gc.enable()
-    gone = _gone(feature, {file.module: file for file in pruned if file.path.parts[0] != "tests"})
+    gone = _gone(features, {file.module: file for file in pruned if file.path.parts[0] != "tests"})
     left = [file for file in pruned if not gone.has(file.module)]
     prune([file for file in left if file.module in REGISTRIES], gone)
     _write([file for file in left if file.module in REGISTRIES], copy)
@@ -260,11 +262,11 @@ def told(gone: Gone) -> str:
 def main(words: list[str]) -> int:
     """Try the features that are named, or all; say what is wrong."""
     wrong = 0
-    for feature in [word for word in words if word != "--whole"] or features():
-        sys.stdout.write(f"{feature}\n")
+    for together in [word for word in words if word != "--whole"] or features():
+        sys.stdout.write(f"{together}\n")
         with tempfile.TemporaryDirectory(prefix="truearm-removal-") as folder:
             copy = copy_of_the_tree(Path(folder))
-            gone = removed(feature, copy)
+            gone = removed(copy, *together.split(","))
             sys.stdout.write(told(gone))
             sys.stdout.flush()
             for name, text in faults(copy, gone, whole="--whole" in words).items():

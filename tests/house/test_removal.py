@@ -8,13 +8,16 @@ import pytest
 from tests.house.pruning import Gone, Pruned, prune
 from tests.house.removal import faults, features, removed
 from tests.mutants.running import copy_of_the_tree
+from tests.mutants.tree import ROOT
+
+from truearm import JOBS
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("feature", features())
 def test_a_feature_can_be_deleted(feature: str, tmp_path: Path) -> None:
     copy = copy_of_the_tree(tmp_path)
-    gone = removed(feature, copy)
+    gone = removed(copy, feature)
     assert not (copy / "src" / "truearm" / feature).exists()
     assert faults(copy, gone, whole=False) == {}
 
@@ -88,3 +91,12 @@ def test_what_uses_a_deleted_module_goes_and_nothing_else() -> None:
         "by_words_put_after_others",
     )
     assert sorted(gone.tests) == sorted(f"tests/house/test_gears.py::test_{name}" for name in went)
+
+
+def test_the_engine_names_no_feature_and_no_job() -> None:
+    """What names one, be it in a docstring, could not stay where that is deleted."""
+    jobs = {("truearm", name) for name, home in JOBS.items() if not home.startswith("truearm.engine.")}
+    everything = Gone({f"truearm.{name}" for name in features()} | {"papers"}, jobs)
+    of_engine = (ROOT / "src" / "truearm" / "engine").rglob("*.py")
+    files = (Pruned(path.relative_to(ROOT), path.read_text("utf-8"), registry=False) for path in of_engine)
+    assert [file.module for file in files if file.touched(everything)] == []

@@ -365,7 +365,7 @@ class OfController(Request):
         "read, unknown, or a kinematics file (calibration.conf).",
         default=None,
         shown="as the robot file says, else asked",
-        more="The file is one that :func:`truearm.import_ur_kinematics` reads.",
+        more="The file is one that `import_ur_kinematics` reads.",
     )
 
 
@@ -388,7 +388,6 @@ class Accepting(Request):
         "How far targets may be moved and turned, for instance 95mm,3deg; a larger correction is refused.",
         default=None,
         shown="twice the robot's largest deviation",
-        more="See :mod:`truearm.compensation.limit`.",
     )
 
 

@@ -326,7 +326,7 @@ class Dataset:
     def split(self, train: float = 0.7, *, seed: int = 0) -> tuple[Dataset, Dataset]:
         """Return the configurations to train on, and those that judge.
 
-        They are those of :func:`truearm.calibrate` with the same seed: ``calibrate(robot, training, train="all")`` and
+        They are those of `calibrate` with the same seed: ``calibrate(robot, training, train="all")`` and
         ``validate(robot, judging)`` find what ``calibrate(robot, data, train=...)`` finds at once.
 
         Parameters

@@ -6,7 +6,7 @@ arm has more joints than the task has rows, they stay as near to the starting po
 began with. Velocities and accelerations are exact derivatives of the joint positions, not differences of samples.
 
 The robot's geometry counts, its joint effects do not: the motion is what is commanded, and what effects make of it is
-for :mod:`truearm.compensation.corrected_path` to correct.
+for compensation to correct.
 """
 
 from __future__ import annotations

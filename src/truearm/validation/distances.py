@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from truearm.engine.base.errors import InputError, counted, refusals_of
 from truearm.engine.base.units import Marked, parts_of
 from truearm.engine.command.arguments import refuse_swapped
 from truearm.engine.data.statistics import errors_of
+from truearm.engine.document.document import Block, detail, say
 from truearm.engine.document.records import Record
 from truearm.engine.robot.chain import Array
 from truearm.validation.validate import as_measured
@@ -298,34 +300,29 @@ class Distances(Record):
     errors: PairDistances  #: Predicted minus measured distances.
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm."""
-        found = self.errors
-        return {
-            "configurations": self.configurations,
-            "pairs": found.pairs,
-            "distance_mm": {"mean": found.mean * 1e3, "deviation": found.deviation * 1e3, "max": found.maximum * 1e3},
-            "positive": found.positive,
-            "histogram": {"edges_mm": self._edges(), "counts": found.counts.tolist()},
-        }
-
-    def lines(self) -> list[str]:
-        """Return the statistics and a histogram."""
+    def blocks(self) -> Iterator[Block]:
+        """Give the statistics and a histogram, in mm."""
         found, edges = self.errors, self._edges()
-        text = [
+        figures = {"mean": found.mean * 1e3, "deviation": found.deviation * 1e3, "max": found.maximum * 1e3}
+        yield say(
             f"{counted(found.pairs, 'distance')} between points of {counted(self.configurations, 'configuration')} of "
             f"{self.source}:",
-            f"  mean {found.mean * 1e3:.3f}  deviation {found.deviation * 1e3:.3f}  max {found.maximum * 1e3:.3f} mm",
+            f"  {'  '.join(f'{name} {value:.3f}' for name, value in figures.items())} mm",
             f"  {100 * found.positive:.0f} % of the predicted distances are too long",
-        ]
+            configurations=self.configurations,
+            pairs=found.pairs,
+            distance_mm=figures,
+            positive=found.positive,
+        )
         step = max(1, len(found.counts) // _BARS)
         starts = range(0, len(found.counts), step)
         sums = [int(found.counts[first : first + step].sum()) for first in starts]
-        for first, count in zip(starts, sums, strict=True):
-            last = min(first + step, len(found.counts))
-            bar = "#" * round(_LONGEST * count / max(sums))
-            text.append(f"  {edges[first]:8.3f} to {edges[last]:8.3f} mm  {bar}".rstrip())
-        return text
+        ends = [edges[min(first + step, len(found.counts))] for first in starts]
+        bars = [
+            f"  {edges[first]:8.3f} to {end:8.3f} mm  {'#' * round(_LONGEST * count / max(sums))}".rstrip()
+            for first, end, count in zip(starts, ends, sums, strict=True)
+        ]
+        yield detail(*bars, histogram={"edges_mm": edges, "counts": found.counts.tolist()})
 
     def _edges(self) -> list[float]:
         edges: list[float] = np.round(self.errors.edges * 1e3, 9).tolist()

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
 )
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.document.document import Block, Words, each, say
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import place
 from truearm.engine.motion.cube import DIRECTIONS, SevenLines, seven_lines, usable_joints
@@ -138,6 +140,10 @@ class LineErrors:
         """Return the mean error on a line [m]."""
         return float(np.nanmean(self.error[self.lines.rows(direction)]))
 
+    def figures(self, direction: str) -> dict[str, float]:
+        """Return both as JSON holds them [mm]."""
+        return {"mean": self.mean(direction) * 1e3, "max": self.largest(direction) * 1e3}
+
 
 def on_twin(
     lines: SevenLines, twin: Twin, joints: Array, scatter: float, repeats: int, rng: np.random.Generator
@@ -225,29 +231,24 @@ class LineTest(Record):
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
     out: Path | None = None  #: The file that holds the joint positions; None if none was written.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm."""
-        return {"poses": len(self.poses.labels), "lines": self._errors()}
-
-    def lines(self) -> list[str]:
-        """Return what the command prints: one line of text for each line of poses."""
-        text = []
-        for row in self._errors():
-            before = row["before_mm"]
-            words = f"{row['direction']:<4} mean {before['mean']:.3f}  max {before['max']:.3f} mm"
-            if "after_mm" in row:
-                after = row["after_mm"]
-                words += (
-                    f"   compensated mean {after['mean']:.3f}  max {after['max']:.3f} mm"
-                    f"   max reduced by {row['reduction_percent']:.1f} %"
-                )
-            text.append(words)
-        text = text or [f"The robot can go to all {len(self.poses.labels)} poses."]
+    def blocks(self) -> Iterator[Block]:
+        """Give the errors of each line of poses, in mm."""
+        reached = f"The robot can go to all {len(self.poses.labels)} poses."
+        yield say(*([reached] if self.before is None else []), poses=len(self.poses.labels))
+        yield each("lines", (self._line(direction, self.before) for direction in DIRECTIONS if self.before))
         if self.out is not None:
             said = "compensated" if self.compensated else "nominal"
             shown = " as the controller shows them (axis_i)" if self.joints_are == "controller" else ""
-            text.append(f"{self.out}: {len(self.joints)} configurations, {said} joint positions{shown}.")
-        return text
+            yield say(f"{self.out}: {len(self.joints)} configurations, {said} joint positions{shown}.")
+
+    def _line(self, direction: str, before: LineErrors) -> Words:
+        figures = before.figures(direction)
+        words = f"{direction:<4} mean {figures['mean']:.3f}  max {figures['max']:.3f} mm"
+        if self.after is None:
+            return say(words, direction=direction, before_mm=figures)
+        after, reduced = self.after.figures(direction), reduction(before, self.after, direction)
+        words += f"   compensated mean {after['mean']:.3f}  max {after['max']:.3f} mm   max reduced by {reduced:.1f} %"
+        return say(words, direction=direction, before_mm=figures, after_mm=after, reduction_percent=reduced)
 
     def csv_text(self) -> str:
         """Return the plan as CSV: one configuration a pose, joint positions in deg, those of sliding joints in mm."""
@@ -260,22 +261,6 @@ class LineTest(Record):
     def save(self, file: str | Path) -> None:
         """Write the plan as a CSV file."""
         write_text(output_file(file, self.inputs), self.csv_text())
-
-    def _errors(self) -> list[dict[str, Any]]:
-        if self.before is None:
-            return []
-        rows = []
-        for direction in DIRECTIONS:
-            row: dict[str, Any] = {"direction": direction, "before_mm": _shown(self.before, direction)}
-            if self.after is not None:
-                row["after_mm"] = _shown(self.after, direction)
-                row["reduction_percent"] = reduction(self.before, self.after, direction)
-            rows.append(row)
-        return rows
-
-
-def _shown(errors: LineErrors, direction: str) -> dict[str, float]:
-    return {"mean": errors.mean(direction) * 1e3, "max": errors.largest(direction) * 1e3}
 
 
 def tested(asked: TestLines) -> LineTest:

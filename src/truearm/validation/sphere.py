@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +23,8 @@ from truearm.engine.command.arguments import (
 )
 from truearm.engine.command.split import changed_since, told_of
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, each, say
+from truearm.engine.document.records import Record
 from truearm.engine.programs.fake_targets import nominal_robot
 from truearm.engine.programs.gauge import best_agreement
 from truearm.engine.robot.chain import Array
@@ -61,6 +63,16 @@ class SphereTest:
     def largest(self) -> float:
         """Largest absolute error [m]."""
         return float(np.abs(self.errors).max())
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """These three as JSON holds them [mm]."""
+        return {"mean": self.mean * 1e3, "deviation": self.deviation * 1e3, "largest": self.largest * 1e3}
+
+    @property
+    def words(self) -> str:
+        """These three in words."""
+        return "  ".join(f"{name} {value:.3f}" for name, value in self.figures.items()) + " mm"
 
 
 def sphere_test(
@@ -141,6 +153,21 @@ class OneSphere:
     before: SphereTest | None  #: By the nominal robot; None for a robot that is not calibrated.
     after: SphereTest  #: By the robot.
 
+    def blocks(self) -> Iterator[Block]:
+        """Give its errors."""
+        lost = f", {self.left_out} beyond the range of the bar" if self.left_out else ""
+        yield say(
+            f"{self.target} about {self.fixture}, {counted(len(self.lengths), 'reading')}{lost}",
+            target=self.target,
+            fixture=self.fixture,
+            readings=len(self.lengths),
+            left_out=self.left_out,
+        )
+        if self.before is not None:
+            yield say(f"  nominal     {self.before.words}", nominal_mm=self.before.figures)
+        name = "this robot" if self.before is None else "calibrated"
+        yield say(f"  {name}  {self.after.words}", robot_mm=self.after.figures)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SphereTests(Record):
@@ -156,40 +183,19 @@ class SphereTests(Record):
     warnings: tuple[Notice, ...] = ()  #: What speaks against the calibration of the robot.
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
-    out: Path | None = None  #: The page; None if none was written.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm."""
-        return {
-            "centre": "found" if self.taught is None else "taught",
-            "spheres": [
-                {
-                    "target": one.target,
-                    "fixture": one.fixture,
-                    "readings": len(one.lengths),
-                    "left_out": one.left_out,
-                    **({} if one.before is None else {"nominal_mm": _figures(one.before)}),
-                    "robot_mm": _figures(one.after),
-                }
-                for one in self.spheres
-            ],
-            "warnings": notice_summaries(self.warnings),
-        }
+    def blocks(self) -> Iterator[Block]:
+        """Give the centre, and mean, deviation and largest error of each sphere."""
+        if self.taught is None:
+            yield say("Measured less predicted distance from the centre that fits best:", centre="found")
+        else:
+            words = f"Measured less predicted distance from the centre that was taught at configuration {self.taught}:"
+            yield say(words, centre="taught")
+        yield each("spheres", (one.blocks() for one in self.spheres))
 
-    def lines(self) -> list[str]:
-        """Return what the command prints: mean, deviation and largest error of each sphere."""
-        text = [
-            "Measured less predicted distance from the centre that fits best:"
-            if self.taught is None
-            else f"Measured less predicted distance from the centre that was taught at configuration {self.taught}:"
-        ]
-        for one in self.spheres:
-            lost = f", {one.left_out} beyond the range of the bar" if one.left_out else ""
-            text.append(f"{one.target} about {one.fixture}, {counted(len(one.lengths), 'reading')}{lost}")
-            if one.before is not None:
-                text.append(f"  nominal     {_words(one.before)}")
-            text.append(f"  {'calibrated' if one.before is not None else 'this robot'}  {_words(one.after)}")
-        return [*text, *notice_lines(self.warnings), *([] if self.out is None else [f"Written: {self.out}"])]
+    def written_at(self, out: str) -> str:
+        """Return the line that says which file holds it."""
+        return f"Written: {out}"
 
     def save(self, file: str | Path) -> Path:
         """Write a page with the errors of every reading; return the file."""
@@ -198,15 +204,6 @@ class SphereTests(Record):
         page = output_file(file, self.inputs)
         write_text(page, sphere_page(self))
         return page
-
-
-def _figures(test: SphereTest) -> dict[str, float]:
-    return {"mean": test.mean * 1e3, "deviation": test.deviation * 1e3, "largest": test.largest * 1e3}
-
-
-def _words(test: SphereTest) -> str:
-    mean, deviation, largest = (value * 1e3 for value in (test.mean, test.deviation, test.largest))
-    return f"mean {mean:.3f}  deviation {deviation:.3f}  largest {largest:.3f} mm"
 
 
 def judged(asked: JudgeSphere) -> SphereTests:
@@ -238,7 +235,6 @@ def judged(asked: JudgeSphere) -> SphereTests:
         (*changed_since(asked.robot), *told_of(arm)),
         files_of(asked.robot, asked.data),
         parts_of((arm, measured)),
-        page,
     )
     if page is not None:
         found.save(page)

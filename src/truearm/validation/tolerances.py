@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,6 +12,7 @@ import numpy as np
 from truearm.engine.base.errors import InputError, refusals_of
 from truearm.engine.base.units import Marked
 from truearm.engine.command.arguments import lengths_argument, robot_argument
+from truearm.engine.document.document import Block, Table, each, say
 from truearm.engine.document.records import Record
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.conversion import converted
@@ -117,9 +118,11 @@ class UsedTolerances(Record):
     joints: tuple[Tolerance, ...]  #: What each joint uses.
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm and deg."""
-        rows = [
+    def blocks(self) -> Iterator[Block]:
+        """Give what each joint uses, in mm and deg."""
+        yield say(robot=self.robot)
+        heading = ("joint", "depth [mm]", "lean [mm]", "towards [deg]", "position x, y, z [mm]")
+        held: list[dict[str, Any]] = [
             {
                 "joint": number,
                 "depth_mm": depth * 1e3,
@@ -129,16 +132,18 @@ class UsedTolerances(Record):
             }
             for number, (depth, used) in enumerate(zip(self.depths, self.joints, strict=True), 1)
         ]
-        return {"robot": self.robot, "joints": rows}
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        text = ["joint  depth [mm]  lean [mm]  towards [deg]  position x, y, z [mm]"]
-        for row in self.summary()["joints"]:
-            place = ", ".join(f"{v:.4f}" for v in row["position_mm"])
-            figures = f"{row['depth_mm']:<11.1f} {row['lean_mm']:<10.4f} {row['towards_deg']:<14.1f}"
-            text.append(f"{row['joint']:<6} {figures} {place}")
-        return text
+        rows = [
+            (
+                str(row["joint"]),
+                *(
+                    f"{row[key]:{form}}"
+                    for key, form in (("depth_mm", ".1f"), ("lean_mm", ".4f"), ("towards_deg", ".1f"))
+                ),
+                ", ".join(f"{v:.4f}" for v in row["position_mm"]),
+            )
+            for row in held
+        ]
+        yield Table(heading, rows, held={"joints": held})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,31 +156,33 @@ class AllowedErrors(Record):
     errors: FlangeError  #: What the tolerances may do at the flange [m].
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm and deg."""
-        leaning, place = self.errors.leaning.tolist(), self.errors.position.tolist()
-        worst, root = self.errors.together
-        return {
-            "robot": self.robot,
-            "configurations": self.configurations,
-            "joints": [
-                {"joint": i, "angle_deg": math.degrees(t), "by_lean_mm": a * 1e3, "by_position_mm": b * 1e3}
-                for i, (t, a, b) in enumerate(zip(self.angles, leaning, place, strict=True), 1)
-            ],
-            "together": {"worst_mm": worst * 1e3, "root_of_squares_mm": root * 1e3},
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        said = self.summary()
-        text = [f"Largest error of the flange's position over {self.configurations} configurations:"]
-        text += [
-            f"  joint {e['joint']}: {e['by_lean_mm']:.4f} mm by leaning {e['angle_deg']:.4f} deg,"
-            f" {e['by_position_mm']:.4f} mm by place"
-            for e in said["joints"]
-        ]
-        worst, root = said["together"].values()
-        return [*text, f"  all at their worst {worst:.3f} mm, root of the sum of squares {root:.3f} mm"]
+    def blocks(self) -> Iterator[Block]:
+        """Give what each joint may do, and all together, in mm and deg."""
+        yield say(
+            f"Largest error of the flange's position over {self.configurations} configurations:",
+            robot=self.robot,
+            configurations=self.configurations,
+        )
+        of_joints = zip(self.angles, self.errors.leaning.tolist(), self.errors.position.tolist(), strict=True)
+        yield each(
+            "joints",
+            (
+                say(
+                    f"  joint {i}: {lean * 1e3:.4f} mm by leaning {math.degrees(angle):.4f} deg, "
+                    f"{place * 1e3:.4f} mm by place",
+                    joint=i,
+                    angle_deg=math.degrees(angle),
+                    by_lean_mm=lean * 1e3,
+                    by_position_mm=place * 1e3,
+                )
+                for i, (angle, lean, place) in enumerate(of_joints, 1)
+            ),
+        )
+        worst, root = (one * 1e3 for one in self.errors.together)
+        yield say(
+            f"  all at their worst {worst:.3f} mm, root of the sum of squares {root:.3f} mm",
+            together={"worst_mm": worst, "root_of_squares_mm": root},
+        )
 
 
 #: Configurations at which the flange is looked at, drawn from the robot's limits.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from truearm.engine.base.errors import InputError, Notice, counted, has_error, refusals_of
 from truearm.engine.base.files import path_argument, read_bytes
@@ -28,7 +28,8 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, Spread, errors_of
 from truearm.engine.diagnose.external_force import check_force, check_payload
 from truearm.engine.diagnose.next_step import NextStep
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, each, say
+from truearm.engine.document.records import Record
 from truearm.engine.document.summaries import error_line, errors_summary, refit_lines, refit_summary
 from truearm.engine.fit.refit import Refit
 from truearm.engine.fit.refit import refit as find_moved
@@ -100,42 +101,36 @@ class Validation(Record):
         """Statistics of errors of distances and heights [m]; None where none was read."""
         return self.errors.length
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm and mrad."""
-        return {
-            **errors_summary(self.errors),
-            **({} if self.orientations is None else {"orientation_parts_deg": orientation_summary(self.orientations)}),
-            **({} if self.distances is None else {"distance_from_training": distance_summary(self.distances)}),
-            **({} if self.zones is None else {"zones": self._zones()}),
-            **({} if self.refit is None else {"refit": refit_summary(self.refit)}),
-            **({"notes": self.notes} if self.notes else {}),
-            "next": [step.summary() for step in self.next],
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        return [
-            f"On {counted(self.errors.configurations, 'configuration')} of {self.source}:",
-            f"  {error_line(self.errors)}",
-            *orientation_lines(self.orientations),
-            *distance_lines(self.distances),
-            *(
-                f"  {'elsewhere' if row['zone'] is None else 'zone ' + row['zone']}: {row['mean_mm']:.3f} mm on "
-                f"{counted(row['configurations'], 'configuration')}"
-                for row in self._zones()
-            ),
-            *([] if self.refit is None else refit_lines(self.refit)),
-            *(f"{name}: {said}" for name, said in self.notes.items()),
-            *(step.line for step in self.next),
-            *notice_lines(self.warnings),
-        ]
-
-    def _zones(self) -> list[dict[str, Any]]:
-        return [
-            {"zone": name or None, "configurations": count, "mean_mm": mean * 1e3}
-            for name, (count, mean) in (self.zones or {}).items()
-        ]
+    def blocks(self) -> Iterator[Block]:
+        """Give the errors, their parts, and where the readings lie, in mm and mrad."""
+        configurations = counted(self.errors.configurations, "configuration")
+        yield say(
+            f"On {configurations} of {self.source}:", f"  {error_line(self.errors)}", **errors_summary(self.errors)
+        )
+        if self.orientations is not None:
+            yield say(
+                *orientation_lines(self.orientations), orientation_parts_deg=orientation_summary(self.orientations)
+            )
+        if self.distances is not None:
+            yield say(*distance_lines(self.distances), distance_from_training=distance_summary(self.distances))
+        if self.zones is not None:
+            yield each(
+                "zones",
+                (
+                    say(
+                        f"  {f'zone {name}' if name else 'elsewhere'}: {mean * 1e3:.3f} mm on "
+                        f"{counted(count, 'configuration')}",
+                        zone=name or None,
+                        configurations=count,
+                        mean_mm=mean * 1e3,
+                    )
+                    for name, (count, mean) in self.zones.items()
+                ),
+            )
+        if self.refit is not None:
+            yield say(*refit_lines(self.refit), refit=refit_summary(self.refit))
+        if self.notes:
+            yield say(*(f"{name}: {said}" for name, said in self.notes.items()), notes=self.notes)
 
     @staticmethod
     def folder(out: str | Path, inputs: Iterable[Path] = (), parameter: str = "folder") -> Path:

@@ -1,11 +1,15 @@
-"""What a page is made of: words, tables, pictures, in sections. One template draws them all and knows no feature."""
+"""What a result says: words, tables, pictures, in sections. Text, JSON and pages are made of them.
+
+The text of a command is its blocks line by line; JSON holds what stands beside the words; one template draws all
+pages. None of them knows a feature.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from truearm.engine.base.errors import Notice, worst_first
 from truearm.engine.base.units import without_mark
@@ -18,11 +22,18 @@ _TEMPLATE: Final = Path(__file__).with_name("document.html.jinja")
 
 @dataclass(frozen=True)
 class Words:
-    """A paragraph; what is in backticks is shown as code."""
+    """A paragraph; what is in backticks is shown as code. In text it is a line, or some."""
 
     text: str
     quiet: bool = False  #: Whether it stands back.
+    held: Mapping[str, Any] = field(default_factory=dict)  #: What JSON holds of it.
+    is_detail: bool = False  #: Whether it is not on the first screen.
     kind: ClassVar = "words"
+
+    @property
+    def lines(self) -> list[str]:
+        """It as lines of text."""
+        return self.text.split("\n") if self.text else []
 
 
 @dataclass(frozen=True)
@@ -37,6 +48,9 @@ class Cell:
     share: str | None = None  #: Percent that a bar before the text shows.
     chip: str = ""  #: The colour of a small square before it: ``before`` or ``after``.
 
+    def __str__(self) -> str:
+        return self.text
+
 
 @dataclass(frozen=True)
 class Table:
@@ -50,7 +64,16 @@ class Table:
     look: str = ""  #: ``sortable`` and classes of the style sheet.
     wide: bool = False  #: Whether it may be wider than the page.
     marks: tuple[str, ...] = ()  #: Of each row: ``uninformed``, ``taken``, or nothing.
+    held: Mapping[str, Any] = field(default_factory=dict)  #: What JSON holds of it.
+    is_detail: bool = False  #: Whether it is not on the first screen.
     kind: ClassVar = "table"
+
+    @property
+    def lines(self) -> list[str]:
+        """It as lines of text, its columns under each other."""
+        rows = [[str(cell) for cell in row] for row in (self.heading, *self.rows)]
+        wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        return ["  ".join(cell.ljust(width) for cell, width in zip(row, wide, strict=True)).rstrip() for row in rows]
 
     def is_number(self, column: int) -> bool:
         """Return whether a column, from 0, has numbers."""
@@ -96,6 +119,24 @@ class Points:
     entries: Sequence[str]
     name: str = ""
     kind: ClassVar = "points"
+
+
+@dataclass(frozen=True)
+class Under:
+    """What JSON holds as an object under a key, or as a list of them; in text its blocks stand like any others."""
+
+    key: str
+    blocks: Sequence[Block]
+    kind: ClassVar = "under"
+
+
+@dataclass(frozen=True)
+class Each:
+    """What JSON holds as a list under a key, an object for each entry; in text their blocks follow each other."""
+
+    key: str
+    entries: Sequence[Sequence[Block]]
+    kind: ClassVar = "each"
 
 
 @dataclass(frozen=True)
@@ -155,7 +196,7 @@ class Section:
         return any(isinstance(block, Picture) for block in self.blocks)
 
 
-Block = Words | Table | Picture | Lead | Facts | Points | Folded | Warned | Alert | Section
+Block = Words | Table | Picture | Lead | Facts | Points | Folded | Warned | Alert | Section | Under | Each
 
 
 @dataclass(frozen=True)
@@ -177,6 +218,51 @@ class Document:
             of: The record that it tells about: if that is simulated, the page begins with it.
         """
         return page(_TEMPLATE, pictures_of(self), of, document=self)
+
+
+def say(*lines: str, **held: Any) -> Words:
+    """Return lines of text, with what JSON holds of them by its keys; either may be missing."""
+    return Words("\n".join(lines), held=held)
+
+
+def detail(*lines: str, **held: Any) -> Words:
+    """Return lines that are not on the first screen; arguments as for :func:`say`."""
+    return Words("\n".join(lines), held=held, is_detail=True)
+
+
+def under(key: str, blocks: Iterable[Block]) -> Under:
+    """Return what JSON holds as an object under a key."""
+    return Under(key, [*blocks])
+
+
+def each(key: str, entries: Iterable[Words | Iterable[Block]]) -> Each:
+    """Return what JSON holds as a list under a key, an object for each entry."""
+    return Each(key, [[entry] if isinstance(entry, Words) else [*entry] for entry in entries])
+
+
+def lines_of(blocks: Iterable[Block], *, details: bool = True) -> list[str]:
+    """Return what blocks say as lines of text, without details if these are not asked for."""
+    lines: list[str] = []
+    for block in blocks:
+        if isinstance(block, Under | Each):
+            parts = [block.blocks] if isinstance(block, Under) else block.entries
+            lines += [line for part in parts for line in lines_of(part, details=details)]
+        elif isinstance(block, Words | Table) and (details or not block.is_detail):
+            lines += block.lines
+    return lines
+
+
+def held_by(blocks: Iterable[Block]) -> dict[str, Any]:
+    """Return what JSON holds of blocks."""
+    held: dict[str, Any] = {}
+    for block in blocks:
+        if isinstance(block, Words | Table):
+            held |= block.held
+        elif isinstance(block, Under):
+            held[block.key] = held_by(block.blocks)
+        elif isinstance(block, Each):
+            held[block.key] = [held_by(entry) for entry in block.entries]
+    return held
 
 
 def _pictures(blocks: Sequence[Block]) -> Iterator[Picture]:

@@ -1,10 +1,9 @@
-"""What every result is: figures with a short text of their own."""
+"""What every result is: blocks, from which its text, its JSON and its page are made."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import wraps
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 from truearm.engine.base.errors import Notice, as_html, counted, has_error, listed, short_text, worst_first
 from truearm.engine.base.units import Marked, parts_of, with_mark
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.document.document import Block, held_by, lines_of
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 
@@ -22,7 +22,7 @@ from truearm.engine.robot.controller import JointsOf
 _FIRST: Final = 3
 
 
-class Record(ABC):
+class Record:
     """A result that a person can read: its text is what the command prints, its summary what JSON holds.
 
     Where it holds data or a robot that are simulated, both begin with that, whatever the record's own class returns.
@@ -61,17 +61,33 @@ class Record(ABC):
         """Whether it can be used as it is: no notice is an error."""
         return not has_error(getattr(self, "warnings", ()))
 
-    @abstractmethod
+    def blocks(self) -> Iterable[Block]:
+        """Return what it says, the answer first, with what JSON holds of it; notices and next steps come by themselves.
+
+        In JSON units stand in the names.
+        """
+        raise NotImplementedError
+
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them, units in the names."""
+        parts = self.simulated_from
+        made: dict[str, Any] = {"simulated": True, "simulated_parts": [*parts]} if parts else {}
+        made |= held_by(self.blocks())
+        if hasattr(self, "next"):
+            made["next"] = [step.summary() for step in self.next]
+        if hasattr(self, "warnings"):
+            made["warnings"] = notice_summaries(self.warnings)
+        return made
 
     def as_json(self) -> Any:
         """Return what the command prints as JSON."""
         return self.summary()
 
-    @abstractmethod
     def lines(self) -> list[str]:
         """Return the result in words and figures, line by line, as the command prints it."""
+        steps = [step.line for step in getattr(self, "next", ())]
+        text = [*lines_of(self.blocks()), *steps, *notice_lines(getattr(self, "warnings", ()))]
+        return with_mark(text, self.simulated_from)
 
     def __repr__(self) -> str:
         return short_text(self.lines())

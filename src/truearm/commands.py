@@ -1,64 +1,84 @@
-"""The command ``truearm``: every command of every feature, each of them thin."""
+"""The command ``truearm``: its commands by their words, and how it ends."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from copy import copy
-from typing import Annotated, NoReturn, TextIO
+from importlib import import_module
+from typing import Annotated, Any, Final, NoReturn, TextIO
 
 import typer
-from typer.main import get_command_name
-from typer.models import CommandInfo
 
-from truearm.axis_circles.axes import Axes
-from truearm.bags.import_ros import ImportRos
-from truearm.board.import_hand_eye import ImportHandEye
-from truearm.calibration.calibrate import Calibrate
-from truearm.checking.check import Check
-from truearm.compensation.jobs import Compensate, FollowPath
-from truearm.drawn_circle.import_circle import ImportCircle
 from truearm.engine.base.errors import InputError, is_one_line, printable
 from truearm.engine.base.version import __version__
-from truearm.engine.command.options import CommandError, Commands, add, command_of
-from truearm.fleets.fleet import CalibrateFleet
-from truearm.hexapod.command import app as hexapod
-from truearm.importing.jobs import GuessMapping, ImportMatrices, ImportRoboDK, ImportSockets, ImportTable
-from truearm.inclinometers.jobs import FindTilting, PlanInclinometers, SimulateInclinometers
-from truearm.iso9283.command import app as iso9283
-from truearm.measuring.measure import Measure
-from truearm.planning.plan import PlanPoses
-from truearm.planning.poses import PosesOfSet
-from truearm.robot_files.jobs import (
-    ConvertRobot,
-    ExportRobot,
-    ExportToRobodk,
-    FindJoints,
-    ImportUrKinematics,
-    ListRobots,
-    ShowRobot,
-)
-from truearm.simulation.jobs import FindInfluence, ListDevices, Simulate
-from truearm.starting.command import study_help
-from truearm.starting.jobs import Demonstrate, NewRobot, WriteExample
-from truearm.starting.study import MakeStudy
-from truearm.studio.command import studio
-from truearm.validation.jobs import JudgeDistances, JudgeSphere, JudgeTolerance, TestLines, Validate
+from truearm.engine.command.options import CommandError, Commands, command_of
+
+#: Every command by its words, in the order of the help, and the job that it runs.
+COMMANDS: Final = {
+    "check": "truearm.checking.check.check",
+    "calibrate": "truearm.calibration.calibrate.calibrate",
+    "tilting": "truearm.inclinometers.jobs.tilting",
+    "validate": "truearm.validation.jobs.validate",
+    "distances": "truearm.validation.jobs.distances",
+    "compensate": "truearm.compensation.jobs.compensate",
+    "ik": "truearm.robot_files.jobs.inverse",
+    "plan": "truearm.planning.plan.plan",
+    "measure": "truearm.measuring.measure.measure",
+    "poses": "truearm.planning.poses.poses",
+    "path": "truearm.compensation.jobs.path",
+    "axes": "truearm.axis_circles.axes.axes",
+    "tolerance": "truearm.validation.jobs.tolerance",
+    "lines": "truearm.validation.jobs.lines",
+    "influence": "truearm.simulation.jobs.influence",
+    "sphere": "truearm.validation.jobs.sphere",
+    "simulate": "truearm.simulation.jobs.simulate",
+    "devices": "truearm.simulation.jobs.devices",
+    "import matrices": "truearm.importing.jobs.import_matrices",
+    "import table": "truearm.importing.jobs.import_table",
+    "import guess": "truearm.importing.jobs.import_guess",
+    "import robodk": "truearm.importing.jobs.import_robodk",
+    "import circle": "truearm.drawn_circle.import_circle.import_circle",
+    "import sockets": "truearm.importing.jobs.import_sockets",
+    "import hand-eye": "truearm.board.import_hand_eye.import_hand_eye",
+    "import ur-kinematics": "truearm.robot_files.jobs.import_ur_kinematics",
+    "import ros": "truearm.bags.import_ros.import_ros",
+    "hexapod enumerate": "truearm.hexapod.jobs.hexapod_enumerate",
+    "hexapod uncertainty": "truearm.hexapod.jobs.hexapod_uncertainty",
+    "hexapod solve": "truearm.hexapod.jobs.hexapod_solve",
+    "hexapod plan": "truearm.hexapod.jobs.hexapod_plan",
+    "hexapod world-frame": "truearm.hexapod.jobs.hexapod_world_frame",
+    "iso9283 plan": "truearm.iso9283.jobs.iso9283_plan",
+    "iso9283 simulate": "truearm.iso9283.jobs.iso9283_simulate",
+    "iso9283 evaluate": "truearm.iso9283.jobs.iso9283_evaluate",
+    "robots": "truearm.robot_files.jobs.robots",
+    "show": "truearm.robot_files.jobs.show",
+    "convert": "truearm.robot_files.jobs.convert",
+    "export": "truearm.robot_files.jobs.export",
+    "export-robodk": "truearm.robot_files.jobs.export_robodk",
+    "new-robot": "truearm.starting.jobs.new_robot",
+    "study": "truearm.starting.study.study",
+    "fleet": "truearm.fleets.fleet.fleet",
+    "example": "truearm.starting.jobs.example",
+    "demo": "truearm.starting.jobs.demo",
+    "studio": "truearm.studio.command.studio",
+}
+#: Jobs that a command runs instead for devices of their own.
+OF_DEVICES: Final = {
+    "plan": ("truearm.inclinometers.jobs.plan_inclinometers",),
+    "simulate": ("truearm.inclinometers.jobs.simulate_inclinometers",),
+}
+#: What groups of commands are for, by their word.
+GROUPS: Final = {
+    "import": "Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
+    "hexapod": "Measure poses with one ballbar between three cups on the tool and three on the base.",
+    "iso9283": "Test a robot by the criteria of ISO 9283: plan, simulate, evaluate.",
+}
 
 # A calibration's matrices are small: a second BLAS thread gains nothing on a quiet machine and waits for its turn on
 # a busy one. NumPy reads this when it is first imported, which is after here.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-app = Commands(
-    name="truearm",
-    help="Make a serial robot accurate: identify the real robot from measurements and prove how good it is.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
 
 
 def _version(wanted: bool) -> None:
@@ -67,7 +87,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and stop.")
@@ -76,52 +95,40 @@ def _root(
     pass
 
 
-importing = Commands(
-    help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
-    no_args_is_help=True,
-)
-add(importing, ImportMatrices)
-add(importing, ImportTable)
-add(importing, GuessMapping)
-add(importing, ImportRoboDK)
-add(importing, ImportCircle)
-add(importing, ImportSockets)
-add(importing, ImportHandEye)
-add(importing, ImportUrKinematics)
-add(importing, ImportRos)
+def program(*asked: str) -> Commands:
+    """Return the program with the command, or the group of commands, that some words ask for.
 
-add(app, Check)
-add(app, Calibrate)
-add(app, FindTilting)
-add(app, Validate)
-add(app, JudgeDistances)
-add(app, Compensate)
-add(app, FindJoints)
-app.command()(command_of(PlanPoses, PlanInclinometers))
-add(app, Measure)
-add(app, PosesOfSet)
-add(app, FollowPath)
-add(app, Axes)
-add(app, JudgeTolerance)
-add(app, TestLines)
-add(app, FindInfluence)
-add(app, JudgeSphere)
-app.command()(command_of(Simulate, SimulateInclinometers))
-add(app, ListDevices)
-app.add_typer(importing, name="import")
-app.add_typer(hexapod, name="hexapod")
-app.add_typer(iso9283, name="iso9283")
-add(app, ListRobots)
-add(app, ShowRobot)
-add(app, ConvertRobot)
-add(app, ExportRobot)
-add(app, ExportToRobodk)
-add(app, NewRobot)
-app.command(help=study_help())(command_of(MakeStudy))
-add(app, CalibrateFleet)
-add(app, WriteExample)
-add(app, Demonstrate)
-app.command()(studio)
+    It has all where they ask for none: to load all takes longer than many of them run.
+    """
+    app = Commands(
+        name="truearm",
+        help="Make a serial robot accurate: identify the real robot from measurements and prove how good it is.",
+        callback=_root,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    groups = dict[str, Commands]()
+    of_word = [words for words in COMMANDS if words.split()[:1] == [*asked[:1]]]
+    for words in [words for words in of_word if words.split() == [*asked[:2]]] or of_word or COMMANDS:
+        group, _, name = words.rpartition(" ")
+        if group and group not in groups:
+            groups[group] = Commands(help=GROUPS[group], no_args_is_help=True)
+            app.add_typer(groups[group], name=group)
+        groups.get(group, app).command(name)(_function(words))
+    return app
+
+
+def _function(words: str) -> Callable[..., None]:
+    """Return the function of a command."""
+    first, *others = (_named(dotted) for dotted in (COMMANDS[words], *OF_DEVICES.get(words, ())))
+    return command_of(first.request, *(one.request for one in others)) if hasattr(first, "request") else first
+
+
+def _named(dotted: str) -> Any:
+    module, _, name = dotted.rpartition(".")
+    return getattr(import_module(module), name)
 
 
 def main() -> None:
@@ -129,7 +136,7 @@ def main() -> None:
     try:
         _refuse_unprintable(sys.argv[1:])
         try:
-            _asked_for(sys.argv[1:])(prog_name="truearm")
+            program(*sys.argv[1:])(prog_name="truearm")
         finally:
             sys.stdout.flush()
     except (InputError, CommandError) as error:
@@ -158,19 +165,6 @@ def main() -> None:
         if not isinstance(error, LinAlgError):
             raise
         _end(f"the equations cannot be solved ({error}). Look at the data with 'truearm check'.")
-
-
-def _asked_for(words: Sequence[str]) -> typer.Typer:
-    """Return the command with the one part that is asked for: to make all of them takes longer than many run."""
-    part = copy(app)
-    for name in words[:1]:
-        part.registered_commands = [c for c in app.registered_commands if (c.name or _spelled(c)) == name]
-        part.registered_groups = [g for g in app.registered_groups if g.name == name]
-    return part if part.registered_commands or part.registered_groups else app
-
-
-def _spelled(command: CommandInfo) -> str:
-    return get_command_name(command.callback.__name__ if command.callback else "")
 
 
 def _refuse_unprintable(words: Sequence[str]) -> None:

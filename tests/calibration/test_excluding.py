@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from truearm.calibration.calibrate import calibrate
 from truearm.checking.check import check
-from truearm.commands import app
+from truearm.commands import program
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.excluded import Exclusion, exclusions_text, numbers_read, read_exclusions, without_readings
@@ -104,7 +104,7 @@ def test_what_is_excluded_is_no_longer_found_and_counted(csv: Path, tmp_path: Pa
     before = check("irb120", csv)
     assert "outliers" in [one.code for one in before.warnings]
     file = _file(tmp_path, (HELD_OUT[0], "2", "touched"))
-    done = CliRunner().invoke(app, ["check", "irb120", str(csv), "--exclude", str(file), "--json"])
+    done = CliRunner().invoke(program(), ["check", "irb120", str(csv), "--exclude", str(file), "--json"])
     found = {one["code"]: one for one in json.loads(done.stdout)["warnings"]}
     assert "outliers" not in found
     assert found["excluded"]["level"] == "note"
@@ -112,7 +112,7 @@ def test_what_is_excluded_is_no_longer_found_and_counted(csv: Path, tmp_path: Pa
     assert "missing" not in found  # whoever has excluded it knows that it is
     assert "falsifies the proof" in found["excluded"]["message"]
     words = ["calibrate", "irb120", str(csv), "--model", "offsets", "--exclude", str(file), "--json"]
-    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "r")])
+    done = CliRunner().invoke(program(), [*words, "--out", str(tmp_path / "r")])
     assert json.loads(done.stdout)["excluded"][0]["part"] == "held out"
 
 

@@ -10,7 +10,7 @@ from tests.simulated import campaign
 from typer.testing import CliRunner
 
 from truearm.calibration.calibrate import calibrate
-from truearm.commands import app
+from truearm.commands import program
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.validation.jobs import validate
@@ -66,9 +66,9 @@ def test_something_must_be_left(csv: Path) -> None:
 
 def test_the_command_takes_lists_and_repeats(csv: Path, tmp_path: Path) -> None:
     words = ["calibrate", "irb120", str(csv), "--model", "offsets", "--without", "3, 7", "--without", "9", "--json"]
-    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "r")])
+    done = CliRunner().invoke(program(), [*words, "--out", str(tmp_path / "r")])
     assert json.loads(done.stdout)["without"] == ["3", "7", "9"]
-    refused = CliRunner().invoke(app, [*words, "--without", "nine", "--out", str(tmp_path / "r")])
+    refused = CliRunner().invoke(program(), [*words, "--without", "nine", "--out", str(tmp_path / "r")])
     assert "there is no configuration of this name" in str(refused.exception)
     assert "'nine'" in str(refused.exception)
 
@@ -85,7 +85,7 @@ def test_notes_are_in_the_result_and_on_the_report(csv: Path, tmp_path: Path) ->
         "--note",
         "operator=A B",
     ]
-    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "r")])
+    done = CliRunner().invoke(program(), [*words, "--out", str(tmp_path / "r")])
     assert done.exit_code == 0, done.output
     assert json.loads((tmp_path / "r" / "result.json").read_text())["notes"] == {
         "serial": "120-<7>",
@@ -116,6 +116,6 @@ def test_notes_that_cannot_be_shown_are_refused(notes: object, what: str) -> Non
 @pytest.mark.parametrize("texts", [["serial"], ["serial=1", "serial=2"]])
 def test_notes_of_the_command_are_names_and_texts(csv: Path, tmp_path: Path, texts: list[str]) -> None:
     words = [word for text in texts for word in ("--note", text)]
-    done = CliRunner().invoke(app, ["calibrate", "irb120", str(csv), *words, "--out", str(tmp_path / "r")])
+    done = CliRunner().invoke(program(), ["calibrate", "irb120", str(csv), *words, "--out", str(tmp_path / "r")])
     assert str(done.exception).startswith("--note: a note ")
     assert not (tmp_path / "r").exists()

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
-from truearm.commands import app
+from truearm.commands import program
 from truearm.engine.base.errors import InputError
 from truearm.engine.choosing.zones import boxes_of, cut_boxes, divisions_for, flange_places, read_zones
 from truearm.engine.data.dataset import Dataset
@@ -204,13 +204,13 @@ def test_zones_are_for_validate_alone(cut: tuple[Path, Calibration], tmp_path: P
 def test_the_command_takes_a_number_or_a_file(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(csv_text(campaign("irb120", 60, 0.02e-3, 7)[1]))
     told = CliRunner().invoke(
-        app, ["calibrate", "irb120", str(tmp_path / "data.csv"), "--zones", "2", "--out", str(tmp_path / "out")]
+        program(), ["calibrate", "irb120", str(tmp_path / "data.csv"), "--zones", "2", "--out", str(tmp_path / "out")]
     )
     assert told.exit_code == 0
     assert "\nZones: " in told.stdout
     assert told.stdout.splitlines()[-1].startswith(f"Written to {tmp_path / 'out'}: calibrated.yaml, result.json")
     told = CliRunner().invoke(
-        app, ["calibrate", "irb120", str(tmp_path / "data.csv"), "--zones", "2 or 3", "--out", str(tmp_path / "out")]
+        program(), ["calibrate", "irb120", str(tmp_path / "data.csv"), "--zones", "2 or 3", "--out", str(tmp_path / "out")]
     )
     assert told.exit_code != 0
 

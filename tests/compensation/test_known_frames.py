@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
-from truearm.commands import app
+from truearm.commands import program
 from truearm.compensation.program_correction import corrected_programs
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.loading import load_robot
@@ -123,7 +123,7 @@ def test_what_was_held_is_said_everywhere(tmp_path: Path) -> None:
     assert again.proof is not None
     assert again.proof.held[:2] == ("base", "flange")
     assert "target_1_x" in again.proof.held
-    shown = CliRunner().invoke(app, ["show", str(tmp_path / "out" / "calibrated.yaml")]).output
+    shown = CliRunner().invoke(program(), ["show", str(tmp_path / "out" / "calibrated.yaml")]).output
     assert "held at known places: base, flange" in " ".join(shown.split())
     assert found.expected.frame == "the instrument's frame"
 
@@ -341,10 +341,10 @@ def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(csv_text(data))
     frames_of(twin.robot, tmp_path / "frames.yaml")
     words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--hold", "base, 1", "--hold", "2"]
-    done = CliRunner().invoke(app, [*words, "--frames", str(tmp_path / "frames.yaml"), "--out", str(tmp_path / "out")])
+    done = CliRunner().invoke(program(), [*words, "--frames", str(tmp_path / "frames.yaml"), "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     assert "Held at known places: base, target 1, target 2" in done.output
-    lacking = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out")])
+    lacking = CliRunner().invoke(program(), [*words, "--out", str(tmp_path / "out")])
     assert str(lacking.exception).startswith("--hold: what is held has no numbers")
     assert str(lacking.exception).endswith("in a file with --frames.")
     validated = validate(tmp_path / "out" / "calibrated.yaml", data)

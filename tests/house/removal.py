@@ -33,7 +33,7 @@ from tests.mutants.running import copy_of_the_tree, pytest
 from tests.mutants.tree import ROOT
 
 #: Modules that list what there is: there a line goes.
-REGISTRIES: Final = ("truearm", "truearm.commands", "truearm.starting.command", "truearm.studio.pages", "papers")
+REGISTRIES: Final = ("truearm", "truearm.commands", "truearm.studio.pages", "papers")
 #: Parts of which single files may go, and what may not: without it the whole part goes.
 IN_PARTS: Final = {"truearm.studio": ("truearm.studio.command",), "papers": ("papers.study",)}
 #: What belongs to the papers and lies elsewhere: what runs them.
@@ -44,17 +44,6 @@ LISTS: Final = ("papers/__init__.py", "tests/house/", "tests/fuzz/", "tests/hone
 QUICK: Final = ("test_contract.py", "test_every_job.py", "test_package.py", "test_refusals.py", "test_slow.py")
 OF_THE_WHOLE: Final = ("tests/mutants", "tests/house/test_documents.py", "tests/house/test_removal.py")
 
-_COMMANDS = """
-import json
-from typer.main import get_command
-from truearm.commands import app
-def below(command, words):
-    found = [words] if words else []
-    for name, part in getattr(command, "commands", {}).items():
-        found += below(part, [*words, name])
-    return found
-print(json.dumps(below(get_command(app), [])))
-"""
 _IMPORTS = """
 import importlib, pkgutil, sys
 import truearm
@@ -128,9 +117,10 @@ def _run(copy: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 def _commands(tree: Path) -> set[tuple[str, ...]]:
     """Return the words of all commands."""
-    run = _run(tree, "-c", _COMMANDS)
+    run = _run(tree, "-c", "import json; from truearm.commands import COMMANDS; print(json.dumps([*COMMANDS]))")
     assert run.returncode == 0, run.stderr
-    return {tuple(words) for words in json.loads(run.stdout)}
+    every = [tuple(words.split()) for words in json.loads(run.stdout)]
+    return {*every, *(words[:1] for words in every)}
 
 
 def removed(copy: Path, *features: str) -> Gone:

@@ -14,7 +14,7 @@ from tests.simulated import campaign, more_of
 from typer.testing import CliRunner
 
 from truearm.calibration.calibrate import calibrate
-from truearm.commands import app
+from truearm.commands import program
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
@@ -176,10 +176,10 @@ def test_the_command_finds_what_moved(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(robot_text(robot))
     (tmp_path / "moved.csv").write_text(csv_text(replace(new, position=new.position + SHIFT)))
     words = ["validate", str(tmp_path / "robot.yaml"), str(tmp_path / "moved.csv")]
-    told = CliRunner().invoke(app, words)
+    told = CliRunner().invoke(program(), words)
     assert told.exit_code == 3
     assert "--refit base" in told.output
-    done = CliRunner().invoke(app, [*words, "--refit", "base", "--note", "operator=A B", "--json"])
+    done = CliRunner().invoke(program(), [*words, "--refit", "base", "--note", "operator=A B", "--json"])
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert found["refit"]["shift_mm"] == pytest.approx(1e3 * float(np.linalg.norm(SHIFT)), abs=0.2)

@@ -11,7 +11,7 @@ from tests.simulated import campaign, more_of
 from typer.testing import CliRunner
 
 from truearm.calibration.calibrate import calibrate
-from truearm.commands import app
+from truearm.commands import program
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
@@ -53,7 +53,7 @@ def test_renamed_targets_are_told(calibrated: tuple[Path, Dataset]) -> None:
     assert "2 is 1, 3 is 2, 1 is 3" in notice.message
     (folder / "renamed.csv").write_text(csv_text(renamed))
     told = CliRunner().invoke(
-        app, ["validate", str(folder / "result" / "calibrated.yaml"), str(folder / "renamed.csv"), "--json"]
+        program(), ["validate", str(folder / "result" / "calibrated.yaml"), str(folder / "renamed.csv"), "--json"]
     )
     assert told.exit_code == 3
     assert json.loads(told.stdout)["warnings"][0]["code"] == "targets-renamed"
@@ -74,7 +74,7 @@ def test_a_page_and_its_figures_are_written(calibrated: tuple[Path, Dataset], tm
     assert "truearm.validate(" in content["command"]
     assert "From the nearest of 20 training configurations: tips " in "\n".join(found.lines())
     told = CliRunner().invoke(
-        app,
+        program(),
         [
             "validate",
             str(folder / "result" / "calibrated.yaml"),

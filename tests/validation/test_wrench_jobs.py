@@ -15,7 +15,7 @@ from tests.plate import PLATE
 from typer.testing import CliRunner
 
 import truearm
-from truearm.commands import app
+from truearm.commands import program
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.robot.robot import Robot
@@ -109,10 +109,10 @@ def test_the_command_names_the_option(cell: Path) -> None:
         ("--wrench-frame", "tool", "--wrench-frame: a frame says in whose axes a force is"),
         ("--wrench", "0,0,80,0,0,0", "--wrench: the force is larger than irb120 is rated for"),
     ):
-        run = CliRunner().invoke(app, [*words, option, value])
+        run = CliRunner().invoke(program(), [*words, option, value])
         assert run.exit_code != 0
         assert said in str(run.exception)
-    run = CliRunner().invoke(app, [*words, "--wrench", "0,0,20,0,0,0"])
+    run = CliRunner().invoke(program(), [*words, "--wrench", "0,0,20,0,0,0"])
     assert "Warning (force-on-rigid-model)" in " ".join(run.output.split())
 
 
@@ -219,7 +219,7 @@ def test_a_file_says_what_acts_where(cell: Path) -> None:
     file = cell / "cell.yaml"
     file.write_text(text)
     words = ["compensate", str(cell / "calibrated.yaml"), str(cell / "plate.mod"), "--out", str(cell / "out"), *ANSWERS]
-    run = CliRunner().invoke(app, [*words, "--tool", str(file), "--wrench", str(file), "--json"])
+    run = CliRunner().invoke(program(), [*words, "--tool", str(file), "--wrench", str(file), "--json"])
     assert "force-taken" in {notice["code"] for notice in json.loads(run.output)["warnings"]}
     said: tuple[tuple[list[str], str], ...] = (
         ([], str(file) + ": the file has wrenches, and nothing takes them. Give the file as --wrench"),
@@ -228,7 +228,7 @@ def test_a_file_says_what_acts_where(cell: Path) -> None:
         (["--wrench", "1,2,3,4,5"], "--wrench: three forces and three moments belong here"),
     )
     for more, message in said:
-        run = CliRunner().invoke(app, [*words, "--tool", str(file), *more])
+        run = CliRunner().invoke(program(), [*words, "--tool", str(file), *more])
         assert message in str(run.exception)
 
 

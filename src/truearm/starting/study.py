@@ -9,6 +9,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import InParts, IntoFolder, Long, Repeatable
 from truearm.engine.command.kinds import File, Text, Whole
 from truearm.engine.command.request import job, option, required
+from truearm.starting.published import find_papers
 
 if TYPE_CHECKING:
     from truearm.engine.document.records import Record
@@ -37,6 +38,22 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
         default=1,
         more="One is this process itself. The figures do not depend on it.",
     )
+
+    @classmethod
+    def help_text(cls) -> str:
+        """Return what the help begins with: it lists the studies, where they are."""
+        told = [
+            "Make a published experiment again and set our figures beside the printed ones, over several seeds.",
+            "Writes report.html and study.json into DIR. The studies:",
+        ]
+        try:
+            find_papers()
+        except InputError as error:
+            return "\n\n".join([*told, error.message(str)])
+        from papers import STUDIES
+
+        told += [f"{entry.name}: {entry.about}{' (with `data`)' if entry.files else ''}" for entry in STUDIES]
+        return "\n\n".join(told)
 
     def check(self) -> None:
         """Refuse several who do the seeds."""

@@ -156,12 +156,6 @@ def print_line(line: str, *, err: bool = False) -> None:
 # The command of a request: its options are made from their declarations.
 
 
-def add(group: Commands, *requests: type[Request]) -> None:
-    """Add the commands of requests to a group, each by its last word."""
-    for request in requests:
-        group.command(request.command_words().split()[-1])(command_of(request))
-
-
 def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[..., None]:
     """Return the command of a request as Typer takes it: a function with an argument for each option.
 
@@ -205,13 +199,13 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
     every = [*sorted(asked, key=lambda one: one.default is not inspect.Parameter.empty), *flags]
     run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     run.__annotations__ = {one.name: one.annotation for one in every}
-    run.__doc__ = spelled_by(inspect.cleandoc(request.__doc__ or ""), declared)
+    run.__doc__ = spelled_by(request.help_text(), declared)
     run.__name__ = request.job
     return run
 
 
 def _headline(request: type[Request]) -> str:
-    return inspect.cleandoc(request.__doc__ or "").partition("\n")[0]
+    return request.help_text().partition("\n")[0]
 
 
 def _with_flags(typed: Mapping[str, Any], declared: Mapping[str, Option]) -> dict[str, Any]:

@@ -138,6 +138,11 @@ class Request:
         return cls.__dataclass_fields__[name].default
 
     @classmethod
+    def help_text(cls) -> str:
+        """Return what the help of the command begins with."""
+        return inspect.cleandoc(cls.__doc__ or "")
+
+    @classmethod
     def command_words(cls) -> str:
         """Return the words of the command."""
         return cls.words or cls.job.replace("_", "-")

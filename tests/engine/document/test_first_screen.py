@@ -1,25 +1,30 @@
-"""What the command prints first: the answer, the three gravest notices, and how many there are beside."""
+"""What the command prints first: the answer, the next step, the gravest notices, and how much there is beside."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import pytest
 
 from truearm.engine.base.errors import Notice
-from truearm.engine.document.records import Record, first_screen, notice_lines
+from truearm.engine.base.units import Marked, said_of
+from truearm.engine.diagnose.next_step import NextStep
+from truearm.engine.document.document import Block, Table, detail, each, say, under
+from truearm.engine.document.records import Record, first_screen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Found(Record):
-    warnings: tuple[Notice, ...]
+    answer: int = 1
+    warnings: tuple[Notice, ...] = ()
+    next: tuple[NextStep, ...] = ()
+    simulated_from: tuple[Marked, ...] = ()
 
-    def summary(self) -> dict[str, Any]:
-        return {}
-
-    def lines(self) -> list[str]:
-        return ["the answer", *notice_lines(self.warnings)]
+    def blocks(self) -> Iterator[Block]:
+        yield each("parts", (say(f"answer {k}", number=k) for k in range(self.answer)))
+        yield detail("explained", "at length", why="so")
+        yield under("table", [Table(("a", "b"), [("1", "22"), ("333", "4")], held={"rows": 2}, is_detail=True)])
 
 
 NOTICES = (
@@ -30,20 +35,53 @@ NOTICES = (
     Notice("e", "fifth."),
     Notice("f", "sixth.", "note"),
 )
+STEPS = (NextStep("measure", "Measure more."), NextStep("stop", "Or stop."))
 
 
-def test_the_gravest_notices_are_first_and_the_others_are_counted() -> None:
-    assert first_screen(Found(NOTICES)) == [
-        "the answer",
+def test_text_and_json_are_made_of_the_same_blocks() -> None:
+    found = Found(2, NOTICES[:1], STEPS[:1])
+    assert found.lines() == [
+        *("answer 0", "answer 1", "explained", "at length", "a    b", "1    22", "333  4"),
+        *("Next (measure): Measure more.", "Note (a): first."),
+    ]
+    assert found.summary() == {
+        "parts": [{"number": 0}, {"number": 1}],
+        "why": "so",
+        "table": {"rows": 2},
+        "next": [STEPS[0].summary()],
+        "warnings": [NOTICES[0].summary()],
+    }
+
+
+def test_details_notices_and_steps_that_are_left_out_are_counted() -> None:
+    assert first_screen(Found(1, NOTICES, STEPS)) == [
+        "answer 0",
+        "Next (measure): Measure more.",
         "Error (c): third.",
         "Warning (b): second.",
         "Warning (d): fourth.",
-        "And 1 warning, 2 notes more, which `details` shows.",
+        "And 1 warning, 2 notes, 6 lines more, which `details` shows.",
     ]
 
 
-@pytest.mark.parametrize("count", [0, 1, 3])
-def test_few_notices_are_all_on_it(count: int) -> None:
-    found = Found(NOTICES[:count])
-    assert first_screen(found) == found.lines()
-    assert len(found.lines()) == count + 1
+@pytest.mark.parametrize("marked", [(), ("data",)])
+@pytest.mark.parametrize("steps", [0, 1, 2])
+@pytest.mark.parametrize("notices", [0, 1, 3, 6])
+@pytest.mark.parametrize("answer", [1, 4, 8, 40])
+def test_it_has_ten_lines_at_most_and_counts_the_rest(
+    answer: int, notices: int, steps: int, marked: tuple[Marked, ...]
+) -> None:
+    found = Found(answer, NOTICES[:notices], STEPS[:steps], marked)
+    shown = first_screen(found)
+    assert len(shown) < 10  # the tenth says where files are
+    *told, more = shown
+    assert told == [line for line in found.lines() if line in told]
+    assert sum(int(word) for word in more.split() if word.isdigit()) == len(found.lines()) - len(told)
+    assert said_of(marked) == told[: len(marked)]
+    assert "answer 0" in told
+    assert sum("(c)" in line for line in told) == (notices > 2)
+
+
+def test_what_is_whole_stays_whole() -> None:
+    whole = type("Listed", (Found,), {"is_list": True})(40, NOTICES)
+    assert first_screen(whole) == whole.lines()

@@ -7,18 +7,19 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import wraps
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from truearm.engine.base.errors import Notice, as_html, counted, has_error, listed, short_text, worst_first
-from truearm.engine.base.units import Marked, parts_of, with_mark
+from truearm.engine.base.units import Marked, parts_of, said_of, with_mark, without_mark
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.document.document import Block, held_by, lines_of
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 
-#: So many notices are on the first screen.
+#: So many lines has the first screen of a command, and so many of them are notices.
+_LINES: Final = 10
 _FIRST: Final = 3
 
 
@@ -33,6 +34,9 @@ class Record:
         for name, marked in (("lines", _marked_lines), ("summary", _marked_summary)):
             if name in vars(cls):
                 setattr(cls, name, marked(vars(cls)[name]))
+
+    #: Whether it is a list that was asked for, so that the first screen has all of it.
+    is_list: ClassVar[bool] = False
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:
@@ -129,18 +133,23 @@ def notice_lines(notices: Sequence[Notice]) -> list[str]:
 
 
 def first_screen(record: Record) -> list[str]:
-    """Return the lines of a result with its three gravest notices, and a line that counts the others.
+    """Return at most ten lines, with the one that says where files are: the answer, the next step, and what to know.
 
-    What goes to standard error, as what a file cannot hold, is told as a whole.
+    The last of these counts what is not among them. What goes to standard error, as what a file cannot hold, and the
+    answers of lists are told as a whole.
     """
-    notices = worst_first(getattr(record, "warnings", ()))
-    rest = notices[_FIRST:]
-    if not rest or record.asides:
+    if record.is_list or record.asides:
         return record.lines()
-    hidden = notice_lines(rest)
-    levels = Counter(notice.level for notice in rest)
-    more = listed([counted(count, level) for level, count in levels.items()])
-    return [*(line for line in record.lines() if line not in hidden), f"And {more} more, which `details` shows."]
+    notices, steps = worst_first(getattr(record, "warnings", ())), getattr(record, "next", ())
+    mark, answer = said_of(record.simulated_from), without_mark(lines_of(record.blocks(), details=False))
+    room = _LINES - len(mark) - len(steps[:1]) - 2  # the last two count the rest, and say where files are
+    grave = sum(notice.level == "error" for notice in notices)
+    shown = min(len(notices), _FIRST, max(1, grave, room - len(answer)))
+    text = [*mark, *answer[: room - shown], *(step.line for step in steps[:1]), *notice_lines(notices[:shown])]
+    rest = Counter(notice.level for notice in notices[shown:])
+    rest["line"] = len(record.lines()) - len(text) - rest.total()
+    more = listed([counted(count, what) for what, count in rest.items() if count])
+    return [*text, f"And {more} more, which `details` shows."] if more else text
 
 
 def notice_summaries(notices: Sequence[Notice]) -> list[dict[str, str]]:

@@ -210,7 +210,9 @@ def test_the_command_takes_a_number_or_a_file(tmp_path: Path) -> None:
     assert "\nZones: " in told.stdout
     assert told.stdout.splitlines()[-1].startswith(f"Written to {tmp_path / 'out'}: calibrated.yaml, result.json")
     told = CliRunner().invoke(
-        program(), ["calibrate", "irb120", str(tmp_path / "data.csv"), "--zones", "2 or 3", "--out", str(tmp_path / "out")]
+        program(),
+        ["calibrate", "irb120", str(tmp_path / "data.csv"), "--zones", "2 or 3", "--out", str(tmp_path / "out")],
+        ["calibrate", "irb120", str(tmp_path / "data.csv"), "--zones", "2 or 3", "--out", str(tmp_path / "out")],
     )
     assert told.exit_code != 0
 

@@ -341,10 +341,11 @@ def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(csv_text(data))
     frames_of(twin.robot, tmp_path / "frames.yaml")
     words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--hold", "base, 1", "--hold", "2"]
-    done = CliRunner().invoke(program(), [*words, "--frames", str(tmp_path / "frames.yaml"), "--out", str(tmp_path / "out")])
+    words += ["--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(program(), [*words, "--frames", str(tmp_path / "frames.yaml")])
     assert done.exit_code == 0, done.output
     assert "Held at known places: base, target 1, target 2" in done.output
-    lacking = CliRunner().invoke(program(), [*words, "--out", str(tmp_path / "out")])
+    lacking = CliRunner().invoke(program(), words)
     assert str(lacking.exception).startswith("--hold: what is held has no numbers")
     assert str(lacking.exception).endswith("in a file with --frames.")
     validated = validate(tmp_path / "out" / "calibrated.yaml", data)

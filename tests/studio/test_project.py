@@ -6,15 +6,21 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.killing import killed, leftovers, operations
 
+from truearm.calibration.calibrate import Calibrate
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import confined_reads, read_bytes, read_yaml
 from truearm.engine.base.writing import remove_known, write_text_over
+from truearm.measuring.measure import Measure
+from truearm.planning.plan import PlanPoses
+from truearm.studio.measure_fields import MeasureFields
+from truearm.studio.plan_fields import PlanFields
 from truearm.studio.project import PROJECT_FILE, Project, open_project
 from truearm.studio.settings import Settings
 
@@ -338,3 +344,13 @@ def test_a_process_killed_at_any_moment_leaves_the_old_or_the_new_project(tmp_pa
         assert open_project(folder).settings.robot == "kr5"
         assert leftovers(folder) == []
     assert seen == {"irb120", "kr5"}
+
+
+def test_defaults_are_those_of_the_jobs() -> None:
+    """What a page says before anybody has typed is what Python and the command take."""
+    for fields, request in ((Settings, Calibrate), (PlanFields, PlanPoses), (MeasureFields, Measure)):
+        for name, field in fields.model_fields.items():
+            told = request.__dataclass_fields__.get(name)
+            if told is not None and None not in (field.default, told.default) and told.default is not MISSING:
+                shown = told.default if isinstance(told.default, str) else float(request.typed_default(name))
+                assert field.default == shown, f"{fields.__name__}.{name}"

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.units import sized_si, to_si
+from truearm.measuring.measure import Measure
 from truearm.measuring.session import LONGEST_ROUND, MOST_SAMPLES
 
 _Text = Annotated[str, Field(min_length=1)]
@@ -22,8 +23,6 @@ SOURCES: Final[dict[Source, tuple[str, ...]]] = {
     "watched folder": ("watch", "mapping"),
     "port of this machine": ("listen",),
 }
-#: Configurations between two rounds of the nests, where nothing is said.
-EVERY: Final = 10
 _LENGTHS: Final = ("noise", "drift", "most_deviation", "most_settling")
 #: Options that have other names than the parameters.
 _OPTIONS: Final = {"mapping": "map", "targets": "target", "nests": "nest"}
@@ -51,7 +50,7 @@ class MeasureFields(BaseModel):
     listen: Annotated[_Whole, Field(ge=0, le=65535)] = 0
     targets: _Text | None = None
     nests: _Text | None = None
-    every: Annotated[_Whole, Field(ge=1, le=LONGEST_ROUND)] = EVERY
+    every: Annotated[_Whole, Field(ge=1, le=LONGEST_ROUND)] = Measure.default("every")
     most_deviation: _Number | None = None
     most_settling: _Number | None = None
     fewest_samples: Annotated[_Whole, Field(ge=1, le=MOST_SAMPLES)] | None = None
@@ -91,7 +90,7 @@ class MeasureFields(BaseModel):
             "payload": payload if virtual else None,
             "targets": names_of(self.targets),
             "nests": names_of(self.nests),
-            "every": None if self.every == EVERY else self.every,
+            "every": None if self.every == Measure.default("every") else self.every,
             "most_deviation": self.most_deviation,
             "most_settling": self.most_settling,
             "fewest_samples": self.fewest_samples,

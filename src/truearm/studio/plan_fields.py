@@ -9,11 +9,15 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.engine.base.units import sized_si
 from truearm.engine.command.texts import read_region, read_speed
+from truearm.planning.plan import PlanPoses
 
 _Text = Annotated[str, Field(min_length=1)]
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 #: What the job takes where nothing is said.
-UNSAID: Final[dict[str, Any]] = {"model": "geometric", "candidates": 5000, "noise": 0.1, "seed": 0}
+UNSAID: Final[dict[str, Any]] = {
+    **{name: PlanPoses.default(name) for name in ("model", "candidates", "seed")},
+    "noise": float(PlanPoses.typed_default("noise")),
+}
 
 
 class PlanFields(BaseModel):
@@ -28,11 +32,11 @@ class PlanFields(BaseModel):
     objective: _Text | None = None
     accurate_at: _Text | None = None
     region: _Text | None = None
-    model: _Text = "geometric"
-    candidates: Annotated[int, Field(strict=True, ge=1)] = 1000
+    model: _Text = UNSAID["model"]
+    candidates: Annotated[int, Field(strict=True, ge=1)] = UNSAID["candidates"]
     device: _Text | None = None
-    noise: _Number = 0.1
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    noise: _Number = UNSAID["noise"]
+    seed: Annotated[int, Field(strict=True, ge=0)] = UNSAID["seed"]
     floor: _Number | None = None
     no_floor: bool = False
     clearance: _Number | None = None

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.calibration.calibrate import Calibrate
-from truearm.engine.command.request import Request
 from truearm.engine.robot.wrench import WrenchFrame
 from truearm.iso9283.jobs import EvaluateTests
 from truearm.studio.measure_fields import MeasureFields
@@ -15,12 +14,6 @@ from truearm.studio.plan_fields import PlanFields
 
 _Name = Annotated[str, Field(min_length=1)]
 _Above0 = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-
-
-def typed_default(request: type[Request], name: str) -> str:
-    """Return the default of an option as it is typed."""
-    (text,) = dict(request.options())[name].kind.typed_again(request.default(name))
-    return text
 
 
 class TestedFiles(BaseModel):
@@ -36,8 +29,8 @@ class TestedFiles(BaseModel):
     alignment: _Name | None = None
     compare: _Name | None = None
     #: noise_mm, noise_rot_deg: of the instrument.
-    noise_mm: _Above0 = float(typed_default(EvaluateTests, "noise"))
-    noise_rot_deg: _Above0 = float(typed_default(EvaluateTests, "noise_rot"))
+    noise_mm: _Above0 = float(EvaluateTests.typed_default("noise"))
+    noise_rot_deg: _Above0 = float(EvaluateTests.typed_default("noise_rot"))
     result: _Name = "iso9283/result"  #: Folder of the evaluation.
 
 

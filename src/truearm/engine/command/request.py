@@ -138,6 +138,12 @@ class Request:
         return cls.__dataclass_fields__[name].default
 
     @classmethod
+    def typed_default(cls, name: str) -> str:
+        """Return the default of an option as it is typed."""
+        (text,) = dict(cls.options())[name].kind.typed_again(cls.default(name))
+        return text
+
+    @classmethod
     def help_text(cls) -> str:
         """Return what the help of the command begins with."""
         return inspect.cleandoc(cls.__doc__ or "")

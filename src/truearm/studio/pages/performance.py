@@ -32,7 +32,6 @@ from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.drawn_cube import DrawnCube
 from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.project import stamp_of
-from truearm.studio.settings import typed_default
 from truearm.studio.tasks import Outcome
 from truearm.studio.tested import evaluate_tests, plan_tests, simulate_tests
 from truearm.studio.window import Window
@@ -103,7 +102,7 @@ class PerformancePage:
             self._tip: Any = gui.add_vector3("Tip [mm]", (0.0, 0.0, 100.0), step=1.0, hint="in the flange frame")
             self._velocity: Any = gui.add_number("Rated [mm/s]", 1000.0, min=10.0, max=20000.0, step=10.0)
             self._velocities: Any = gui.add_text(
-                "Velocities [%]", typed_default(PlanTests, "velocities"), hint="percent of the rated velocity"
+                "Velocities [%]", PlanTests.typed_default("velocities"), hint="percent of the rated velocity"
             )
             self._plan_button = gui.add_button("Plan the tests")
         self._plan_button.on_click(self._window.action(self._plan))

@@ -352,5 +352,5 @@ def test_defaults_are_those_of_the_jobs() -> None:
         for name, field in fields.model_fields.items():
             told = request.__dataclass_fields__.get(name)
             if told is not None and None not in (field.default, told.default) and told.default is not MISSING:
-                shown = told.default if isinstance(told.default, str) else float(request.typed_default(name))
+                shown = told.default if isinstance(told.default, str | bool) else float(request.typed_default(name))
                 assert field.default == shown, f"{fields.__name__}.{name}"

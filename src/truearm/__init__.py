@@ -13,11 +13,13 @@ them.
 from __future__ import annotations
 
 from importlib import import_module
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Final
 
 from truearm.engine.base.version import __version__
 
 if TYPE_CHECKING:
+    from truearm import hexapod as hexapod
     from truearm import iso9283 as iso9283
     from truearm.axis_circles.axes import axes as axes
     from truearm.bags.import_ros import import_ros as import_ros
@@ -75,6 +77,20 @@ if TYPE_CHECKING:
     from truearm.validation.jobs import sphere as sphere
     from truearm.validation.jobs import tolerance as tolerance
     from truearm.validation.jobs import validate as validate
+
+    class read:  # noqa: N801
+        """Imports by short names: ``truearm.read.table`` is ``truearm.import_table``."""
+
+        from truearm.bags.import_ros import import_ros as ros
+        from truearm.board.import_hand_eye import import_hand_eye as hand_eye
+        from truearm.drawn_circle.import_circle import import_circle as circle
+        from truearm.importing.jobs import import_guess as guess
+        from truearm.importing.jobs import import_matrices as matrices
+        from truearm.importing.jobs import import_robodk as robodk
+        from truearm.importing.jobs import import_sockets as sockets
+        from truearm.importing.jobs import import_table as table
+        from truearm.robot_files.jobs import import_ur_kinematics as ur_kinematics
+
 
 #: Every job, in the order of the work, and where it is. A job is a function that takes objects, arrays or paths and
 #: plain keywords, refuses what it cannot use with an :class:`InputError` that names the parameter, and returns a frozen
@@ -140,13 +156,16 @@ _CLASSES: Final = {
     "Robot": "truearm.engine.robot.robot",
 }
 #: Features whose jobs have names of their own there.
-_FEATURES: Final = ("iso9283",)
+_FEATURES: Final = ("hexapod", "iso9283")
 __all__ = ["__version__", *_CLASSES, *JOBS]
 
 
 def __getattr__(name: str) -> Any:
     if name in _FEATURES:
         return import_module(f"truearm.{name}")
+    if name == "read":
+        jobs = {one.removeprefix("import_"): __getattr__(one) for one in JOBS if one.startswith("import_")}
+        return SimpleNamespace(**jobs)
     home = JOBS.get(name) or _CLASSES.get(name)
     if home is None:
         raise AttributeError(f"module 'truearm' has no attribute {name!r}")

@@ -183,6 +183,8 @@ def test_the_result_is_frozen_and_speaks_for_itself(job: str, folder: Path) -> N
         assert repr(result) == "\n".join(result.lines())[: len(repr(result))] or repr(result).endswith("...")
         assert result._repr_html_().startswith("<pre>")
         assert json.loads(json.dumps(result.summary(), allow_nan=False))
+        assert (type(result.request).job, type(result.request)) == (job, function(job).request)
+        assert result.request.as_python().startswith(f"truearm.{job}(")
     if hasattr(result, "save"):
         refuses_bad_places(result.save)
 

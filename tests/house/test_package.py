@@ -76,9 +76,7 @@ def test_unknown_names_of_the_package_are_refused() -> None:
         truearm.calibrat  # noqa: B018
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in truearm.JOBS if name.startswith(("import_", "hexapod_", "iso9283_"))]
-)
+@pytest.mark.parametrize("name", [one for one in truearm.JOBS if one.startswith(("import_", "hexapod_", "iso9283_"))])
 def test_a_job_of_a_group_has_a_short_name_in_its_namespace(name: str) -> None:
     space, _, short = name.partition("_")
     assert getattr(getattr(truearm, {"import": "read"}.get(space, space)), short) is getattr(truearm, name)

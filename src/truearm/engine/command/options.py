@@ -182,7 +182,7 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
         ):
             asked = wanted(**given)
             said = {"command": asked.as_command(), "progress": say, "tell": partial(print_line, err=as_json)}
-            result = replace(asked, **{name: value for name, value in said.items() if name in own}).run()
+            result = replace(asked, **{name: value for name, value in said.items() if name in own}).result()
         _show(result, as_json=as_json, details=details)
         written = result.written_at(given["out"]) if "out" in given else ""
         if written and not as_json:

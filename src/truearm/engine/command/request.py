@@ -12,6 +12,7 @@ import shlex
 import sys
 import textwrap
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import Field, dataclass, field, fields
 from typing import Any, ClassVar, Final, ParamSpec, Protocol, TypeVar, dataclass_transform
 
@@ -123,6 +124,17 @@ class Request:
         """Do what is asked for."""
         raise NotImplementedError
 
+    def result(self) -> Any:
+        """Do what is asked for; the result keeps the request, without what only this run needed."""
+        made = self.run()
+        if hasattr(made, "request"):
+            kept = copy(self)
+            for name, declared in self.options():
+                if not (declared.in_command or declared.repeated):
+                    object.__setattr__(kept, name, self.default(name))
+            object.__setattr__(made, "request", kept)
+        return made
+
     @classmethod
     def options(cls) -> Iterator[tuple[str, Option]]:
         """Yield the options by their names: what Python takes by position, those of the class, those of its groups."""
@@ -220,7 +232,8 @@ def job(request: Callable[P, Runs[R]]) -> Callable[P, R]:
     made: Any = request
 
     def run(*given: P.args, **named: P.kwargs) -> R:
-        return request(*given, **named).run()
+        result: R = made(*given, **named).result()
+        return result
 
     frame = sys._getframe(1)
     run.__name__ = run.__qualname__ = made.job

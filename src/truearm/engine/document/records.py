@@ -35,6 +35,8 @@ class Record:
             if name in vars(cls):
                 setattr(cls, name, marked(vars(cls)[name]))
 
+    #: What was asked for; None of what no job has made. It says itself as a call in Python and as a command.
+    request: Any = None
     #: Whether it is a list that was asked for, so that the first screen has all of it.
     is_list: ClassVar[bool] = False
 

@@ -81,11 +81,11 @@ def test_from_plan_to_data(truearm: Truearm, tmp_path: Path) -> None:
     assert list(summary) == [
         "poses",
         "poses_reached",
-        "joints_are",
         "configurations",
         "places",
         "left_out",
         "smallest_room_mm",
+        "joints_are",
     ]
     assert summary["poses"] == 54
     assert 10 < summary["poses_reached"] <= 54

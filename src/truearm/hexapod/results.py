@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from truearm.engine.base.writing import output_file, write_text
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.hexapod import DEVICE, Design, HexapodPose, side_names
 from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.document.document import Block, Words, detail, each, say, under
 from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
@@ -21,9 +23,7 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.urdf_writing import counting
 from truearm.hexapod.places import CupUncertainty, WorldFrame
 from truearm.hexapod.reachable import Reachable, steps_text
-from truearm.hexapod.sheet import CUP_DEVIATION, Attachments, legs_of_side, sheet_csv
-
-_CUPS: Final = ("t1", "t2", "t3")
+from truearm.hexapod.sheet import CUP_DEVIATION, Attachments, ChangerRepeatability, legs_of_side, sheet_csv
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,23 +36,18 @@ class HexapodPoses(Record):
     distinct: tuple[HexapodPose, ...]  #: Those of them that are left without near-equal ones.
     near_equal: tuple[tuple[int, int], ...]  #: Numbers of poses that teach much the same, in pairs.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "designs": self.designs,
-            "assemblies": self.assemblies,
-            "poses": len(self.poses),
-            "distinct": len(self.distinct),
-            "near_equal": [list(pair) for pair in self.near_equal],
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        return [
+    def blocks(self) -> Iterator[Block]:
+        """Give how many there are."""
+        yield say(
             f"{self.designs} designs, {self.assemblies} assemblies above the base",
             f"{len(self.poses)} poses with the flange beyond the tool's plane, {len(self.distinct)} distinct",
             f"Nearer than 30 deg and 50 mm: {', '.join(f'{a}-{b}' for a, b in self.near_equal)}",
-        ]
+            designs=self.designs,
+            assemblies=self.assemblies,
+            poses=len(self.poses),
+            distinct=len(self.distinct),
+            near_equal=[list(pair) for pair in self.near_equal],
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,28 +57,27 @@ class HexapodUncertainty(Record):
     solutions: tuple[CupUncertainty, ...]  #: Propagated, for each of the four ways to assemble a design.
     drawn: tuple[tuple[float, float, float], ...]  #: The same by Monte Carlo: T1, T2, T3 of each solution.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "solutions": [
-                {
-                    **dict(zip(_CUPS, found.norms, strict=True)),
-                    "t3_as_printed": float(np.linalg.norm(found.third_as_printed)),
-                }
-                for found in self.solutions
-            ],
-            "monte_carlo": [dict(zip(_CUPS, drawn, strict=True)) for drawn in self.drawn],
-        }
+    def blocks(self) -> Iterator[Block]:
+        """Give both for each solution."""
+        printed = [float(np.linalg.norm(found.third_as_printed)) for found in self.solutions]
+        norms = [found.norms for found in self.solutions]
+        yield say(
+            "solution     t1     t2     t3   t3 as printed   Monte Carlo: t1     t2     t3   [sigma]",
+            *(
+                f"{number:8}  {_three(row)}  {third:14.3f}  {_three(again):>32}"
+                for number, (row, third, again) in enumerate(zip(norms, printed, self.drawn, strict=True), 1)
+            ),
+            solutions=[_by_cup(row) | {"t3_as_printed": third} for row, third in zip(norms, printed, strict=True)],
+            monte_carlo=[_by_cup(drawn) for drawn in self.drawn],
+        )
 
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        said = self.summary()
-        text = ["solution     t1     t2     t3   t3 as printed   Monte Carlo: t1     t2     t3   [sigma]"]
-        for number, (row, again) in enumerate(zip(said["solutions"], said["monte_carlo"], strict=True), 1):
-            figures = "  ".join(f"{row[name]:5.3f}" for name in _CUPS)
-            checks = "  ".join(f"{again[name]:5.3f}" for name in _CUPS)
-            text.append(f"{number:8}  {figures}  {row['t3_as_printed']:14.3f}  {checks:>32}")
-        return text
+
+def _three(sigmas: Iterable[float]) -> str:
+    return "  ".join(f"{sigma:5.3f}" for sigma in sigmas)
+
+
+def _by_cup(sigmas: Iterable[float]) -> dict[str, float]:
+    return dict(zip(("t1", "t2", "t3"), sigmas, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +91,24 @@ class SolvedPose:
     place: str = ""  #: Name of the place of the base fixture; empty if the sheet has none.
     side: int = 1  #: On which side of four cups the legs were measured, 1 to 4.
 
+    def block(self, *, among: Sequence[SolvedPose]) -> Words:
+        """Return where the cups are, in mm; the side is said if others are measured on several."""
+        at = [f"place {self.place}"] if self.place else []
+        at += [f"side {self.side}"] if any(other.side > 1 for other in among) else []
+        at += [f"design {self.design.name}", f"solution {self.solution}"]
+        cups = (self.cups * 1e3).tolist()
+        return (say if len(among) == 1 else detail)(
+            f"{self.configuration or 'pose'}: {', '.join(at)}",
+            *(f"  T{cup}  x {x:.4f}  y {y:.4f}  z {z:.4f} mm" for cup, (x, y, z) in enumerate(cups, 1)),
+            configuration=self.configuration,
+            design=self.design.name,
+            solution=self.solution,
+            legs=list(legs_of_side(self.design, self.side)),
+            place=self.place or None,
+            side=self.side,
+            cups_mm=cups,
+        )
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodSolution(Record):
@@ -108,7 +120,6 @@ class HexapodSolution(Record):
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
     #: How well the tool changer repeats the cups; None if the tool was attached once, as far as is said.
     attached: Attachments | None = None
-    out: Path | None = None  #: The canonical CSV file that holds the cups; None if none was written.
 
     @property
     def notices(self) -> tuple[Notice, ...]:
@@ -124,80 +135,52 @@ class HexapodSolution(Record):
             ),
         )
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm."""
-        entries = [
-            {
-                "configuration": pose.configuration,
-                "design": pose.design.name,
-                "solution": pose.solution,
-                "legs": list(legs_of_side(pose.design, pose.side)),
-                "place": pose.place or None,
-                "side": pose.side,
-                "cups_mm": (pose.cups * 1e3).tolist(),
-            }
-            for pose in self.poses
-        ]
-        return {
-            "poses": entries,
-            "left_out": list(self.left_out),
-            "tool_changer": self._changer(),
-            "notices": notice_summaries(self.notices),
-        }
+    def blocks(self) -> Iterator[Block]:
+        """Give the cups of each pose, and how well the tool changer repeats them, in mm."""
+        yield each("poses", (pose.block(among=self.poses) for pose in self.poses))
+        missing = [f"Left out, not all legs measured: {', '.join(self.left_out)}"] if self.left_out else []
+        yield say(*missing, left_out=list(self.left_out))
+        repeats = None if self.attached is None else self.attached.found
+        yield say(tool_changer=None) if repeats is None else under("tool_changer", [_changer(repeats)])
+        yield say(*notice_lines(self.notices), notices=notice_summaries(self.notices))
 
-    def _changer(self) -> dict[str, Any] | None:
-        if self.attached is None or self.attached.found is None:
-            return None
-        found = self.attached.found
-        return {
-            "attachments": found.compared,
-            "pairs": found.pairs,
-            "deviation_mm": (found.changer * 1e3).tolist(),
-            "rest_mm": None if found.rest is None else (found.rest * 1e3).tolist(),
-            "mean_mm": (found.mean * 1e3).tolist(),
-            "largest_mm": (found.largest * 1e3).tolist(),
-            "ballbar_mm": CUP_DEVIATION * DEVICE.sigma * 1e3,
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        text = []
-        for pose in self.poses:
-            at = [f"place {pose.place}"] if pose.place else []
-            at += [f"side {pose.side}"] if any(other.side > 1 for other in self.poses) else []
-            at += [f"design {pose.design.name}", f"solution {pose.solution}"]
-            text.append(f"{pose.configuration or 'pose'}: {', '.join(at)}")
-            for cup, (x, y, z) in enumerate((pose.cups * 1e3).tolist(), 1):
-                text.append(f"  T{cup}  x {x:.4f}  y {y:.4f}  z {z:.4f} mm")
-        if self.left_out:
-            text.append(f"Left out, not all legs measured: {', '.join(self.left_out)}")
-        written = [] if self.out is None else [f"Written to {self.out}"]
-        return [*text, *self._changer_lines(), *notice_lines(self.notices), *written]
-
-    def _changer_lines(self) -> list[str]:
-        changer = self._changer()
-        if changer is None:
-            return []
-        worst = max(changer["deviation_mm"])
-        rest = "the robot's repeatability contained"
-        if changer["rest_mm"] is not None:
-            rest = "robot and ballbar without it {:.4f}, {:.4f}, {:.4f} mm".format(*changer["rest_mm"])
-        return [
-            f"Tool changer, from {counted(changer['pairs'], 'pair')} of readings with {changer['attachments']} "
-            "attachments:",
-            "  it repeats a coordinate of T1, T2, T3 to {:.4f}, {:.4f}, {:.4f} mm".format(*changer["deviation_mm"])
-            + f" ({rest})",
-            "  a cup is moved by {:.4f}, {:.4f}, {:.4f} mm on average,".format(*changer["mean_mm"])
-            + " by {:.4f}, {:.4f}, {:.4f} mm at most".format(*changer["largest_mm"]),
-            f"  the ballbar alone would know it to {changer['ballbar_mm']:.4f} mm: taking the tool off costs "
-            f"{worst / changer['ballbar_mm']:.0f} times as much. The data declare it.",
-        ]
+    def written_at(self, out: str) -> str:
+        """Return the line that says which file holds the cups."""
+        return f"Written to {out}"
 
     def save(self, file: str | Path) -> None:
         """Write the cups as a canonical CSV file, for ``truearm.calibrate``."""
         if self.data is None:
             raise InputError("there are no joint positions, so this is no data", parameter="file")
         write_text(output_file(file, self.inputs), csv_text(self.data))
+
+
+def _changer(found: ChangerRepeatability) -> Words:
+    """Return how well the tool changer repeats the cups, in mm."""
+    deviation, mean, largest = ((values * 1e3).tolist() for values in (found.changer, found.mean, found.largest))
+    robot = None if found.rest is None else (found.rest * 1e3).tolist()
+    ballbar = CUP_DEVIATION * DEVICE.sigma * 1e3
+    rest = "the robot's repeatability contained"
+    if robot is not None:
+        rest = f"robot and ballbar without it {_lengths(robot)} mm"
+    return say(
+        f"Tool changer, from {counted(found.pairs, 'pair')} of readings with {found.compared} attachments:",
+        f"  it repeats a coordinate of T1, T2, T3 to {_lengths(deviation)} mm ({rest})",
+        f"  a cup is moved by {_lengths(mean)} mm on average, by {_lengths(largest)} mm at most",
+        f"  the ballbar alone would know it to {ballbar:.4f} mm: taking the tool off costs "
+        f"{max(deviation) / ballbar:.0f} times as much. The data declare it.",
+        attachments=found.compared,
+        pairs=found.pairs,
+        deviation_mm=deviation,
+        rest_mm=robot,
+        mean_mm=mean,
+        largest_mm=largest,
+        ballbar_mm=ballbar,
+    )
+
+
+def _lengths(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:.4f}" for value in values)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -210,51 +193,35 @@ class HexapodPlan(Record):
     joints_are: JointsOf = "model"
     files: tuple[Path, ...] = ()  #: Those that were written.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm."""
-        found = self.reachable
-        return {
-            "poses": found.poses,
-            "poses_reached": found.poses_reached,
-            "joints_are": self.joints_are,
-            "configurations": len(found.rows),
-            "places": self._places(),
-            "left_out": dict(found.left_out),
-            "smallest_room_mm": float(found.clearance.min()) * 1e3,
-        }
+    def blocks(self) -> Iterator[Block]:
+        """Give how many configurations there are, at which places, and what was left out, in mm."""
+        found, room = self.reachable, float(self.reachable.clearance.min()) * 1e3
+        yield say(
+            f"{found.poses_reached} of {found.poses} poses, {len(found.rows)} configurations",
+            poses=found.poses,
+            poses_reached=found.poses_reached,
+            configurations=len(found.rows),
+        )
+        yield each("places", self._places())
+        left_out = ", ".join(f"{n} {why}" for why, n in found.left_out.items())
+        yield say(f"Left out: {left_out or 'nothing'}", left_out=dict(found.left_out))
+        yield say(f"Smallest room between arm and bars: {room:.0f} mm", smallest_room_mm=room)
+        yield say(*joints_lines(self.joints_are), joints_are=self.joints_are)
+        if self.files:
+            yield say(f"Written to {', '.join(map(str, self.files))}")
 
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        said = self.summary()
-        left_out = ", ".join(f"{n} {why}" for why, n in said["left_out"].items())
-        return [
-            f"{said['poses_reached']} of {said['poses']} poses, {said['configurations']} configurations",
-            *self._place_lines(said["places"]),
-            f"Left out: {left_out or 'nothing'}",
-            f"Smallest room between arm and bars: {said['smallest_room_mm']:.0f} mm",
-            *joints_lines(self.joints_are),
-            *([f"Written to {', '.join(map(str, self.files))}"] if self.files else []),
-        ]
-
-    def _places(self) -> list[dict[str, Any]]:
-        """Return how many configurations there are at each place, and on each side."""
-        sides: dict[str, dict[str, int]] = {}
+    def _places(self) -> Iterator[Words]:
+        """Give how many configurations there are at each place, and on each side."""
+        sides: dict[str, Counter[str]] = {}
         for row in self.reachable.rows:
-            of_place = sides.setdefault(row.place, {})
-            of_place[str(row.side)] = of_place.get(str(row.side), 0) + 1
-        return [{"place": name or None, "sides": dict(sorted(found.items()))} for name, found in sides.items()]
-
-    def _place_lines(self, places: list[dict[str, Any]]) -> list[str]:
-        with_sides = any(len(place["sides"]) > 1 for place in places)
-        if len(places) == 1 and not with_sides:
-            return []
-        text = []
-        for place in places:
-            line = f"{place['place'] or 'The fixture'}: {counted(sum(place['sides'].values()), 'configuration')}"
-            if with_sides:
-                line += f" ({', '.join(f'{n} on side {side}' for side, n in place['sides'].items())})"
-            text.append(line)
-        return text
+            sides.setdefault(row.place, Counter())[str(row.side)] += 1
+        several = any(len(counts) > 1 for counts in sides.values())
+        for place, counts in sides.items():
+            line = f"{place or 'The fixture'}: {counted(counts.total(), 'configuration')}"
+            if several:
+                line += f" ({', '.join(f'{n} on side {side}' for side, n in sorted(counts.items()))})"
+            told = [line] if several or len(sides) > 1 else []
+            yield say(*told, place=place or None, sides=dict(sorted(counts.items())))
 
     def sheet_text(self) -> str:
         """Return the sheet to fill in, as CSV."""
@@ -272,28 +239,22 @@ class HexapodFrame(Record):
     found: WorldFrame  #: The frame, what it would be without the measured distances, and what is left at the cups.
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm."""
+    def blocks(self) -> Iterator[Block]:
+        """Give the frame, the distances between its cups by the robot, and what is left at them, in mm."""
         found = self.found
-        return {
-            "position_mm": [value * 1e3 for value in found.frame.translation],
-            "quaternion": list(found.frame.quaternion),
-            "plain": {
+        x, y, z = position = [value * 1e3 for value in found.frame.translation]
+        yield say(
+            f"Base fixture in the robot's base frame: x {x:.4f}  y {y:.4f}  z {z:.4f} mm",
+            "  quaternion {:.8f} {:.8f} {:.8f} {:.8f}".format(*found.frame.quaternion),
+            position_mm=position,
+            quaternion=list(found.frame.quaternion),
+            plain={
                 "position_mm": [value * 1e3 for value in found.plain.translation],
                 "quaternion": list(found.plain.quaternion),
             },
-            "distances_by_robot_mm": (found.seen * 1e3).tolist(),
-            "residuals_mm": (np.linalg.norm(found.residual, axis=1) * 1e3).tolist(),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
-        said = self.summary()
-        x, y, z = said["position_mm"]
-        seen = ", ".join(f"{n} {s:.3f}" for n, s in zip(side_names("B"), said["distances_by_robot_mm"], strict=True))
-        return [
-            f"Base fixture in the robot's base frame: x {x:.4f}  y {y:.4f}  z {z:.4f} mm",
-            "  quaternion {:.8f} {:.8f} {:.8f} {:.8f}".format(*said["quaternion"]),
-            f"Distances by the robot: {seen} mm",
-            "Left at the cups: {:.4f}, {:.4f}, {:.4f} mm".format(*said["residuals_mm"]),
-        ]
+        )
+        distances = (found.seen * 1e3).tolist()
+        seen = ", ".join(f"{name} {length:.3f}" for name, length in zip(side_names("B"), distances, strict=True))
+        yield say(f"Distances by the robot: {seen} mm", distances_by_robot_mm=distances)
+        left = (np.linalg.norm(found.residual, axis=1) * 1e3).tolist()
+        yield say(f"Left at the cups: {_lengths(left)} mm", residuals_mm=left)

@@ -64,10 +64,9 @@ def solved(asked: SolveCups) -> HexapodSolution:
             [one if isinstance(one, Sheet) else read_sheet(path_argument(one, "sheet"), device) for one in given]
         )
     found = _of_sheet(whole, inputs, with_data=path is not None)
-    if path is None:
-        return found
-    found.save(path)
-    return replace(found, out=path)
+    if path is not None:
+        found.save(path)
+    return found
 
 
 def _of_sheet(whole: Sheet, inputs: tuple[Path, ...], *, with_data: bool) -> HexapodSolution:

@@ -8,6 +8,7 @@ from typing import Any
 
 from truearm.engine.base.files import confined_reads
 from truearm.engine.base.units import with_mark, without_mark
+from truearm.engine.document.document import lines_of
 from truearm.studio.tasks import Outcome, Progress, done, given
 
 
@@ -33,7 +34,7 @@ def simulate_tests(folder: Path, robot: str, plan: str, out: str, progress: Prog
     os.chdir(folder)
     with confined_reads(folder):
         made = done(SimulateTests(robot, plan, out=out, progress=progress, **given(options)))
-    return Outcome(tuple(made.lines()), (), made.files())
+    return Outcome(tuple(made.lines()), (), tuple(made.written))
 
 
 def evaluate_tests(folder: Path, plan: str, out: str, progress: Progress, **options: Any) -> Outcome:
@@ -43,7 +44,7 @@ def evaluate_tests(folder: Path, plan: str, out: str, progress: Progress, **opti
     os.chdir(folder)
     with confined_reads(folder):
         made = done(EvaluateTests(plan, out=out, progress=progress, **given(options)))
-    beside = () if made.comparison is None else made.comparison.lines()
+    beside = () if made.comparison is None else lines_of(made.comparison.blocks())
     said = without_mark(made.lines())
     absent = [line for line in said if line.startswith("Not measured:")]
     shown = with_mark((*said[:2], *absent, *beside), made.simulated_from)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from truearm.engine.base.errors import InputError, Words, shortened
 from truearm.engine.base.files import read_text
+from truearm.engine.document.document import Block, detail, say
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.rows import Component, Status
 from truearm.iso9283.planning.criteria import TEST_OF, TESTS, PerformancePlan
@@ -316,28 +317,24 @@ class Comparison:
     curves: Mapping[Key, Course] = field(default_factory=dict)
     offsets: Mapping[Key, tuple[float, ...]] = field(default_factory=dict)
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "other": self.other,
-            "values": [vars(row) for row in self.rows],
-            "left_out": list(self.left_out),
-            "unlike": {why: list(ids) for why, ids in self.unlike.items()},
-            "unknown_plan": self.unknown_plan,
-        }
-
-    def lines(self) -> list[str]:
-        """Return what is smaller and what is larger than in the other result."""
-        text = [f"Beside {self.other}: {len(self.rows)} values that both have."]
-        for verdict in ("smaller", "larger", "not told apart", "no interval"):
+    def blocks(self) -> Iterator[Block]:
+        """Give what is smaller and what is larger than in the other result."""
+        yield say(
+            f"Beside {self.other}: {len(self.rows)} values that both have.",
+            other=self.other,
+            values=[vars(row) for row in self.rows],
+            left_out=list(self.left_out),
+            unlike={why: list(ids) for why, ids in self.unlike.items()},
+            unknown_plan=self.unknown_plan,
+        )
+        for verdict in get_args(Verdict):
             rows = [row for row in self.rows if row.verdict == verdict]
-            shown = [row for row in rows if row.component == "position"][:8]
-            if rows and verdict in ("smaller", "larger"):
-                text.append(f"  {verdict} by more than both intervals leave open: {len(rows)}")
-                text += [f"    {row.id} {row.where}, {row.under}: {row.change}" for row in shown]
-            elif rows:
-                text.append(f"  {verdict}: {len(rows)}")
-        return text
+            told_apart = verdict in ("smaller", "larger")
+            if rows:
+                yield say(f"  {verdict}{' by more than both intervals leave open' * told_apart}: {len(rows)}")
+            if told_apart:
+                shown = [row for row in rows if row.component == "position"][:8]
+                yield detail(*(f"    {row.id} {row.where}, {row.under}: {row.change}" for row in shown))
 
 
 #: Criteria whose values depend on how the instrument was tied to the base.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
@@ -17,7 +17,8 @@ from truearm.engine.command.arguments import (
     files_of,
     folder_beside,
 )
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, say, under
+from truearm.engine.document.records import Record
 from truearm.engine.motion.cube import Cube
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.alignment import Alignment, read_alignment, refuse_implausible
@@ -27,7 +28,6 @@ from truearm.iso9283.evaluating.evaluation import Evaluation, Measurements, eval
 from truearm.iso9283.evaluating.reading import read_attained_poses, read_pushes
 from truearm.iso9283.evaluating.samples import read_path_samples, read_settling_samples
 from truearm.iso9283.evaluating.table import (
-    HEADING,
     UNITS,
     conditions_summary,
     copied_notices,
@@ -48,6 +48,8 @@ RESULT: Final = "iso9283.json"
 REPORT: Final = "report.html"
 EVALUATION_FILES: Final = (RESULT, REPORT)
 SCHEMA: Final = "truearm-iso9283-result/1"
+#: So many criteria are on the first screen.
+_FIRST: Final = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,30 +71,47 @@ class Iso9283Evaluation(Record):
         """All values, in the order of the standard's table."""
         return self.evaluation.values
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, units beside the values."""
-        tie = self.evaluation.alignment
-        return {
-            "truearm": SCHEMA,
-            "robot": self.plan.robot.name,
-            "alignment": {
+    def blocks(self) -> Iterator[Block]:
+        """Give each criterion at its worst place, at the fastest velocity and at others; the rest is in the files."""
+        tie, sigma_rot = self.evaluation.alignment, self.instrument.sigma_rot
+        measured = [value for value in self.values if value.status != "not-measured"]
+        criteria = {value.id for value in measured}
+        yield say(
+            f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {counted_criteria(len(criteria))}.",
+            truearm=SCHEMA,
+            robot=self.plan.robot.name,
+            inputs={name: one.model_dump() for name, one in self.read.items()},
+            rated={"load_kg": self.plan.rated_load, "velocity_mm_s": self.plan.rated_velocity * 1e3},
+            plan=plan_summary(self.plan),
+        )
+        yield detail(
+            self.tied,
+            alignment={
                 "kind": tie.kind,
                 "standard": tie.is_standard,
                 "sigma_mm": tie.sigma * 1e3,
                 "sigma_rot_deg": math.degrees(tie.sigma_rot),
             },
-            "instrument": {
+            instrument={
                 "sigma_mm": self.instrument.sigma * 1e3,
-                "sigma_rot_deg": None if self.instrument.sigma_rot is None else math.degrees(self.instrument.sigma_rot),
+                "sigma_rot_deg": None if sigma_rot is None else math.degrees(sigma_rot),
             },
-            "inputs": {name: one.model_dump() for name, one in self.read.items()},
-            "rated": {"load_kg": self.plan.rated_load, "velocity_mm_s": self.plan.rated_velocity * 1e3},
-            "plan": plan_summary(self.plan),
-            "criteria": [value_summary(value) for value in self.values],
-            **self._drawn(),
-            **({} if self.comparison is None else {"comparison": self.comparison.summary()}),
-            "warnings": notice_summaries(self.warnings),
-        }
+        )
+        rows = [worst.cells for worst in worst_places(self.values)]
+        wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ["  " + "  ".join(map(str.ljust, row, wide)).rstrip() for row in rows]
+        if lines:
+            yield (say if self.comparison is None else detail)(
+                "Each at its worst place and fastest velocity, with its 95 % interval or the range of its cycles.",
+                *lines[:_FIRST],
+            )
+            yield detail(*lines[_FIRST:], f"All places, axes and angles are in the report and in {RESULT}.")
+        yield say(criteria=[value_summary(value) for value in self.values], **self._drawn())
+        absent = dict.fromkeys(value.id for value in self.values if value.id not in criteria)
+        if absent:
+            yield say(f"Not measured: {', '.join(absent)}.")
+        if self.comparison is not None:
+            yield under("comparison", self.comparison.blocks())
 
     def _drawn(self) -> dict[str, Any]:
         """Return what another result draws beside its own: deviations along paths, and barycentres from commands."""
@@ -117,29 +136,6 @@ class Iso9283Evaluation(Record):
             if cloud.test == "AP"
         ]
         return {**({"curves": curves} if curves else {}), **({"offsets": offsets} if offsets else {})}
-
-    def lines(self) -> list[str]:
-        """Return each criterion at its worst place, at the fastest velocity and at others; the rest is in the files."""
-        measured = [value for value in self.values if value.status != "not-measured"]
-        absent = list(dict.fromkeys(value.id for value in self.values if value.status == "not-measured"))
-        absent = [id_ for id_ in absent if id_ not in {value.id for value in measured}]
-        criteria = len({value.id for value in measured})
-        text = [f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {counted_criteria(criteria)}."]
-        text.append(self.tied)
-        rows = [worst.cells for worst in worst_places(self.values)]
-        if rows:
-            text.append(
-                "Each at its worst place and fastest velocity, with its 95 % interval or the range of its cycles."
-            )
-        wide = [max((len(row[k]) for row in rows), default=0) for k in range(len(HEADING))]
-        text += ["  " + "  ".join(cell.ljust(wide[k]) for k, cell in enumerate(row)).rstrip() for row in rows]
-        if rows:
-            text.append(f"All places, axes and angles are in the report and in {RESULT}.")
-        if absent:
-            text.append(f"Not measured: {', '.join(absent)}.")
-        if self.comparison is not None:
-            text += self.comparison.lines()
-        return [*text, *notice_lines(self.warnings)]
 
     @property
     def tied(self) -> str:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from truearm.engine.base.errors import Notice, counted, millimetres
 from truearm.engine.base.writing import output_folder, write_files
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, Words, detail, each, say, under
+from truearm.engine.document.records import Record
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, PlannedTest
 from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text
@@ -30,6 +31,22 @@ class WrittenPrograms:
     count: int  #: How many programs they are.
     share: float  #: Velocity of the slow run, in that of the robot; that of single tests may be lower.
 
+    def block(self) -> Words:
+        """Return how many there are, and how fast they run, in percent."""
+        fast = "every velocity."
+        if self.record is not None:
+            fast = (
+                f"up to {100 * self.share:g} % of the velocity. The faster ones are written when {SLOW_RUN} says that "
+                "the slow run is completed."
+            )
+        return say(
+            f"{counted(self.count, 'measuring program')} in {self.language}, at {fast}",
+            language=self.language,
+            slow_percent=round(100.0 * self.share, 6),
+            slow_run_completed=self.record is None,
+            files=list(self.files),
+        )
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Iso9283Plan(Record):
@@ -41,30 +58,6 @@ class Iso9283Plan(Record):
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
     programs: WrittenPrograms | None = None  #: Measuring programs; None where they were not asked for.
     kept: str = ""  #: What all ways keep clear of, in words; nothing where no cell was stated.
-
-    def summary(self) -> dict[str, Any]:
-        """Return the plan as JSON holds it: lengths in mm, velocities and loads in percent of the rated ones."""
-        plan = self.plan
-        return {
-            "robot": plan.robot.name,
-            "target": plan.target,
-            "cube_mm": {"centre": (plan.cube.centre * 1e3).tolist(), "side": plan.cube.side * 1e3, "plane": plan.plane},
-            "rated_load_kg": plan.rated_load,
-            "rated_velocity_mm_s": plan.rated_velocity * 1e3,
-            "tests": [
-                {
-                    "criterion": test.id,
-                    "criteria": list(TESTS[test.id].criteria),
-                    "places": list(test.places),
-                    "cycles": test.cycles,
-                    "velocities_percent": [round(v * 100.0, 6) for v in test.velocities],
-                    "loads_percent": [round(v * 100.0, 6) for v in test.loads],
-                }
-                for test in plan.tests
-            ],
-            **({} if self.programs is None else {"programs": _of_programs(self.programs)}),
-            "warnings": notice_summaries(self.warnings),
-        }
 
     @property
     def answer(self) -> list[str]:
@@ -78,27 +71,26 @@ class Iso9283Plan(Record):
             *([self.kept] if self.kept else []),
         ]
 
-    def lines(self) -> list[str]:
-        """Return what is planned, test by test."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what is planned, test by test: lengths in mm, velocities and loads in percent of the rated ones."""
+        plan = self.plan
+        yield say(
+            *self.answer,
+            robot=plan.robot.name,
+            target=plan.target,
+            cube_mm={"centre": (plan.cube.centre * 1e3).tolist(), "side": plan.cube.side * 1e3, "plane": plan.plane},
+            rated_load_kg=plan.rated_load,
+            rated_velocity_mm_s=plan.rated_velocity * 1e3,
+        )
         rows = [
             (", ".join(TESTS[test.id].criteria), TESTS[test.id].name, ", ".join(test.places), how_often(test))
-            for test in self.plan.tests
+            for test in plan.tests
         ]
-        wide = [max(len(row[k]) for row in rows) for k in range(3)]
-        table = ["  ".join([*(row[k].ljust(wide[k]) for k in range(3)), row[3]]).rstrip() for row in rows]
-        return [*self.answer, *table, *self._program_lines(), *notice_lines(self.warnings)]
-
-    def _program_lines(self) -> list[str]:
-        programs = self.programs
-        if programs is None:
-            return []
-        written = f"{counted(programs.count, 'measuring program')} in {programs.language}"
-        if programs.record is None:
-            return [f"{written}, at every velocity."]
-        return [
-            f"{written}, at up to {100 * programs.share:g} % of the velocity. The faster ones are written when "
-            f"{SLOW_RUN} says that the slow run is completed."
-        ]
+        wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ["  ".join(map(str.ljust, row, wide)).rstrip() for row in rows]
+        yield each("tests", map(_test, plan.tests, lines))
+        if self.programs is not None:
+            yield under("programs", [self.programs.block()])
 
     def contents(self) -> dict[str, str]:
         """Return the texts of all files by their names."""
@@ -124,13 +116,16 @@ class Iso9283Plan(Record):
         return tuple(out / name for name in contents)
 
 
-def _of_programs(programs: WrittenPrograms) -> dict[str, Any]:
-    return {
-        "language": programs.language,
-        "slow_percent": round(100.0 * programs.share, 6),
-        "slow_run_completed": programs.record is None,
-        "files": list(programs.files),
-    }
+def _test(test: PlannedTest, line: str) -> Words:
+    return detail(
+        line,
+        criterion=test.id,
+        criteria=list(TESTS[test.id].criteria),
+        places=list(test.places),
+        cycles=test.cycles,
+        velocities_percent=[round(v * 100.0, 6) for v in test.velocities],
+        loads_percent=[round(v * 100.0, 6) for v in test.loads],
+    )
 
 
 def how_often(test: PlannedTest) -> str:

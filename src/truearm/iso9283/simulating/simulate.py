@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from truearm.engine.command.arguments import (
     folder_for,
     robot_argument,
 )
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, say
+from truearm.engine.document.records import Record
 from truearm.engine.programs.fake_targets import fake_targets, nominal_robot
 from truearm.engine.programs.gauge import best_agreement
 from truearm.engine.robot.chain import Array
@@ -97,44 +99,44 @@ class Iso9283Simulation(Record):
             "forces": 0 if campaign.forces is None else len(campaign.forces.force),
         }
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "robot": self.robot,
-            "truth": self.truth,
-            "corrected": self.corrected,
-            "tests": list(self.tests),
-            "rows": self._counts(),
-            "rate_hz": self.tracker.rate,
-            "noise_mm": from_si(self.tracker.sigma, "mm"),
-            "noise_rot_deg": from_si(self.tracker.sigma_rot, "deg"),
-            "hours": self.campaign.duration / 3600.0,
-            "files": [] if self.out is None else [str(self.out / name) for name in self.files()],
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was run and read."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what was run and read, in mm and deg."""
         commands = "nominal commands" if self.corrected is None else f"commands corrected by {self.corrected}"
-        text = [f"{counted(len(self.tests), 'test')} of {self.robot} ({self.truth}), {commands}"]
-        words = {"poses": "attained pose", "paths": "sample", "settling": "sample", "forces": "reading"}
-        where = {"paths": " along paths", "settling": " of the way to a pose", "forces": " under a push"}
-        for name, count in self._counts().items():
-            if count:
-                text.append(f"  {counted(count, words[name])}{where.get(name, '')}")
-        text.append(f"  {self.campaign.duration / 3600.0:.1f} hours in the cell")
-        if self.out is not None:
-            text.append(f"Written to {self.out}: {', '.join(self.files())}")
-        return text + notice_lines(self.warnings)
+        yield say(
+            f"{counted(len(self.tests), 'test')} of {self.robot} ({self.truth}), {commands}",
+            robot=self.robot,
+            truth=self.truth,
+            corrected=self.corrected,
+            tests=list(self.tests),
+        )
+        nouns = {
+            "poses": ("attained pose", ""),
+            "paths": ("sample", " along paths"),
+            "settling": ("sample", " of the way to a pose"),
+            "forces": ("reading", " under a push"),
+        }
+        rows = self._counts()
+        read = [f"  {counted(rows[name], noun)}{where}" for name, (noun, where) in nouns.items() if rows[name]]
+        yield say(
+            *read,
+            rows=rows,
+            rate_hz=self.tracker.rate,
+            noise_mm=from_si(self.tracker.sigma, "mm"),
+            noise_rot_deg=from_si(self.tracker.sigma_rot, "deg"),
+        )
+        hours = self.campaign.duration / 3600.0
+        files = [] if self.out is None else [str(self.out / name) for name in self.written]
+        yield say(f"  {hours:.1f} hours in the cell", hours=hours, files=files)
 
-    def files(self) -> tuple[str, ...]:
-        """Return the names of the files that hold it."""
+    @property
+    def written(self) -> tuple[str, ...]:
+        """Names of the files that hold it."""
         counts = self._counts()
         return tuple(name for name in FILES if counts.get(name.partition(".")[0], 1))
 
     def save(self, folder: str | Path) -> None:
         """Write the files into a folder."""
-        place = output_folder(folder, self.files(), self.inputs, "folder", ours=True)
+        place = output_folder(folder, self.written, self.inputs, "folder", ours=True)
         campaign, texts = self.campaign, {}
         if campaign.poses is not None:
             texts["poses.csv"] = poses_text(campaign.poses)

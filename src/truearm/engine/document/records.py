@@ -76,9 +76,9 @@ class Record:
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them, units in the names."""
-        parts = self.simulated_from
-        made: dict[str, Any] = {"simulated": True, "simulated_parts": [*parts]} if parts else {}
-        made |= held_by(self.blocks())
+        parts, held = self.simulated_from, held_by(self.blocks())
+        schema = {name: held[name] for name in ("truearm",) if name in held}
+        made = schema | ({"simulated": True, "simulated_parts": [*parts]} if parts else {}) | held
         if hasattr(self, "next"):
             made["next"] = [step.summary() for step in self.next]
         if hasattr(self, "warnings"):

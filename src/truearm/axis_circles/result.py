@@ -25,7 +25,7 @@ from truearm.engine.command.arguments import (
 )
 from truearm.engine.document.document import Block, Words, detail, each, say, under
 from truearm.engine.document.records import Record
-from truearm.engine.fit.problem import in_words
+from truearm.engine.fit.problem import Redundancy, in_words
 from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.lines import joint_axes
 from truearm.engine.robot.parameters import FreeParameters, Parameter

@@ -147,6 +147,7 @@ class JointTable(Record):
             poses=found.poses,
             poses_reached=reached,
             rows=len(found.status),
+            joints_are=self.joints_are,
             status=dict(status),
         )
         attention = self.attention
@@ -155,7 +156,7 @@ class JointTable(Record):
             yield detail(f"  {name}: {entry['status']}. {entry['advice']}")
         rest = len(attention) - _EXPLAINED
         yield detail(*([f"  and {rest} more; the JSON summary lists all"] if rest > 0 else []), attention=[*attention])
-        yield say(*joints_lines(self.joints_are), joints_are=self.joints_are)
+        yield say(*joints_lines(self.joints_are))
 
 
 def found_joints(asked: FindJoints) -> JointTable:

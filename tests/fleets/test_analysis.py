@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 from tests.fleets.simulated_series import campaign, rows
 
-from truearm.fleets.analysis import analysed
+from truearm.engine.document.document import held_by, lines_of
+from truearm.fleets.analysis import Analysis, analysed
 from truearm.fleets.series import Accuracy, FoundParameters, Row
-from truearm.fleets.words import analysis_lines, analysis_notices, analysis_summary
+from truearm.fleets.words import analysis_blocks, analysis_notices
 
 COUNT = len(campaign().own)
+
+
+def analysis_lines(found: Analysis) -> list[str]:
+    return lines_of(analysis_blocks(found))
 
 
 def series(robots: int, seed: int = 1, error: float = 5e-5) -> list[Row]:
@@ -117,7 +122,7 @@ def test_notices_say_what_figures_do_not() -> None:
 
 
 def test_json_holds_figures_in_mm_and_deg() -> None:
-    said = analysis_summary(analysed(series(12)))
+    said = held_by(analysis_blocks(analysed(series(12))))
     (kind,) = said["kinds"]
     told = {row["name"]: row for row in kind["parameters"]}
     assert told["a_3"]["unit"] == "mm"
@@ -167,7 +172,7 @@ def test_results_that_end_with_an_error_are_in_no_figure() -> None:
     assert "Left out of all figures, because their results end with an error: 1 robot (robot-5)." in analysis_lines(
         found
     )
-    assert analysis_summary(found)["left_out"] == ["robot-5"]
+    assert held_by(analysis_blocks(found))["left_out"] == ["robot-5"]
 
 
 def test_of_a_machine_the_last_campaign_without_an_error_counts() -> None:

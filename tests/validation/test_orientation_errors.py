@@ -13,7 +13,7 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, quaternion_from_rotation, rotation_from_vector
-from truearm.validation.region import orientation_errors, orientation_lines, orientation_summary, zxz_angles
+from truearm.validation.region import orientation_block, orientation_errors, zxz_angles
 
 
 def about(axis: str, angle: Array) -> Array:
@@ -74,9 +74,9 @@ def test_a_turn_about_an_axis_of_the_base_shows_there() -> None:
     assert found.zxz[np.isfinite(found.zxz[:, 0])] == pytest.approx(
         np.tile([0.01, 0.0, 0.0], (20 - found.locked, 1)), abs=1e-9
     )
-    summary = orientation_summary(found)
-    assert summary["rotation_vector"]["rz"]["mean"] == pytest.approx(np.degrees(0.01))
-    assert summary["zxz"]["phi"]["max"] == pytest.approx(np.degrees(0.01))
+    held = orientation_block(found).held["orientation_parts_deg"]
+    assert held["rotation_vector"]["rz"]["mean"] == pytest.approx(np.degrees(0.01))
+    assert held["zxz"]["phi"]["max"] == pytest.approx(np.degrees(0.01))
 
 
 def test_angles_across_half_a_turn_differ_by_little() -> None:
@@ -98,16 +98,15 @@ def test_where_the_middle_angle_is_nearly_zero_the_others_are_left_out() -> None
     assert found.locked == 1
     assert np.isnan(found.zxz[0, [0, 2]]).all()
     assert np.isfinite(found.zxz[1]).all()
-    (line,) = orientation_lines(found)
+    (line,) = orientation_block(found).lines
     assert "(Phi and Psi without 1 readings near Theta 0 or 180)" in line
     alone = orientation_errors(robot, data.of_configurations([0]), errors_of(robot, data.of_configurations([0])))
     assert alone is not None
-    assert orientation_summary(alone)["zxz"]["phi"] is None
-    assert "Phi –" in orientation_lines(alone)[0]
+    assert alone.parts["phi"] is None
+    assert "Phi –" in orientation_block(alone).text
 
 
 def test_positions_alone_have_no_orientation() -> None:
     robot, data = with_poses(about("x", np.zeros(2)), np.zeros((2, 6)))
     plain = replace(data, quaternion=None)
     assert orientation_errors(robot, plain, errors_of(robot, plain)) is None
-    assert orientation_lines(None) == []

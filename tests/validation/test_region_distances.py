@@ -19,7 +19,7 @@ from truearm.engine.robot.proof import MOST_MEASURED, Proof
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import is_intact
 from truearm.validation.jobs import validate
-from truearm.validation.region import RegionDistances, distance_lines, distance_summary, region_distances
+from truearm.validation.region import RegionDistances, distance_block, region_distances
 from truearm.validation.validate import measure_farther
 
 
@@ -111,14 +111,14 @@ def test_errors_that_grow_with_the_distance_are_told() -> None:
     (step,) = measure_farther(grows)
     assert step.code == "measure-more"
     assert "Calibrate with configurations that reach farther" in step.message
-    assert distance_summary(grows)["grows"] is True
-    assert distance_summary(grows)["joints_deg"] == []
+    held = distance_block(grows).held["distance_from_training"]
+    assert (held["grows"], held["joints_deg"]) == (True, [])
     spans = grows.spans(grows.tip)
     assert [span.readings for span in spans] == [18] * 5
     assert spans[0].mean < spans[2].mean < spans[4].mean
     level = replace(grows, error=1e-4 * rng.uniform(0.8, 1.2, 90))
     assert measure_farther(level) == ()
-    assert "deg" not in distance_lines(level)[0]
+    assert "deg" not in distance_block(level).text
     few = replace(grows, configuration=np.zeros(90, dtype=np.intp))
     assert few.growth is None
     assert measure_farther(few) == ()

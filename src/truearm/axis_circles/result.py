@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,11 +23,12 @@ from truearm.engine.command.arguments import (
     refuse_swapped,
     robot_argument,
 )
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
-from truearm.engine.fit.problem import in_words
+from truearm.engine.document.document import Block, Words, detail, each, say, under
+from truearm.engine.document.records import Record
+from truearm.engine.fit.problem import Redundancy, in_words
 from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.lines import joint_axes
-from truearm.engine.robot.parameters import FreeParameters
+from truearm.engine.robot.parameters import FreeParameters, Parameter
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.engine.robot.transform import Transform
@@ -65,53 +67,34 @@ class AxisCalibration(Record):
         """Names of the files that hold it."""
         return AXIS_FILES
 
-    @cached_property
-    def _summary(self) -> dict[str, Any]:
+    def blocks(self) -> Iterator[Block]:
+        """Give the circles, the axes, and the robot's parameters and joint errors, in mm, deg and mrad."""
         found = self.analysis
-        return {
-            "truearm": "truearm-axes/1",
-            "robot": found.nominal.name,
-            "configurations": found.data.configurations,
-            "left_out": found.found.left_out,
-            "frame": "robot" if found.in_robot_frame else "instrument",
-            "declared": found.found.declared,
-            "excess": found.found.excess,
-            "circles": [_circle(circle) for circle in found.found.circles],
-            "axes": self._axes(),
-            "base": _placed(found.base),
-            "flange": _placed(found.flange),
-            "targets": {t.name: [self.robot.values[t.parameter(a)] * 1e3 for a in "xyz"] for t in self.robot.targets},
-            "tables": {name: self._table(name) for name in TABLES},
-            "joint_errors": joint_errors_summary(found.errors),
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def summary(self) -> dict[str, Any]:
-        """Return what ``axes.json`` holds, in mm, deg and mrad."""
-        return self._summary
-
-    def lines(self) -> list[str]:
-        """Return the circles and the joint errors, as the command prints them."""
-        text = [
+        yield say(
+            truearm="truearm-axes/1",
+            robot=found.nominal.name,
+            configurations=found.data.configurations,
+            left_out=found.found.left_out,
+            frame="robot" if found.in_robot_frame else "instrument",
+            declared=found.found.declared,
+            excess=found.found.excess,
+        )
+        yield detail(
             "joint  target  points   arc [deg]  radius [mm]  axis +/- [mm]  [mrad]  tangential [mm]  backlash [deg]"
-        ]
-        for c in map(_circle, self.analysis.found.circles):
-            lag = "" if c["backlash_deg"] is None else f"{c['backlash_deg']:.4f}"
-            line = (
-                f"{c['joint']:<6} {c['target']:<7} {c['points']:<8} {c['arc_deg']:<10.1f} {c['radius_mm']:<12.3f} "
-                f"{c['centre_deviation_mm']:<14.4f} {c['direction_deviation_mrad']:<7.3f} "
-                f"{c['tangential_range_mm']:<16.4f} {lag}"
-            )
-            text.append(line.rstrip())
-        errors = joint_errors_summary(self.analysis.errors)
-        text.append(f"Joint errors: {len(errors['found'])} found, in 95 % intervals:")
-        for e in errors["found"]:
-            low, high = e["interval"]
-            text.append(f"  {e['is']:<24} {e['value']:9.4f} {e['unit']:<4} {low:9.4f} to {high:.4f}")
-        text.append("Unobservable with circles, and held at their nominal values:")
-        for e in errors["unseen"]:
-            text.append(f"  {e['combination']}{' (moves the flange)' if e['moves_flange'] else ''}")
-        return text + notice_lines(self.warnings)
+        )
+        yield each("circles", map(_circle, found.found.circles))
+        yield say(
+            axes=self._axes(),
+            base=_placed(found.base),
+            flange=_placed(found.flange),
+            targets={t.name: [self.robot.values[t.parameter(a)] * 1e3 for a in "xyz"] for t in self.robot.targets},
+            tables=self._tables,
+        )
+        yield under("joint_errors", joint_errors(found.errors))
+
+    @cached_property
+    def _tables(self) -> dict[str, Any]:
+        return {name: self._table(name) for name in TABLES}
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write ``calibrated.yaml``, ``joint-errors.yaml`` and ``axes.json`` into a folder.
@@ -167,35 +150,32 @@ class AxisCalibration(Record):
         }
 
 
-def joint_errors_summary(fit: AxisFit) -> dict[str, Any]:
-    """Return what a fit in joint errors says: what was found, of what, and what circles cannot observe."""
+def joint_errors(fit: AxisFit) -> Iterator[Block]:
+    """Give what a fit in joint errors says: what was found, of what, and what circles cannot observe."""
     everything = FreeParameters((*fit.free.parameters, *(fit.robot.parameters[r.dropped] for r in fit.redundancies)))
-    found = []
-    for p in fit.free.parameters:
-        if p.group == "base":
-            continue
-        unit = SHOWN_AS[p.unit]
-        half = NORMAL_95 * (p.deviation or 0.0)
-        found.append(
-            {
-                "name": p.name,
-                "unit": unit,
-                "value": from_si(p.value, unit),
-                "deviation": from_si(p.deviation or 0.0, unit),
-                "interval": [from_si(p.value - half, unit), from_si(p.value + half, unit)],
-                "is": in_words(fit.combination(p.name), everything),
-            }
-        )
-    held = [
-        {"name": r.dropped, "combination": r.combination, "moves_flange": r.dropped in fit.moving_flange}
-        for r in fit.redundancies
-    ]
-    return {"found": found, "unseen": held}
+    found = [p for p in fit.free.parameters if p.group != "base"]
+    yield say(f"Joint errors: {len(found)} found, in 95 % intervals:")
+    yield each("found", (_joint_error(p, in_words(fit.combination(p.name), everything)) for p in found))
+    yield detail("Unobservable with circles, and held at their nominal values:")
+    yield each("unseen", (_unseen(r, moves_flange=r.dropped in fit.moving_flange) for r in fit.redundancies))
 
 
-def _circle(measured: AxisCircle) -> dict[str, Any]:
+def _unseen(one: Redundancy, *, moves_flange: bool) -> Words:
+    words = f"  {one.combination}{' (moves the flange)' if moves_flange else ''}"
+    return detail(words, name=one.dropped, combination=one.combination, moves_flange=moves_flange)
+
+
+def _joint_error(p: Parameter, words: str) -> Words:
+    unit, half = SHOWN_AS[p.unit], NORMAL_95 * (p.deviation or 0.0)
+    value, low, high = (from_si(v, unit) for v in (p.value, p.value - half, p.value + half))
+    line = f"  {words:<24} {value:9.4f} {unit:<4} {low:9.4f} to {high:.4f}"
+    held = {"value": value, "deviation": from_si(p.deviation or 0.0, unit), "interval": [low, high], "is": words}
+    return detail(line, name=p.name, unit=unit, **held)
+
+
+def _circle(measured: AxisCircle) -> Words:
     turn, circle = measured.turn, measured.circle
-    return {
+    c = {
         "joint": measured.joint,
         "target": measured.target,
         "points": len(turn.joint_position),
@@ -212,6 +192,13 @@ def _circle(measured: AxisCircle) -> dict[str, Any]:
         "angular_range_deg": math.degrees(turn.angular),
         "backlash_deg": None if turn.backlash is None else math.degrees(turn.backlash),
     }
+    lag = "" if c["backlash_deg"] is None else f"{c['backlash_deg']:.4f}"
+    line = (
+        f"{c['joint']:<6} {c['target']:<7} {c['points']:<8} {c['arc_deg']:<10.1f} {c['radius_mm']:<12.3f} "
+        f"{c['centre_deviation_mm']:<14.4f} {c['direction_deviation_mrad']:<7.3f} "
+        f"{c['tangential_range_mm']:<16.4f} {lag}"
+    )
+    return detail(line.rstrip(), **c)
 
 
 def _placed(place: tuple[Transform, float, float]) -> dict[str, Any]:

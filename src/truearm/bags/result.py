@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from truearm.bags.standstills import Recording, Sighting, found_in
-from truearm.bags.streams import read_streams
+from truearm.bags.streams import TargetStream, read_streams
 from truearm.engine.base.errors import InputError, Notice, counted, listed, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.writing import output_file, write_files
 from truearm.engine.command.arguments import file_for, files_of
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, each, say
+from truearm.engine.document.records import Record, joints_lines
 
 if TYPE_CHECKING:
     from truearm.bags.import_ros import ImportRos
@@ -34,7 +36,6 @@ class ImportedBag(Record):
     found: Recording  #: Standstills, and what was seen in them.
     command: str  #: How to run it again.
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
-    out: Path | None = None  #: The canonical CSV file that holds the measurements; None if none was written.
 
     @property
     def data(self) -> Dataset:
@@ -56,61 +57,33 @@ class ImportedBag(Record):
             ),
         )
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        found = self.found
-        return {
-            "configurations": self.data.configurations,
-            "joint_names": list(found.joints.names),
-            "targets": [
-                {
-                    "name": target.target,
-                    "topic": target.topic,
-                    "frame": target.frame,
-                    "missing": sum(not np.isfinite(one.position).all() for one in row),
-                    "samples": [one.samples for one in row],
-                    "set_aside": sum(one.set_aside for one in row),
-                    "without_numbers": target.lost,
-                    "scatter_mm": [_number(1e3 * one.scatter) for one in row],
-                    "sigma_mm": [_number(1e3 * one.sigma) for one in row],
-                }
-                for target, row in zip(found.targets, found.sightings, strict=True)
-            ],
-            "standstills_s": [[still.start, still.end] for still in found.standstills],
-            "missed_pauses_s": list(found.missed),
-            "warnings": notice_summaries(self.warnings),
-            "declares_sigma": found.declares_sigma,
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was found."""
-        from truearm.engine.document.drawing import significant
-
+    def blocks(self) -> Iterator[Block]:
+        """Give the standstills and what was seen in them, in s and mm."""
         found = self.found
         lasted = [still.end - still.start for still in found.standstills]
-        text = [
+        yield say(
             f"{counted(len(lasted), 'standstill')} of {min(lasted):.1f} to {max(lasted):.1f} s, joints "
-            f"{', '.join(found.joints.names)}"
-        ]
-        for target, row in zip(found.targets, found.sightings, strict=True):
-            text.append(f"  {target.target}: {_told(row, significant)}, in frame {target.frame or '(none)'}")
-            if missing := sum(not np.isfinite(one.position).all() for one in row):
-                text.append(f"    not seen in {counted(missing, 'standstill')}")
-            if aside := sum(one.set_aside for one in row):
-                text.append(f"    {counted(aside, 'sample')} set aside, far from the others of their standstill")
-            if target.lost:
-                text.append(f"    {counted(target.lost, 'message')} without numbers")
+            f"{', '.join(found.joints.names)}",
+            configurations=self.data.configurations,
+            joint_names=list(found.joints.names),
+            standstills_s=[[still.start, still.end] for still in found.standstills],
+        )
+        yield each("targets", (_of_target(*one) for one in zip(found.targets, found.sightings, strict=True)))
+        text = []
         if found.missed:
             when = listed([f"{at:.1f} s" for at in found.missed])
-            text.append(
-                f"  {counted(len(found.missed), 'pause')} without a standstill, at {when}: too short, creeping, or"
-            )
-            text.append("  the joints were not recorded. Each takes a number: the way to the next one is not known.")
-        if not found.declares_sigma:
-            text.append("  No deviations are declared: in a standstill all samples are the same.")
-        text += joints_lines("controller" if self.data.joints_are == "controller" else "model")
-        written = [] if self.out is None else [f"Written: {self.out}, {self.out.with_suffix(PAGE)}"]
-        return [*text, *notice_lines(self.warnings), *written]
+            text = [
+                f"  {counted(len(found.missed), 'pause')} without a standstill, at {when}: too short, creeping, or",
+                "  the joints were not recorded. Each takes a number: the way to the next one is not known.",
+            ]
+        yield detail(*text, missed_pauses_s=list(found.missed))
+        words = "  No deviations are declared: in a standstill all samples are the same."
+        yield detail(*([] if found.declares_sigma else [words]), declares_sigma=found.declares_sigma)
+        yield detail(*joints_lines("controller" if self.data.joints_are == "controller" else "model"))
+
+    def written_at(self, out: str) -> str:
+        """Return the line that says which files hold it."""
+        return f"Written: {out}, {Path(out).with_suffix(PAGE)}"
 
     def save(self, file: str | Path) -> tuple[Path, Path]:
         """Write the measurements as canonical CSV, and a page with the same name that ends in ``.html``.
@@ -127,11 +100,31 @@ class ImportedBag(Record):
         return table, page
 
 
-def _told(row: tuple[Sighting, ...], significant: Any) -> str:
-    seen = [one for one in row if math.isfinite(one.scatter)]
-    samples = sorted(one.samples for one in seen)
-    scatter = 1e3 * float(np.median([one.scatter for one in seen]))
-    return f"{samples[0]} to {samples[-1]} samples a standstill, scattered by {significant(scatter, 2)} mm"
+def _of_target(target: TargetStream, row: tuple[Sighting, ...]) -> Iterator[Block]:
+    """Give what was seen of a target in each standstill."""
+    from truearm.engine.document.drawing import significant
+
+    there = [one for one in row if math.isfinite(one.scatter)]
+    samples = sorted(one.samples for one in there)
+    scatter = 1e3 * float(np.median([one.scatter for one in there]))
+    yield say(
+        f"  {target.target}: {samples[0]} to {samples[-1]} samples a standstill, scattered by "
+        f"{significant(scatter, 2)} mm, in frame {target.frame or '(none)'}",
+        name=target.target,
+        topic=target.topic,
+        frame=target.frame,
+        samples=[one.samples for one in row],
+        scatter_mm=[_number(1e3 * one.scatter) for one in row],
+        sigma_mm=[_number(1e3 * one.sigma) for one in row],
+    )
+    missing = sum(not np.isfinite(one.position).all() for one in row)
+    aside = sum(one.set_aside for one in row)
+    for key, count, words in (
+        ("missing", missing, f"not seen in {counted(missing, 'standstill')}"),
+        ("set_aside", aside, f"{counted(aside, 'sample')} set aside, far from the others of their standstill"),
+        ("without_numbers", target.lost, f"{counted(target.lost, 'message')} without numbers"),
+    ):
+        yield detail(*([f"    {words}"] if count else []), **{key: count})
 
 
 def _number(value: float) -> float | None:
@@ -145,11 +138,10 @@ def of_bag(asked: ImportRos) -> ImportedBag:
     with refusals_of("file"):
         found = _found(bag, asked)
     imported = ImportedBag(found, asked.again, files_of(bag))
-    if out is None:
-        return imported
-    asked.progress("writing the files")
-    imported.save(out)
-    return replace(imported, out=out)
+    if out is not None:
+        asked.progress("writing the files")
+        imported.save(out)
+    return imported
 
 
 def _table_for(out: str | Path, bag: Path) -> Path:

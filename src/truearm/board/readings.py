@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from truearm.engine.data.readers.sheets import (
     read_named,
     refuse_repeated,
 )
+from truearm.engine.document.document import Block, Words, detail, say
 from truearm.engine.document.records import Record
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion
 
@@ -193,44 +194,38 @@ class ImportedHandEye(Record):
         """The same of a turn about an axis [rad]."""
         return None if self.data.sigma_rot is None else float(np.sqrt(np.mean(self.data.sigma_rot**2)))
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        made: dict[str, Any] = {
-            "configurations": self.data.configurations,
-            "on_flange": self.on_flange,
-            "scale_sigma_ppm": None if self.data.scale_sigma is None else 1e6 * self.data.scale_sigma,
-            "ahead_mm": 1e3 * self.ahead,
-            "sigma_mm": None if self.sigma is None else 1e3 * self.sigma,
-            "sigma_rot_mrad": None if self.sigma_rot is None else 1e3 * self.sigma_rot,
-        }
-        if self.lens is not None:
-            made["lens"] = {
-                "values": dict(self.lens.values),
-                "deviations": dict(self.lens.deviations),
-                "noise_px": self.lens.noise,
-                "corners": list(self.lens.corners),
-            }
-        return made
-
-    def lines(self) -> list[str]:
-        """Return what was read."""
-        where = "" if self.out is None else f": {self.out}"
-        text = [f"{counted(self.data.configurations, 'configuration')}, target {self.data.targets[0]}{where}"]
+    def blocks(self) -> Iterator[Block]:
+        """Give what was read, in mm, mrad, ppm and pixels."""
+        data, where = self.data, "" if self.out is None else f": {self.out}"
+        mm, mrad = (None if one is None else 1e3 * one for one in (self.sigma, self.sigma_rot))
+        yield say(
+            f"{counted(data.configurations, 'configuration')}, target {data.targets[0]}{where}",
+            configurations=data.configurations,
+            on_flange=self.on_flange,
+            ahead_mm=1e3 * self.ahead,
+            sigma_mm=mm,
+            sigma_rot_mrad=mrad,
+        )
         if self.on_flange == "camera":
-            text.append(f"  the target is a point on the camera's axis, {1e3 * self.ahead:.1f} mm before it")
-        if self.sigma is not None and self.sigma_rot is not None:
-            text.append(f"  deviations {1e3 * self.sigma:.3f} mm a coordinate, {1e3 * self.sigma_rot:.3f} mrad an axis")
-        if self.data.scale_sigma is None:
-            text.append("  the board's size is taken as exact")
-        else:
-            text.append(f"  the board's size is known to {1e6 * self.data.scale_sigma:.3g} ppm")
+            yield say(f"  the target is a point on the camera's axis, {1e3 * self.ahead:.1f} mm before it")
+        if mm is not None and mrad is not None:
+            yield say(f"  deviations {mm:.3f} mm a coordinate, {mrad:.3f} mrad an axis")
+        ppm = None if data.scale_sigma is None else 1e6 * data.scale_sigma
+        words = "taken as exact" if ppm is None else f"known to {ppm:.3g} ppm"
+        yield say(f"  the board's size is {words}", scale_sigma_ppm=ppm)
         if self.lens is not None:
-            text.append(f"  corners are off by {self.lens.noise:.2f} px, {min(self.lens.corners)} or more a picture")
-            for names, unit in _SHOWN:
-                digits = 1 if unit else 4
-                of = [f"{n} {self.lens.values[n]:.{digits}f} ({self.lens.deviations[n]:.{digits}f})" for n in names]
-                text.append(f"  lens: {', '.join(of)}{unit}")
-        return text
+            yield self._lens(self.lens)
+
+    @staticmethod
+    def _lens(lens: Lens) -> Words:
+        values, deviations = lens.values, lens.deviations
+        text = [f"  corners are off by {lens.noise:.2f} px, {min(lens.corners)} or more a picture"]
+        for names, unit in _SHOWN:
+            digits = 1 if unit else 4
+            of = [f"{n} {values[n]:.{digits}f} ({deviations[n]:.{digits}f})" for n in names]
+            text.append(f"  lens: {', '.join(of)}{unit}")
+        held = {"values": dict(values), "deviations": dict(deviations)}
+        return detail(*text, lens={**held, "noise_px": lens.noise, "corners": list(lens.corners)})
 
 
 def of_views(asked: ImportHandEye) -> ImportedHandEye:

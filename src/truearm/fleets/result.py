@@ -15,14 +15,15 @@ from truearm.engine.base.errors import Notice, counted, listed
 from truearm.engine.base.files import exists
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import output_folder, write_files
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, held_by, say
+from truearm.engine.document.records import Record
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.fleets.analysis import ACCURACIES, Analysis, analysed, with_proposed
 from truearm.fleets.recorded import ROBOTS, Recorded
 from truearm.fleets.series import Accuracy, Row
-from truearm.fleets.words import PRIORS_FILE, analysis_lines, analysis_notices, analysis_summary, outcome_words
+from truearm.fleets.words import PRIORS_FILE, analysis_blocks, analysis_notices, outcome_words
 
 #: What a fleet writes into its folder beside its parts.
 FLEET_FILES: Final = ("fleet.json", "robots.csv", "report.html", PRIORS_FILE)
@@ -156,38 +157,28 @@ class Fleet(Record):
 
     def content(self) -> dict[str, Any]:
         """Return what ``fleet.json`` holds, in mm: the same however the parts were computed."""
-        found = self.analysis
-        return {
-            "truearm": "truearm-fleet-result/1",
-            **({"simulated": True} if self.simulated_from else {}),
-            "digest": self.recorded.manifest.digest,
-            "robots": self.recorded.manifest.count,
-            "calibrated": found.measurements - len(found.failed),
-            "failed": [{"name": name, "message": message} for name, message in found.failed],
-            "missing": [*self.run.lost],
-            **analysis_summary(found),
-        }
+        held = held_by(self.blocks())
+        del held["run"]
+        return {"truearm": held["truearm"], **({"simulated": True} if self.simulated_from else {}), **held}
 
-    def summary(self) -> dict[str, Any]:
-        """Return what ``fleet.json`` holds, and how it was computed."""
-        run = self.run
-        return {
-            **self.content(),
-            "run": {"parts": run.parts, "on_disk_before": run.before, "told": [*run.told]},
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
+    def blocks(self) -> Iterator[Block]:
+        """Give how many were calibrated, how, and what the fleet says, in mm and deg."""
         found, run = self.analysis, self.run
-        text = [f"{self._robots()}{self._outcome()}."]
-        if run.before:
-            text.append(f"{counted(run.before, 'part')} of {run.parts} on disk already.")
-        text += [f"{words[0].upper()}{words[1:]}." for words in run.told]
-        text += analysis_lines(found, None if self.draw is None else f"{self.draw}.")
+        yield say(
+            f"{self._robots()}{self._outcome()}.",
+            truearm="truearm-fleet-result/1",
+            digest=self.recorded.manifest.digest,
+            robots=self.recorded.manifest.count,
+            calibrated=found.measurements - len(found.failed),
+            failed=[{"name": name, "message": message} for name, message in found.failed],
+            missing=[*run.lost],
+        )
+        before = [f"{counted(run.before, 'part')} of {run.parts} on disk already."] if run.before else []
+        told = (f"{words[0].upper()}{words[1:]}." for words in run.told)
+        yield detail(*before, *told, run={"parts": run.parts, "on_disk_before": run.before, "told": [*run.told]})
+        yield from analysis_blocks(found, None if self.draw is None else f"{self.draw}.")
         if self.proposed is not None:
-            text.append(f"Priors proposed: {counted(len(self.proposed[1]), 'parameter')} in {PRIORS_FILE}.")
-        return text + notice_lines(self.warnings)
+            yield say(f"Priors proposed: {counted(len(self.proposed[1]), 'parameter')} in {PRIORS_FILE}.")
 
     def _outcome(self) -> str:
         """Return how many have a result, and of how many of these it should not be used."""

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from truearm.engine.base.errors import Notice, counted, listed
 from truearm.engine.base.units import SHOWN_AS, from_si
+from truearm.engine.document.document import Block, Words, detail, each, say, under
 from truearm.fleets.analysis import (
     LEAST_COMPARED,
     LEAST_SPREAD,
     Analysis,
     Difference,
-    Errors,
     KindFound,
     Look,
     ParameterSpread,
@@ -74,29 +74,43 @@ def interval_words(one: Quantile) -> str:
     return f"95 %: below {high}" if low is None else f"95 %: {low} to {high}"
 
 
-def accuracy_lines(found: Analysis) -> list[str]:
-    """Return the errors over the series."""
-    text = []
-    for name, errors in found.errors.items():
-        count = len(errors.mean)
-        told = [quantile_words(one, count) for one in errors.of_means if one.value is not None]
-        worst = f"the worst {errors.mean.max() * 1e3:.3f} mm"
-        of = "" if count == found.machines else f" of {counted(count, 'robot')}"
-        text.append(f"{ERRORS_OF[name]}, mean error{of}: {', '.join([*told, worst])}.")
+def _accuracy(found: Analysis) -> Iterator[Block]:
+    """Give the errors over the series [mm], and how many have none."""
+    yield under("errors_mm", (under(name, [_errors(found, name)]) for name in found.errors))
     if found.left_out:
         out = f"{counted(len(found.left_out), 'robot')} ({listed(found.left_out)})"
-        text.append(f"Left out of all figures, because their results end with an error: {out}.")
+        yield detail(f"Left out of all figures, because their results end with an error: {out}.")
     if found.failed:
         low, high = (100.0 * end for end in found.failing)
-        text.append(
+        yield detail(
             f"Not calibrated: {len(found.failed)} of {found.measurements}; of such a series {low:.3g} to {high:.3g} % "
             "(95 %)."
         )
-    return text
 
 
-def parameter_lines(found: KindFound, *, several: bool) -> list[str]:
-    """Return what robots of one kind say of their parameters."""
+def _errors(found: Analysis, name: str) -> Words:
+    errors = found.errors[name]
+    count = len(errors.mean)
+    told = [quantile_words(one, count) for one in errors.of_means if one.value is not None]
+    worst = f"the worst {errors.mean.max() * 1e3:.3f} mm"
+    of = "" if count == found.machines else f" of {counted(count, 'robot')}"
+    return say(
+        f"{ERRORS_OF[name]}, mean error{of}: {', '.join([*told, worst])}.",
+        robots=count,
+        of_means=[_quantile(one) for one in errors.of_means],
+        of_largest=[_quantile(one) for one in errors.of_largest],
+        worst_mean=float(errors.mean.max()) * 1e3,
+        worst_largest=float(errors.largest.max()) * 1e3,
+    )
+
+
+def _quantile(one: Quantile) -> dict[str, Any]:
+    value, low, high = (None if end is None else end * 1e3 for end in (one.value, one.low, one.high))
+    return {"share": one.share, "value": value, "low_95": low, "high_95": high, "robots_needed": one.needed}
+
+
+def _kind(found: KindFound, *, several: bool) -> Iterator[Block]:
+    """Give what robots of one kind say of their parameters; in text their drift stands with that of the others."""
     count = len(found.kind.latest)
     name = f"{found.kind.robot}: " if several else ""
     beside = (
@@ -106,18 +120,77 @@ def parameter_lines(found: KindFound, *, several: bool) -> list[str]:
     said = "none differs"
     if differing:
         said = f"{listed(differing)} {'differs' if len(differing) == 1 else 'differ'}"
-    text = [f"{name}Parameters of {counted(count, 'robot')} compared {beside}: {said}."]
+    yield say(
+        f"{name}Parameters of {counted(count, 'robot')} compared {beside}: {said}.",
+        robot=found.kind.robot,
+        robots=count,
+        differing=[_difference(one) for one in found.differences[:_MOST_LOOKS]],
+        drift=[_drift(one) for one in found.drifts.found[:_MOST_LOOKS]],
+        drift_not_seen=[*found.drifts.unknown],
+    )
+    text = []
     for verdict, words in _VERDICTS.items():
         those = [one for one in found.spreads if one.verdict == verdict]
-        if not those:
-            continue
-        if verdict in ("wider", "narrower"):
-            told = listed([f"{one.parameter} {spread_words(one)}" for one in those])
-        else:
-            told = listed([one.parameter for one in those])
-        text.append(f"  {words}: {told}.")
+        known = verdict in ("wider", "narrower")
+        if those:
+            told = listed([f"{one.parameter} {spread_words(one)}" if known else one.parameter for one in those])
+            text.append(f"  {words}: {told}.")
     shifted = [mean_words(one) for one in found.spreads if one.beside]
-    return [*text, f"  The whole series lies beside nominal: {listed(shifted)}."] if shifted else text
+    if shifted:
+        text.append(f"  The whole series lies beside nominal: {listed(shifted)}.")
+    yield detail(*text, parameters=[_spread(one) for one in found.spreads])
+
+
+def _difference(one: Difference) -> dict[str, Any]:
+    off, unit = in_unit(one.off, one.unit)
+    return {
+        "robot": one.robot,
+        "parameter": one.parameter,
+        "together_with": [*one.together],
+        "unit": unit,
+        "off": off,
+        "deviations": one.times,
+        "chance": one.chance,
+        "beside": one.beside,
+    }
+
+
+def _drift(one: Drift) -> dict[str, Any]:
+    slope, unit = in_unit(one.slope, one.unit)
+    return {
+        "machine": one.machine,
+        "parameter": one.parameter,
+        "together_with": [*one.together],
+        "campaigns": one.campaigns,
+        "months": one.months,
+        "unit": unit,
+        "a_month": slope,
+        "low_95": in_unit(one.low, one.unit)[0],
+        "high_95": in_unit(one.high, one.unit)[0],
+        "chance": one.chance,
+        "significant": one.significant,
+        "steady": one.steady,
+    }
+
+
+def _spread(one: ParameterSpread) -> dict[str, Any]:
+    def shown(value: float | None) -> float | None:
+        return None if value is None or value != value else in_unit(value, one.unit)[0]
+
+    return {
+        "name": one.parameter,
+        "unit": SHOWN_AS[one.unit],
+        "informed": None if one.share != one.share else one.share,
+        "robots": one.robots,
+        "prior": shown(one.prior),
+        "verdict": one.verdict,
+        "mean_off_nominal": shown(one.mean),
+        "mean_95": None if one.mean is None else [shown(one.mean_low), shown(one.mean_high)],
+        "series_beside_nominal": one.beside,
+        "spread": shown(one.spread),
+        "spread_95": None if one.spread is None else [shown(one.low), shown(one.high)],
+        "proposed_prior": shown(one.proposed),
+    }
 
 
 def mean_words(one: ParameterSpread) -> str:
@@ -159,23 +232,18 @@ def drift_words(one: Drift) -> str:
     )
 
 
-def drift_lines(found: Analysis) -> list[str]:
-    """Return what has changed of machines that were measured again."""
-    machines = list(dict.fromkeys(one.machine for one in found.drifts))
-    text = []
+def _changes(found: Analysis) -> Iterator[Words]:
+    """Give what has changed of machines that were measured again; JSON holds it with their kind."""
+    machines = {one.machine for one in found.drifts}
     if machines:
         changed = [one for one in found.drifts if one.significant]
-        those = list(dict.fromkeys(one.machine for one in changed))
+        those = {one.machine for one in changed}
         words = f"{counted(len(those), 'machine')} changed" if those else "none has changed by more than chance"
-        text.append(f"Measured again: {counted(len(machines), 'machine')}; {words}.")
-        text += [f"  {one.machine}: {drift_words(one)}" for one in changed[:_TOLD]]
-        text += [f"  and {len(changed) - _TOLD} more changes"] if len(changed) > _TOLD else []
-    for kind in found.kinds:
-        text += [
-            f"  all machines alike: {one.parameter} {sized(one.slope, one.unit, sign=True)} a month"
-            for one in kind.drifts.alike
-        ]
-    return text
+        yield say(f"Measured again: {counted(len(machines), 'machine')}; {words}.")
+        more = [f"  and {len(changed) - _TOLD} more changes"] if len(changed) > _TOLD else []
+        yield detail(*(f"  {one.machine}: {drift_words(one)}" for one in changed[:_TOLD]), *more)
+    for one in (one for kind in found.kinds for one in kind.drifts.alike):
+        yield detail(f"  all machines alike: {one.parameter} {sized(one.slope, one.unit, sign=True)} a month")
 
 
 def reason_words(reason: Reason) -> str:
@@ -200,13 +268,15 @@ def reason_words(reason: Reason) -> str:
     return f"the largest held-out error of all, {held_out} (median {beside})"
 
 
-def look_lines(looks: Sequence[Look]) -> list[str]:
-    """Return the robots to look at first."""
-    if not looks:
-        return []
-    text = ["Look first at:"]
-    text += [f"  {look.robot}: {'; '.join(reason_words(reason) for reason in look.reasons)}" for look in looks[:_TOLD]]
-    return [*text, f"  and {len(looks) - _TOLD} more"] if len(looks) > _TOLD else text
+def _looks(looks: Sequence[Look]) -> Words:
+    """Return the robots to look at first; text tells fewer of them."""
+    held, text = list[dict[str, Any]](), ["Look first at:"]
+    for look in looks[:_MOST_LOOKS]:
+        words = [reason_words(reason) for reason in look.reasons]
+        held.append({"robot": look.robot, "why": [reason.why for reason in look.reasons], "words": words})
+        text.append(f"  {look.robot}: {'; '.join(words)}")
+    more = [f"  and {len(looks) - _TOLD} more"] if len(looks) > _TOLD else []
+    return detail(*(text[: _TOLD + 1] if looks else []), *more, look_first=held)
 
 
 def outcome_words(found: Analysis) -> str:
@@ -215,15 +285,20 @@ def outcome_words(found: Analysis) -> str:
     return f"{found.usable} usable, {wrong} whose result ends with an error, {len(found.failed)} not calibrated"
 
 
-def analysis_lines(found: Analysis, draw: str | None = None) -> list[str]:
-    """Return all that a fleet says, line by line; `draw` is what its figures hold for."""
-    several = len(found.kinds) > 1
-    text = accuracy_lines(found)
+def analysis_blocks(found: Analysis, draw: str | None = None) -> Iterator[Block]:
+    """Give all that a fleet says, in mm and deg; `draw` is what its figures hold for."""
+    yield say(
+        measurements=found.measurements,
+        machines=found.machines,
+        left_out=[*found.left_out],
+        failing_95=[*found.failing] if found.measurements else None,
+    )
+    yield from _accuracy(found)
     if draw is not None and found.errors:
-        text.append(draw)
-    for kind in found.kinds:
-        text += parameter_lines(kind, several=several)
-    return text + drift_lines(found) + look_lines(found.looks)
+        yield detail(draw)
+    yield each("kinds", (_kind(kind, several=len(found.kinds) > 1) for kind in found.kinds))
+    yield from _changes(found)
+    yield _looks(found.looks)
 
 
 def analysis_notices(found: Analysis) -> list[Notice]:
@@ -278,97 +353,3 @@ def analysis_notices(found: Analysis) -> list[Notice]:
             )
         )
     return notices
-
-
-def analysis_summary(found: Analysis) -> dict[str, Any]:
-    """Return all that a fleet says as JSON holds it: mm and deg."""
-    return {
-        "measurements": found.measurements,
-        "machines": found.machines,
-        "left_out": [*found.left_out],
-        "failing_95": [*found.failing] if found.measurements else None,
-        "errors_mm": {name: _errors_summary(errors) for name, errors in found.errors.items()},
-        "kinds": [_kind_summary(kind) for kind in found.kinds],
-        "look_first": [
-            {
-                "robot": look.robot,
-                "why": [reason.why for reason in look.reasons],
-                "words": [reason_words(reason) for reason in look.reasons],
-            }
-            for look in found.looks[:_MOST_LOOKS]
-        ],
-    }
-
-
-def _errors_summary(errors: Errors) -> dict[str, Any]:
-    return {
-        "robots": len(errors.mean),
-        "of_means": [_quantile_summary(one) for one in errors.of_means],
-        "of_largest": [_quantile_summary(one) for one in errors.of_largest],
-        "worst_mean": float(errors.mean.max()) * 1e3,
-        "worst_largest": float(errors.largest.max()) * 1e3,
-    }
-
-
-def _quantile_summary(one: Quantile) -> dict[str, Any]:
-    value, low, high = (None if end is None else end * 1e3 for end in (one.value, one.low, one.high))
-    return {"share": one.share, "value": value, "low_95": low, "high_95": high, "robots_needed": one.needed}
-
-
-def _kind_summary(found: KindFound) -> dict[str, Any]:
-    return {
-        "robot": found.kind.robot,
-        "robots": len(found.kind.latest),
-        "differing": [
-            {
-                "robot": one.robot,
-                "parameter": one.parameter,
-                "together_with": [*one.together],
-                "unit": (shown := in_unit(one.off, one.unit))[1],
-                "off": shown[0],
-                "deviations": one.times,
-                "chance": one.chance,
-                "beside": one.beside,
-            }
-            for one in found.differences[:_MOST_LOOKS]
-        ],
-        "parameters": [_spread_summary(one) for one in found.spreads],
-        "drift": [
-            {
-                "machine": one.machine,
-                "parameter": one.parameter,
-                "together_with": [*one.together],
-                "campaigns": one.campaigns,
-                "months": one.months,
-                "unit": (slope := in_unit(one.slope, one.unit))[1],
-                "a_month": slope[0],
-                "low_95": in_unit(one.low, one.unit)[0],
-                "high_95": in_unit(one.high, one.unit)[0],
-                "chance": one.chance,
-                "significant": one.significant,
-                "steady": one.steady,
-            }
-            for one in found.drifts.found[:_MOST_LOOKS]
-        ],
-        "drift_not_seen": [*found.drifts.unknown],
-    }
-
-
-def _spread_summary(one: ParameterSpread) -> dict[str, Any]:
-    def shown(value: float | None) -> float | None:
-        return None if value is None or value != value else in_unit(value, one.unit)[0]
-
-    return {
-        "name": one.parameter,
-        "unit": SHOWN_AS[one.unit],
-        "informed": None if one.share != one.share else one.share,
-        "robots": one.robots,
-        "prior": shown(one.prior),
-        "verdict": one.verdict,
-        "mean_off_nominal": shown(one.mean),
-        "mean_95": None if one.mean is None else [shown(one.mean_low), shown(one.mean_high)],
-        "series_beside_nominal": one.beside,
-        "spread": shown(one.spread),
-        "spread_95": None if one.spread is None else [shown(one.low), shown(one.high)],
-        "proposed_prior": shown(one.proposed),
-    }

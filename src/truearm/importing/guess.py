@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from ruamel.yaml import YAML
 
@@ -18,6 +18,7 @@ from truearm.engine.base.writing import new_file, write_text
 from truearm.engine.command.arguments import file_for
 from truearm.engine.data.readers.mapping import MappingFile
 from truearm.engine.data.readers.table import TableFiles, read_with
+from truearm.engine.document.document import Block, say
 from truearm.engine.document.records import Record
 from truearm.engine.robot.urdf_writing import JOINT_COLUMN
 from truearm.importing.layouts import GuessedLayout, guess_layout, number_of
@@ -456,31 +457,29 @@ class GuessedMapping(Record):
         """Every entry that was guessed, and what the guess rests on."""
         return self.guessed.guesses
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "guesses": [{"entry": g.entry, "value": g.value, "because": g.because} for g in self.guesses],
-            "open": list(self.guessed.open),
-            "refusal": self.guessed.refusal,
-            "configurations": self.guessed.configurations,
-            "targets": list(self.guessed.targets),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was guessed, and what is to be done."""
-        where = "" if self.out is None else f": {self.out}"
-        text = [f"Guessed {counted(len(self.guesses), 'entry').replace('entrys', 'entries')}{where}"]
-        if self.guessed.open:
-            text.append(f"Nothing in the file tells {listed(self.guessed.open)}: answer each '?'.")
-        elif self.guessed.refusal is not None:
-            text.append(f"An import with it would be refused: {self.guessed.refusal}")
-        elif self.guessed.configurations:
-            many = counted(self.guessed.configurations, "configuration")
-            text.append(f"An import with it would read {many}, targets {listed(self.guessed.targets)}.")
-        else:
-            text.append("No columns are called like joint positions: name them, or the file that holds them.")
-        text.append("Nothing is imported before every guess is confirmed: look at each, then write confirmed: yes.")
-        return text
+    def blocks(self) -> Iterator[Block]:
+        """Give what was guessed, and what is to be done."""
+        made, where = self.guessed, "" if self.out is None else f": {self.out}"
+        yield say(
+            f"Guessed {counted(len(self.guesses), 'entry').replace('entrys', 'entries')}{where}",
+            guesses=[{"entry": g.entry, "value": g.value, "because": g.because} for g in self.guesses],
+        )
+        words = "No columns are called like joint positions: name them, or the file that holds them."
+        if made.open:
+            words = f"Nothing in the file tells {listed(made.open)}: answer each '?'."
+        elif made.refusal is not None:
+            words = f"An import with it would be refused: {made.refusal}"
+        elif made.configurations:
+            many = counted(made.configurations, "configuration")
+            words = f"An import with it would read {many}, targets {listed(made.targets)}."
+        yield say(
+            words,
+            open=list(made.open),
+            refusal=made.refusal,
+            configurations=made.configurations,
+            targets=list(made.targets),
+        )
+        yield say("Nothing is imported before every guess is confirmed: look at each, then write confirmed: yes.")
 
 
 def guessed_mapping(asked: GuessMapping) -> GuessedMapping:

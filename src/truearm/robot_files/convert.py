@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from truearm.engine.base.errors import InputError, Notice, counted, did_you_mean, refusals_of
-from truearm.engine.base.units import Marked
+from truearm.engine.base.units import Marked, with_mark
 from truearm.engine.base.writing import write_new_text
 from truearm.engine.command.arguments import (
     joints_argument,
@@ -21,7 +22,8 @@ from truearm.engine.command.split import told_of
 from truearm.engine.data.controller_joints import in_controller_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.robodk import robodk_csv
-from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, Words, lines_of, say
+from truearm.engine.document.records import Record, joints_lines, notice_lines
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 from truearm.engine.robot.conversion import converted
@@ -41,19 +43,17 @@ class ConvertedRobot(Record):
     robot: Robot  #: In the other convention. Its history ends with what was done.
     file: Path | None = None  #: Its robot file; None if none was written.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "file": None if self.file is None else str(self.file),
-            "robot": self.robot.name,
-            "convention": self.robot.convention_name,
-            "history": self.robot.history[-1],
-        }
+    def blocks(self) -> Iterator[Block]:
+        """Give what was done."""
+        robot, done = self.robot, self.robot.history[-1]
+        yield _of_file(
+            self.file, f"{robot.name}, {done}.", robot=robot.name, convention=robot.convention_name, history=done
+        )
 
-    def lines(self) -> list[str]:
-        """Return what was done."""
-        text = f"{self.robot.name}, {self.robot.history[-1]}."
-        return [text if self.file is None else f"{self.file}: {text}"]
+
+def _of_file(file: Path | None, words: str, **held: Any) -> Words:
+    """Return a line about a file that was written, or about its content where none was."""
+    return say(words if file is None else f"{file}: {words}", file=None if file is None else str(file), **held)
 
 
 def converted_robot(asked: ConvertRobot) -> ConvertedRobot:
@@ -93,19 +93,14 @@ class ExportedRobot(Record):
         """All lines but the first: what was left out, and what speaks against the calibration."""
         return len(self.lines()) - 1
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "file": None if self.file is None else str(self.file),
-            "format": self.format,
-            "frames": self.frames,
-            "warnings": notice_summaries(self.warnings),
-        }
+    def blocks(self) -> Iterator[Block]:
+        """Give what was written."""
+        words = f"{self.robot.name} as {self.format}. {self.frames}"
+        yield _of_file(self.file, words, format=self.format, frames=self.frames)
 
     def lines(self) -> list[str]:
-        """Return what was written, and then what was left out."""
-        text = f"{self.robot.name} as {self.format}. {self.frames}"
-        return [text if self.file is None else f"{self.file}: {text}", *self.left_out, *notice_lines(self.told)]
+        """Return what was written, and then what was left out, which tells for itself that it is a warning."""
+        return with_mark([*lines_of(self.blocks()), *self.left_out, *notice_lines(self.told)], self.simulated_from)
 
 
 def exported_robot(asked: ExportRobot) -> ExportedRobot:
@@ -131,20 +126,11 @@ class ExportedMeasurements(Record):
     file: Path | None = None  #: The file; None if none was written.
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "file": None if self.file is None else str(self.file),
-            "configurations": self.configurations,
-            "readings": self.readings,
-            "joints_are": self.joints_are,
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was written."""
-        where = "" if self.file is None else f"{self.file}: "
+    def blocks(self) -> Iterator[Block]:
+        """Give what was written."""
         many = f"{counted(self.configurations, 'configuration')}, {counted(self.readings, 'reading')}"
-        return [f"{where}{many}", *joints_lines(self.joints_are)]
+        yield _of_file(self.file, many, configurations=self.configurations, readings=self.readings)
+        yield say(*joints_lines(self.joints_are), joints_are=self.joints_are)
 
 
 def exported_measurements(asked: ExportToRobodk) -> ExportedMeasurements:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from truearm.engine.base.errors import InputError, Notice, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.writing import write_new_text
 from truearm.engine.command.arguments import new_file_for, robot_argument
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, say
+from truearm.engine.document.records import Record
 from truearm.engine.robot.library import library, load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
@@ -69,28 +70,20 @@ class ImportedKinematics(Record):
             ),
         )
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "file": None if self.file is None else str(self.file),
-            "robot": self.robot.name,
-            "identity": dict(self.robot.controller.kinematics.identity),
-            "mean_distance_from_type_mm": self.distance * 1e3,
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was read."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what was read, and how far it is from the type [mm]."""
+        distance, identity = self.distance * 1e3, self.robot.controller.kinematics.identity
         text = (
-            f"{self.robot.name} with the kinematics of its controller, flange {self.distance * 1e3:.2f} mm from the "
-            "type's on average"
+            f"{self.robot.name} with the kinematics of its controller, flange {distance:.2f} mm from the type's on "
+            "average"
         )
-        identity = self.robot.controller.kinematics.identity
-        return [
+        yield say(
             text if self.file is None else f"{self.file}: {text}",
-            *(f"  {name}: {value}" for name, value in identity.items()),
-            *notice_lines(self.warnings),
-        ]
+            file=None if self.file is None else str(self.file),
+            robot=self.robot.name,
+            mean_distance_from_type_mm=distance,
+        )
+        yield say(*(f"  {name}: {value}" for name, value in identity.items()), identity=dict(identity))
 
 
 def largest_zero(robot: Robot) -> float:

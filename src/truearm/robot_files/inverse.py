@@ -6,10 +6,10 @@ import csv
 import io
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from truearm.engine.base.arrays import axes
 from truearm.engine.base.errors import InputError, Notice, refusals_of
@@ -29,7 +29,8 @@ from truearm.engine.command.split import told_of
 from truearm.engine.command.texts import positions_of
 from truearm.engine.data.readers.configurations import read_poses
 from truearm.engine.diagnose.external_force import check_force
-from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, say
+from truearm.engine.document.records import Record, joints_lines
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import Controller, JointsOf
 from truearm.engine.robot.frames import Frame, frame_and_tip
@@ -136,30 +137,26 @@ class JointTable(Record):
             if status.value != "reached" and (status.usable or pose not in reached)
         )
 
-    def summary(self) -> dict[str, Any]:
-        """Return counts by status, and what needs attention, as JSON holds them."""
+    def blocks(self) -> Iterator[Block]:
+        """Give how many poses are reached, and what is wrong with the others."""
         found = self.solutions
-        return {
-            "poses": found.poses,
-            "poses_reached": len(set(found.pose[found.usable].tolist())),
-            "rows": len(found.status),
-            "joints_are": self.joints_are,
-            "status": dict(Counter(status.value for status in found.status)),
-            "attention": list(self.attention),
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return how many poses are reached, and what is wrong with the others."""
-        summary = self.summary()
-        counts = ", ".join(f"{count} {status}" for status, count in summary["status"].items())
-        text = [f"{summary['poses_reached']} of {summary['poses']} poses reached. Rows: {counts}"]
-        for entry in self.attention[:_EXPLAINED]:
+        reached, status = len(set(found.pose[found.usable].tolist())), Counter(one.value for one in found.status)
+        counts = ", ".join(f"{count} {name}" for name, count in status.items())
+        yield say(
+            f"{reached} of {found.poses} poses reached. Rows: {counts}",
+            poses=found.poses,
+            poses_reached=reached,
+            rows=len(found.status),
+            joints_are=self.joints_are,
+            status=dict(status),
+        )
+        attention = self.attention
+        for entry in attention[:_EXPLAINED]:
             name = f"{entry['pose']} ({entry['branch']})" if entry["branch"] else entry["pose"]
-            text.append(f"  {name}: {entry['status']}. {entry['advice']}")
-        if len(self.attention) > _EXPLAINED:
-            text.append(f"  and {len(self.attention) - _EXPLAINED} more; the JSON summary lists all")
-        return text + joints_lines(self.joints_are) + notice_lines(self.warnings)
+            yield detail(f"  {name}: {entry['status']}. {entry['advice']}")
+        rest = len(attention) - _EXPLAINED
+        yield detail(*([f"  and {rest} more; the JSON summary lists all"] if rest > 0 else []), attention=[*attention])
+        yield say(*joints_lines(self.joints_are))
 
 
 def found_joints(asked: FindJoints) -> JointTable:

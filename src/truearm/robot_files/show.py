@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,12 +12,13 @@ from truearm.engine.base.errors import InputError, nearest_names
 from truearm.engine.base.units import SHOWN_AS, from_si, written
 from truearm.engine.command.arguments import array_argument, joints_argument, robot_argument
 from truearm.engine.command.texts import positions_of
+from truearm.engine.document.document import Block, Table, Words, each, say, under
 from truearm.engine.document.records import Record
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import AS_THE_MODEL
 from truearm.engine.robot.frames import Frame
 from truearm.engine.robot.library import close_names, letters, library, load_robot
-from truearm.engine.robot.parts import GRAVITY
+from truearm.engine.robot.parts import GRAVITY, Joint
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.entries import balancer_entry, controller_entry, reach_summary
 from truearm.engine.robot.robot_file.seal import is_intact
@@ -41,32 +42,27 @@ class RobotList(Record):
 
     robots: tuple[Robot, ...]  #: In the order of their ids.
 
-    def summary(self) -> dict[str, Any]:
-        """Return what is known of each, as JSON holds it."""
-        rows = [
-            {
-                "id": robot.name,
-                "maker": robot.maker or None,
-                "title": robot.title,
-                "joints": len(robot.joints),
-                **reach_summary(robot.reach),
-                "controller_known": robot.controller != AS_THE_MODEL,
-                "source": robot.source,
-            }
-            for robot in self.robots
-        ]
-        return {"robots": rows}
-
-    def lines(self) -> list[str]:
-        """Return one line a robot, below what its columns are."""
-        rows = [("id", "maker", "joints", "reach", "controller", "robot")]
+    def blocks(self) -> Iterator[Block]:
+        """Give one line a robot, below what its columns are."""
+        rows, held = list[tuple[str, ...]](), list[dict[str, Any]]()
         for robot in self.robots:
+            known = robot.controller != AS_THE_MODEL
             reach = "-" if robot.reach is None else f"{robot.reach.distance * 1e3:.6g} mm"
-            known = "-" if robot.controller == AS_THE_MODEL else "known"
             title = robot.title.removeprefix(robot.maker).strip()
-            rows.append((robot.name, robot.maker or "-", str(len(robot.joints)), reach, known, title))
-        widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-        return ["  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+            count = len(robot.joints)
+            rows.append((robot.name, robot.maker or "-", str(count), reach, "known" if known else "-", title))
+            held.append(
+                {
+                    "id": robot.name,
+                    "maker": robot.maker or None,
+                    "title": robot.title,
+                    "joints": count,
+                    **reach_summary(robot.reach),
+                    "controller_known": known,
+                    "source": robot.source,
+                }
+            )
+        yield Table(("id", "maker", "joints", "reach", "controller", "robot"), rows, held={"robots": held})
 
 
 def listed_robots(asked: ListRobots) -> RobotList:
@@ -156,47 +152,32 @@ class ShownPose(Record):
     robot: Robot  #: The robot.
     joints: Array  #: Joint positions of its model [rad; m for prismatic joints], ``(joints,)``.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, lengths in mm and angles in deg, rotation vectors in rad."""
+    def blocks(self) -> Iterator[Block]:
+        """Give joint positions and the pose, as every maker writes it, in mm and deg, rotation vectors in rad."""
         robot = self.robot
-        frames: dict[str, Frame] = {"model": "base"}
-        if robot.controller != AS_THE_MODEL:
-            frames["controller"] = "controller"
+        units = "deg" if all(joint.kind == "revolute" for joint in robot.joints) else "deg, mm"
         joints = {"model": self._joints(self.joints)}
+        text = [f"Joint positions of the model (joint_i): {_row(joints['model'], 4)} {units}"]
         if robot.controller.counts_known:
             joints["controller"] = self._joints(robot.controller.from_model(self.joints[None])[0])
-        return {"joints": joints, "flange": {whose: self._pose(frame) for whose, frame in frames.items()}}
-
-    def lines(self) -> list[str]:
-        """Return the joint positions of both kinds and the pose, as every maker writes it."""
-        said = self.summary()
-        joints, flange = said["joints"], said["flange"]
-        units = "deg" if all(joint.kind == "revolute" for joint in self.robot.joints) else "deg, mm"
-        text = []
-        if "controller" in joints:
-            text.append(f"Joint positions on the controller (axis_i): {_row(joints['controller'], 4)} {units}")
-        text.append(f"Joint positions of the model (joint_i): {_row(joints['model'], 4)} {units}")
-        if "controller" in flange:
-            text.append("The controller, with the tool and the user frame all zeros, shows the pose:")
-        else:
-            text.append(
-                "The robot file does not say where its controller has its frames. Flange of the model, from the base:"
-            )
+            text.insert(0, f"Joint positions on the controller (axis_i): {_row(joints['controller'], 4)} {units}")
+        yield say(*text, joints=joints)
+        flange = {"model": self._pose("base")}
+        words = "The robot file does not say where its controller has its frames. Flange of the model, from the base:"
+        if robot.controller != AS_THE_MODEL:
+            flange["controller"] = self._pose("controller")
+            words = "The controller, with the tool and the user frame all zeros, shows the pose:"
         shown = flange.get("controller", flange["model"])
-        x, y, z = _row(shown["position_mm"], 3).split()
-        text.append(f"  x {x}  y {y}  z {z} mm")
+        yield say(words, f"  {_place(shown)}", flange=flange)
         for name, way, unit, who in _WRITTEN:
             digits = 6 if not unit else 4
-            text.append(f"  {name}  {_row(shown[way.name], digits)}{' ' * bool(unit)}{unit}  ({who})")
-        if "controller" in flange and flange["controller"] != flange["model"]:
-            x, y, z = _row(flange["model"]["position_mm"], 3).split()
+            yield say(f"  {name}  {_row(shown[way.name], digits)}{' ' * bool(unit)}{unit}  ({who})")
+        if shown != flange["model"]:
             q = _row(flange["model"][QUATERNION.name], 6)
-            text.append(f"Flange of the model, from its base: x {x}  y {y}  z {z} mm, quaternion {q}")
-        return text
+            yield say(f"Flange of the model, from its base: {_place(flange['model'])}, quaternion {q}")
 
     def _joints(self, joints: Array) -> list[float]:
-        units = ["deg" if joint.kind == "revolute" else "mm" for joint in self.robot.joints]
-        return [from_si(value, unit) for value, unit in zip(joints.tolist(), units, strict=True)]
+        return [from_si(value, _unit(one)) for value, one in zip(joints.tolist(), self.robot.joints, strict=True)]
 
     def _pose(self, frame: Frame) -> dict[str, list[float]]:
         position, rotation = self.robot.forward(self.joints, frame=frame)
@@ -217,6 +198,11 @@ def _usual(numbers: Array, way: Orientation) -> list[float]:
     return [sign * float(v) for v in numbers]
 
 
+def _place(pose: dict[str, list[float]]) -> str:
+    x, y, z = _row(pose["position_mm"], 3).split()
+    return f"x {x}  y {y}  z {z} mm"
+
+
 def _row(values: list[float], digits: int) -> str:
     """Return numbers in a row, without the sign of a zero."""
     return "  ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in values)
@@ -229,94 +215,103 @@ class RobotDescription(Record):
     robot: Robot  #: The robot.
     at: ShownPose | None = None  #: Where it stands, if joint positions were given.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, lengths in mm and angles in deg."""
+    def blocks(self) -> Iterator[Block]:
+        """Give its joints, its reach at zero, and what else is known about it, lengths in mm and angles in deg."""
         robot = self.robot
-        base = robot.base
+        yield say(f"{robot.title} ({robot.name})", name=robot.name, title=robot.title, maker=robot.maker or None)
+        yield say(f"Source: {robot.source}", source=robot.source)
+        yield say(
+            f"Convention: {robot.convention_name}, lengths in mm, angles in deg",
+            convention=robot.convention_name,
+            units={"length": "mm", "angle": "deg"},
+        )
+        yield each("joints", (self._joint(number) for number in range(len(robot.joints))))
         position, _ = robot.world_poses(np.zeros((1, len(robot.joints))))
-        joints = []
-        for number, joint in enumerate(robot.joints, 1):
-            values = {
-                p.name: from_si(p.value, SHOWN_AS[p.unit])
-                for element in robot.link_elements[number - 1]
-                if element.parameter is not None
-                for p in [robot.parameters[element.parameter]]
-            }
-            unit = "deg" if joint.kind == "revolute" else "mm"
-            limits = [from_si(v, unit) for v in joint.limits] if joint.limits else None
-            bearing = None if joint.bearing is None else written(joint.bearing, "mm")
-            speed = None if joint.max_speed is None else written(joint.max_speed, unit)
-            made = {"name": joint.name, "type": joint.kind, "values": values, "limits": limits, "bearing": bearing}
-            joints.append({**made, "max_speed": speed})
-        return {
-            "name": robot.name,
-            "title": robot.title,
-            "maker": robot.maker or None,
-            "source": robot.source,
-            "convention": robot.convention_name,
-            "units": {"length": "mm", "angle": "deg"},
-            "joints": joints,
-            "flange_at_zero_mm": [
-                round(float(v) * 1e3, 9) for v in base.rotation.T @ (position[0] - np.array(base.translation))
-            ],
-            "effects": list(robot.effect_names),
-            "masses_kg": {f"link {m.joint}": m.mass for m in robot.masses},
-            "balancers": [balancer_entry(balancer) for balancer in robot.balancers],
-            "payload": {"mass_kg": robot.payload.mass, "cog_mm": [written(v, "mm") for v in robot.payload.cog]},
-            "rated_load_kg": robot.rated_load,
-            **reach_summary(robot.reach),
-            "gravity": list(robot.gravity),
-            "controller": controller_entry(robot.controller, robot.joints),
-            "tools": list(robot.tools),
-            "truths": list(truth_names(robot)),
-            "targets": [target.name for target in robot.targets],
-            "proof": None if robot.proof is None else {**robot.proof.summary(), "intact": is_intact(robot)},
-            "history": list(robot.history),
-            "at": None if self.at is None else self.at.summary(),
-        }
+        flange = robot.base.rotation.T @ (position[0] - np.array(robot.base.translation))
+        x, y, z = at_zero = [round(float(v) * 1e3, 9) for v in flange]
+        words = f"Flange at zero joint positions, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm"
+        yield say(words, flange_at_zero_mm=at_zero)
+        yield from self._masses()
+        reach = () if robot.reach is None else (f"Reach: {robot.reach.text}",)
+        yield say(*reach, **reach_summary(robot.reach))
+        fall = "Free fall: {:g}, {:g}, {:g} m/s^2 in the base frame".format(*robot.gravity)
+        yield say(*([fall] if robot.gravity != GRAVITY else []), gravity=list(robot.gravity))
+        yield self._controller()
+        targets = [target.name for target in robot.targets]
+        yield say(*_named_list("Joint effects", robot.effect_names), effects=list(robot.effect_names))
+        yield say(*_named_list("Truths for simulation", truth_names(robot)), truths=list(truth_names(robot)))
+        yield say(*_named_list("Targets", targets), targets=targets, tools=list(robot.tools))
+        yield self._proof()
+        yield say(*(f"History: {line}" for line in robot.history), history=list(robot.history))
+        yield say(at=None) if self.at is None else under("at", self.at.blocks())
 
-    def lines(self) -> list[str]:
-        """Return its joints, its reach at zero, and what else is known about it."""
-        robot, content = self.robot, self.summary()
-        text = [f"{robot.title} ({robot.name})", f"Source: {robot.source}"]
-        text.append(f"Convention: {robot.convention_name}, lengths in mm, angles in deg")
-        for joint in content["joints"]:
-            row = "  ".join(f"{name} {value:g}" for name, value in joint["values"].items())
-            limits = "  limits {:g} to {:g}".format(*joint["limits"]) if joint["limits"] else ""
-            bearing = "" if joint["bearing"] is None else f"  bearing at {joint['bearing']:g}"
-            text.append(f"  {joint['name']} ({joint['type']})  {row}{limits}{bearing}{_speed(joint)}")
-        x, y, z = content["flange_at_zero_mm"]
-        text.append(f"Flange at zero joint positions, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm")
-        if content["masses_kg"]:
-            text.append(f"Link masses: {', '.join(f'{k} {v:g} kg' for k, v in content['masses_kg'].items())}")
-        for b in content["balancers"]:
+    def _joint(self, number: int) -> Words:
+        """Return what is known of a joint, numbered from zero."""
+        robot, joint = self.robot, self.robot.joints[number]
+        values = {
+            p.name: from_si(p.value, SHOWN_AS[p.unit])
+            for element in robot.link_elements[number]
+            if element.parameter is not None
+            for p in [robot.parameters[element.parameter]]
+        }
+        unit = _unit(joint)
+        limits = [from_si(v, unit) for v in joint.limits] if joint.limits else None
+        bearing = None if joint.bearing is None else written(joint.bearing, "mm")
+        speed = None if joint.max_speed is None else written(joint.max_speed, unit)
+        row = "  ".join(f"{name} {value:g}" for name, value in values.items())
+        row += "  limits {:g} to {:g}".format(*limits) if limits else ""
+        row += "" if bearing is None else f"  bearing at {bearing:g}"
+        row += "" if speed is None else f"  up to {speed:g} {unit}/s"
+        return say(
+            f"  {joint.name} ({joint.kind})  {row}",
+            name=joint.name,
+            type=joint.kind,
+            values=values,
+            limits=limits,
+            bearing=bearing,
+            max_speed=speed,
+        )
+
+    def _masses(self) -> Iterator[Words]:
+        """Give what is known of masses, springs and loads."""
+        robot = self.robot
+        masses = {f"link {m.joint}": m.mass for m in robot.masses}
+        yield say(*_named_list("Link masses", [f"{k} {v:g} kg" for k, v in masses.items()]), masses_kg=masses)
+        text, balancers = [], [balancer_entry(balancer) for balancer in robot.balancers]
+        for b in balancers:
             pull = f"{b['force']:g} N at {b['length']:g} mm" if "force" in b else f"free at {b['free_length']:g} mm"
             ends = f"from link {b['fixed']['link']} to link {b['moving']['link']}"
             text.append(f"Balancer {b['name']}: {ends}, {pull}, {b['stiffness']:g} N/mm")
-        payload = content["payload"]
-        if payload["mass_kg"]:
-            x, y, z = payload["cog_mm"]
-            text.append(f"Payload: {payload['mass_kg']:g} kg at x {x:g}  y {y:g}  z {z:g} mm of the flange")
-        if robot.rated_load is not None:
-            text.append(f"Rated load: {robot.rated_load:g} kg")
-        if robot.reach is not None:
-            text.append(f"Reach: {robot.reach.text}")
-        if robot.gravity != GRAVITY:
-            text.append("Free fall: {:g}, {:g}, {:g} m/s^2 in the base frame".format(*robot.gravity))
-        if content["controller"]:
-            text.append(f"Controller: {content['controller'].get('source', 'as its file says')}")
-            text += [f"  {line}" for line in _controller_lines(content["controller"], content["joints"])]
-        for key, label in (("effects", "Joint effects"), ("truths", "Truths for simulation"), ("targets", "Targets")):
-            if content[key]:
-                text.append(f"{label}: {', '.join(content[key])}")
-        if self.robot.proof is not None:
-            words = ", ".join(dict.fromkeys([content["proof"]["status"], *content["proof"]["errors"]]))
-            known = f"; held at known places: {', '.join(self.robot.proof.held)}" if self.robot.proof.held else ""
-            text.append(
-                f"Calibration: {words}{known}{'' if content['proof']['intact'] else '; values were changed since'}"
-            )
-        text += [f"History: {line}" for line in robot.history]
-        return text if self.at is None else [*text, *self.at.lines()]
+        yield say(*text, balancers=balancers)
+        mass, (x, y, z) = robot.payload.mass, (written(v, "mm") for v in robot.payload.cog)
+        words = f"Payload: {mass:g} kg at x {x:g}  y {y:g}  z {z:g} mm of the flange"
+        yield say(*([words] if mass else []), payload={"mass_kg": mass, "cog_mm": [x, y, z]})
+        load = robot.rated_load
+        yield say(*([] if load is None else [f"Rated load: {load:g} kg"]), rated_load_kg=load)
+
+    def _controller(self) -> Words:
+        entry = controller_entry(self.robot.controller, self.robot.joints)
+        if not entry:
+            return say(controller=entry)
+        lines = (f"  {line}" for line in _controller_lines(entry, self.robot.joints))
+        return say(f"Controller: {entry.get('source', 'as its file says')}", *lines, controller=entry)
+
+    def _proof(self) -> Words:
+        proof = self.robot.proof
+        if proof is None:
+            return say(proof=None)
+        held = {**proof.summary(), "intact": is_intact(self.robot)}
+        words = ", ".join(dict.fromkeys([held["status"], *held["errors"]]))
+        words += f"; held at known places: {', '.join(proof.held)}" if proof.held else ""
+        return say(f"Calibration: {words}{'' if held['intact'] else '; values were changed since'}", proof=held)
+
+
+def _named_list(label: str, names: Sequence[str]) -> list[str]:
+    return [f"{label}: {', '.join(names)}"] if names else []
+
+
+def _unit(joint: Joint) -> str:
+    return "deg" if joint.kind == "revolute" else "mm"
 
 
 #: What the words of robot files say of a controller's kinematics.
@@ -327,17 +322,10 @@ _KINEMATICS: Final = {
 }
 
 
-def _speed(joint: dict[str, Any]) -> str:
-    """Say how fast a joint goes at 100 %, if that is known."""
-    if joint["max_speed"] is None:
-        return ""
-    return f"  up to {joint['max_speed']:g} {'deg' if joint['type'] == 'revolute' else 'mm'}/s"
-
-
-def _controller_lines(entry: dict[str, Any], joints: list[dict[str, Any]]) -> Iterator[str]:
+def _controller_lines(entry: dict[str, Any], joints: Sequence[Joint]) -> Iterator[str]:
     """Say what of a controller differs from the model; `entry` is what a robot file would say of it."""
-    units = {joint["name"]: "deg" if joint["type"] == "revolute" else "mm" for joint in joints}
-    number = {joint["name"]: place for place, joint in enumerate(joints, 1)}
+    units = {joint.name: _unit(joint) for joint in joints}
+    number = {joint.name: place for place, joint in enumerate(joints, 1)}
     kinematics = entry.get("kinematics", "unknown")
     if not isinstance(kinematics, str):
         kinematics = f"{kinematics['kind']}, from {kinematics.get('source') or 'the robot file'}"

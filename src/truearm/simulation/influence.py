@@ -6,14 +6,14 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted, has_error, listed, refusals_of
+from truearm.engine.base.errors import InputError, Notice, counted, listed, refusals_of
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.base.units import SHOWN_AS, Marked, from_si, parts_of
 from truearm.engine.base.writing import output_folder, write_files
@@ -28,7 +28,8 @@ from truearm.engine.command.arguments import (
 from truearm.engine.command.split import check_split, check_trained_before, train_count
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, errors_of
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, say, under
+from truearm.engine.document.records import Record
 from truearm.engine.document.summaries import error_line, errors_summary
 from truearm.engine.fit.fit import identify, place
 from truearm.engine.fit.models import MODELS, Model
@@ -51,6 +52,8 @@ if TYPE_CHECKING:
 
 #: What is written into a folder.
 INFLUENCE_FILES: Final = ("influence.csv", "result.json", "report.html")
+#: So many of the most influential parameters are told first.
+_FIRST: Final = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +95,6 @@ class InfluenceResult(Record):
         """Names of its files."""
         return INFLUENCE_FILES
 
-    @property
-    def finished(self) -> bool:
-        """Whether no notice is an error."""
-        return not has_error(self.notices)
-
     def rows(self) -> list[dict[str, Any]]:
         """Return each parameter with its change and its influence, the most influential first, as JSON holds them."""
         turn = np.zeros_like(self.made.size) if self.made.turn is None else self.made.turn
@@ -134,47 +132,32 @@ class InfluenceResult(Record):
             rows.append({"name": name, "unit": unit, **values, "deviation": known})
         return rows
 
-    def summary(self) -> dict[str, Any]:
-        """Return the figures as ``result.json`` begins with them: errors in mm and mrad."""
-        told: dict[str, Any] = {
-            "configurations": len(self.labels),
-            "tip": self.tip,
-            "warnings": notice_summaries(self.notices),
-            "influence": self.rows(),
-        }
+    def blocks(self) -> Iterator[Block]:
+        """Give what parameters do, the most influential first, and what identification by that is worth [mm, mrad]."""
+        rows = self.rows()
+        width = max(len(row["name"]) for row in rows)
+        configurations = len(self.labels)
+        yield say(
+            f"What a change of each parameter does to {self.tip} at {counted(configurations, 'configuration')}:",
+            configurations=configurations,
+            tip=self.tip,
+        )
+        lines = []
+        for row in rows:
+            change = f"+{row['change']:.3g} {row['unit']}"
+            lines.append(
+                f"  {row['name']:<{width}} {change:<22} mean {row['mean_mm']:.4f} mm, {row['least_mm']:.4f} to "
+                f"{row['greatest_mm']:.4f} mm; turned by {row['mean_deg']:.4f} deg"
+            )
+        yield say(*lines[:_FIRST], influence=rows)
+        yield detail(*lines[_FIRST:])
         if self.identified is not None:
-            told |= {
-                "held_out": self.identified.held_out,
-                "training": self.identified.training,
-                "frames": self.identified.frames,
-                "errors": {str(way): errors_summary(errors) for way, errors in self.identified.errors.items()},
-            }
-        return told
+            yield from _worth(self.identified)
 
     def result(self) -> dict[str, Any]:
         """Return what ``result.json`` holds."""
         found = {} if self.identified is None else {"parameters": self.found()}
         return {"truearm": "truearm-influence/1", **self.summary(), "command": self.command, **found}
-
-    def lines(self) -> list[str]:
-        """Return the most influential parameters, then what identification by influence is worth."""
-        rows = self.rows()
-        width = max(len(row["name"]) for row in rows)
-        text = [f"What a change of each parameter does to {self.tip} at {counted(len(self.labels), 'configuration')}:"]
-        for row in rows:
-            change = f"+{row['change']:.3g} {row['unit']}"
-            text.append(
-                f"  {row['name']:<{width}} {change:<22} mean {row['mean_mm']:.4f} mm, {row['least_mm']:.4f} to "
-                f"{row['greatest_mm']:.4f} mm; turned by {row['mean_deg']:.4f} deg"
-            )
-        if self.identified is not None:
-            found = self.identified
-            part = "none of them has seen" if found.held_out else "all of them were made from"
-            judged = next(iter(found.errors.values())).configurations
-            text.append(f"On {counted(judged, 'configuration')} that {part}:")
-            width = max(map(len, WAYS.values()))
-            text += [f"  {WAYS[way]:<{width}}  {error_line(errors)}" for way, errors in found.errors.items()]
-        return text + notice_lines(self.notices)
 
     def csv_text(self) -> str:
         """Return the influence of every parameter at every configuration as CSV."""
@@ -208,6 +191,24 @@ class InfluenceResult(Record):
         }
         write_files(folder, files, self.command)
         return tuple(folder / name for name in files)
+
+
+def _worth(found: Identified) -> Iterator[Block]:
+    """Give the errors of each way to identify, in mm and mrad."""
+    part = "none of them has seen" if found.held_out else "all of them were made from"
+    judged = next(iter(found.errors.values())).configurations
+    yield say(
+        f"On {counted(judged, 'configuration')} that {part}:",
+        held_out=found.held_out,
+        training=found.training,
+        frames=found.frames,
+    )
+    width = max(map(len, WAYS.values()))
+    ways = (
+        under(way, [say(f"  {WAYS[way]:<{width}}  {error_line(errors)}", **errors_summary(errors))])
+        for way, errors in found.errors.items()
+    )
+    yield under("errors", ways)
 
 
 Frames = Literal["placed", "robot"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,7 @@ from truearm.engine.data.controller_joints import in_controller_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.data.readers.rows import before_each, in_order, places_after_stops
+from truearm.engine.document.document import Block, detail, each, say
 from truearm.engine.document.records import Record
 from truearm.engine.robot.postures import approach_from
 from truearm.engine.robot.robot import Robot
@@ -46,30 +48,25 @@ class Simulation(Record):
     out: Path | None = None  #: The file that holds them; None if none was written.
     stopped_before: bool = False  #: Whether the arm stopped right before each configuration where a plan says so.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "robot": self.robot,
-            "truth": self.truth,
-            "configurations": self.data.configurations,
-            "joints_are": self.data.joints_are,
-            "readings": len(self.data.target),
-            "targets": list(self.data.targets),
-            "fixtures": list(self.data.fixtures),
-            "stopped_before": self.stopped_before,
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was read."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what was read."""
         data = self.data
         what = f"{counted(len(data.target), 'reading')} of {counted(len(data.targets), 'target')}"
         against = f" against {', '.join(data.fixtures)}" if data.fixtures else ""
         where = "" if self.out is None else f": {self.out}"
         many = counted(data.configurations, "configuration")
-        said = [f"{many} of {self.robot} ({self.truth}), {what}{against}{where}"]
-        if self.stopped_before:
-            said.append("Before each the arm stopped at its approach_i; the order of the data counts these stops, too.")
-        return said
+        yield say(
+            f"{many} of {self.robot} ({self.truth}), {what}{against}{where}",
+            robot=self.robot,
+            truth=self.truth,
+            configurations=data.configurations,
+            joints_are=data.joints_are,
+            readings=len(data.target),
+            targets=list(data.targets),
+            fixtures=list(data.fixtures),
+        )
+        words = "Before each the arm stopped at its approach_i; the order of the data counts these stops, too."
+        yield detail(*([words] if self.stopped_before else []), stopped_before=self.stopped_before)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -78,21 +75,26 @@ class DeviceList(Record):
 
     devices: tuple[Device, ...]  #: In the order of the registry.
 
-    def summary(self) -> dict[str, Any]:
-        """Return name, words, deviation and source of each, as JSON holds them."""
-        rows = [
-            {"name": d.name, "summary": d.summary, "sigma_mm": d.sigma * 1e3, "source": d.source} for d in self.devices
-        ]
-        return {"devices": rows}
-
     def as_json(self) -> Any:
         """Return the rows alone."""
         return self.summary()["devices"]
 
-    def lines(self) -> list[str]:
-        """Return one line an instrument."""
+    def blocks(self) -> Iterator[Block]:
+        """Give name, words, deviation [mm] and source of each."""
         width = max(len(device.name) for device in self.devices)
-        return [f"{d.name:<{width}}  {d.summary}; deviation {d.sigma * 1e3:g} mm" for d in self.devices]
+        yield each(
+            "devices",
+            (
+                say(
+                    f"{d.name:<{width}}  {d.summary}; deviation {d.sigma * 1e3:g} mm",
+                    name=d.name,
+                    summary=d.summary,
+                    sigma_mm=d.sigma * 1e3,
+                    source=d.source,
+                )
+                for d in self.devices
+            ),
+        )
 
 
 def simulated(asked: Simulate) -> Simulation:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
+from truearm.engine.document.document import Words, detail, say
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rotation_from_quaternion, rotation_from_vector
@@ -42,6 +43,12 @@ class OrientationErrors:
     def locked(self) -> int:
         """At how many readings Phi and Psi mean nothing."""
         return int(np.isnan(self.zxz[:, 0]).sum())
+
+    @property
+    def parts(self) -> dict[str, dict[str, float] | None]:
+        """Mean, mean size, RMS and largest size of each part by its name [deg]; None where it means nothing."""
+        columns = (*self.vector.T, *self.zxz.T)
+        return {name: _figures(column) for name, column in zip(PARTS, columns, strict=True)}
 
 
 def orientation_errors(robot: Robot, data: Dataset, errors: Errors) -> OrientationErrors | None:
@@ -212,14 +219,23 @@ def _of_postures(robot: Robot, joints: Array, training: Array) -> Array:
 PARTS: Final = ("rx", "ry", "rz", "phi", "theta", "psi")
 
 
-def orientation_summary(found: OrientationErrors) -> dict[str, Any]:
-    """Return orientation errors by their parts, as JSON holds them, in deg."""
-    return {
-        "readings": len(found.reading),
-        "rotation_vector": {name: _figures(column) for name, column in zip(PARTS[:3], found.vector.T, strict=True)},
-        "zxz": {name: _figures(column) for name, column in zip(PARTS[3:], found.zxz.T, strict=True)},
-        "zxz_left_out": found.locked,
-    }
+def orientation_block(found: OrientationErrors) -> Words:
+    """Return orientation errors by their parts, in deg: the mean size of each, and in JSON the other figures."""
+    parts = found.parts
+    sizes = {name: "–" if part is None else f"{part['mean_size']:.4f}" for name, part in parts.items()}
+    vector = "  ".join(f"{name} {sizes[name]}" for name in PARTS[:3])
+    angles = "  ".join(f"{name.capitalize()} {sizes[name]}" for name in PARTS[3:])
+    left_out = f" (Phi and Psi without {found.locked} readings near Theta 0 or 180)" if found.locked else ""
+    return detail(
+        "  orientation, mean sizes in the base frame: "
+        f"rotation vector  {vector} deg; ZXZ angles  {angles} deg{left_out}",
+        orientation_parts_deg={
+            "readings": len(found.reading),
+            "rotation_vector": {name: parts[name] for name in PARTS[:3]},
+            "zxz": {name: parts[name] for name in PARTS[3:]},
+            "zxz_left_out": found.locked,
+        },
+    )
 
 
 def _figures(values: Array) -> dict[str, float] | None:
@@ -235,33 +251,27 @@ def _figures(values: Array) -> dict[str, float] | None:
     }
 
 
-def orientation_lines(found: OrientationErrors | None) -> list[str]:
-    """Return the mean size of each part of the orientation errors."""
-    if found is None:
-        return []
-    summary = orientation_summary(found)
-    vector = "  ".join(f"{name} {part['mean_size']:.4f}" for name, part in summary["rotation_vector"].items())
-    angles = "  ".join(
-        f"{name.capitalize()} {'–' if part is None else format(part['mean_size'], '.4f')}"
-        for name, part in summary["zxz"].items()
-    )
-    left_out = f" (Phi and Psi without {found.locked} readings near Theta 0 or 180)" if found.locked else ""
-    return [
-        "  orientation, mean sizes in the base frame: "
-        f"rotation vector  {vector} deg; ZXZ angles  {angles} deg{left_out}"
-    ]
-
-
-def distance_summary(found: RegionDistances) -> dict[str, Any]:
-    """Return errors by the distance from where the robot was calibrated, as JSON holds them, in mm and deg."""
+def distance_block(found: RegionDistances) -> Words:
+    """Return how far readings lie from where the robot was calibrated, and what the error does, in mm and deg."""
     growth = found.growth
-    return {
-        "training_configurations": found.training,
-        "tip_mm": [_span(span, 1e3) for span in found.spans(found.tip)],
-        "joints_deg": [_span(span, math.degrees(1.0)) for span in found.spans(found.joints)],
-        "middle_mm": [_span(span, 1e3) for span in found.spans(found.middle)],
-        "grows": None if growth is None else growth[2],
-    }
+    away = f"{found.tip.min() * 1e3:.0f} to {found.tip.max() * 1e3:.0f} mm"
+    turned = np.degrees(found.joints[np.isfinite(found.joints)])
+    words = f"From the nearest of {found.training} training configurations: tips {away}"
+    if len(turned):
+        words += f", joints {turned.min():.0f} to {turned.max():.0f} deg"
+    if growth is not None:
+        near, far, _ = growth
+        words += f"; mean error {near.mean * 1e3:.3f} mm in the nearest third, {far.mean * 1e3:.3f} mm in the farthest"
+    return say(
+        words,
+        distance_from_training={
+            "training_configurations": found.training,
+            "tip_mm": [_span(span, 1e3) for span in found.spans(found.tip)],
+            "joints_deg": [_span(span, math.degrees(1.0)) for span in found.spans(found.joints)],
+            "middle_mm": [_span(span, 1e3) for span in found.spans(found.middle)],
+            "grows": None if growth is None else growth[2],
+        },
+    )
 
 
 def _span(span: Span, scale: float) -> dict[str, Any]:
@@ -272,19 +282,3 @@ def _span(span: Span, scale: float) -> dict[str, Any]:
         "mean_mm": span.mean * 1e3,
         "max_mm": span.largest * 1e3,
     }
-
-
-def distance_lines(found: RegionDistances | None) -> list[str]:
-    """Return how far the readings lie from where the robot was calibrated, and what the error does with that."""
-    if found is None:
-        return []
-    away = f"{found.tip.min() * 1e3:.0f} to {found.tip.max() * 1e3:.0f} mm"
-    turned = np.degrees(found.joints[np.isfinite(found.joints)])
-    words = f"From the nearest of {found.training} training configurations: tips {away}"
-    if len(turned):
-        words += f", joints {turned.min():.0f} to {turned.max():.0f} deg"
-    growth = found.growth
-    if growth is not None:
-        near, far, _ = growth
-        words += f"; mean error {near.mean * 1e3:.3f} mm in the nearest third, {far.mean * 1e3:.3f} mm in the farthest"
-    return [words]

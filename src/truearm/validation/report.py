@@ -22,7 +22,6 @@ from truearm.engine.document.document import (
 )
 from truearm.engine.document.drawing import AFTER, COLOURS, Figure, axis, figure, rounded, significant
 from truearm.engine.document.figures import residuals
-from truearm.validation.region import orientation_summary
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
@@ -229,9 +228,8 @@ def _spreads(found: Validation) -> list[tuple[str, ...]]:
 
 
 def _parts(found: OrientationErrors) -> list[tuple[str, ...]]:
-    summary = orientation_summary(found)
     rows = []
-    for name, part in {**summary["rotation_vector"], **summary["zxz"]}.items():
+    for name, part in found.parts.items():
         count = len(found.reading) - (found.locked if name in ("phi", "psi") else 0)
         texts: tuple[str, ...] = ("–",) * 4
         if part is not None:

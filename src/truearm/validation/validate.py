@@ -41,11 +41,9 @@ from truearm.validation.frames import check_frames, check_names, check_proof
 from truearm.validation.region import (
     OrientationErrors,
     RegionDistances,
-    distance_lines,
-    distance_summary,
+    distance_block,
+    orientation_block,
     orientation_errors,
-    orientation_lines,
-    orientation_summary,
     region_distances,
 )
 
@@ -108,11 +106,9 @@ class Validation(Record):
             f"On {configurations} of {self.source}:", f"  {error_line(self.errors)}", **errors_summary(self.errors)
         )
         if self.orientations is not None:
-            yield say(
-                *orientation_lines(self.orientations), orientation_parts_deg=orientation_summary(self.orientations)
-            )
+            yield orientation_block(self.orientations)
         if self.distances is not None:
-            yield say(*distance_lines(self.distances), distance_from_training=distance_summary(self.distances))
+            yield distance_block(self.distances)
         if self.zones is not None:
             yield each(
                 "zones",

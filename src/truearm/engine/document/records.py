@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import wraps
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 from truearm.engine.base.errors import Notice, as_html, counted, has_error, listed, short_text, worst_first
 from truearm.engine.base.units import Marked, parts_of, said_of, with_mark, without_mark
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.document.document import Block, held_by, lines_of
+from truearm.engine.document.document import Block, detail, held_by, lines_of, say
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 
@@ -169,22 +169,13 @@ class Imported(Record):
     missing: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[Notice, ...] = ()  #: What the data cannot hold of the files.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "configurations": self.data.configurations,
-            "targets": list(self.data.targets),
-            "missing": dict(self.missing),
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was read."""
-        where = "" if self.out is None else f": {self.out}"
-        many = counted(self.data.configurations, "configuration")
-        text = [f"{many}, targets {', '.join(self.data.targets)}{where}"]
-        text += [f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items()]
-        return text + notice_lines(self.warnings)
+    def blocks(self) -> Iterator[Block]:
+        """Give what was read."""
+        data, where = self.data, "" if self.out is None else f": {self.out}"
+        many, targets = counted(data.configurations, "configuration"), list(data.targets)
+        yield say(f"{many}, targets {', '.join(targets)}{where}", configurations=data.configurations, targets=targets)
+        lines = (f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items())
+        yield detail(*lines, missing=dict(self.missing))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -196,23 +187,15 @@ class ImportedRoboDK(Record):
     out: Path | None = None  #: The canonical CSV file that holds them; None if none was written.
     missing: int = 0  #: How many readings are missing.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "configurations": self.data.configurations,
-            "tool_points_mm": {
-                name: (1e3 * point).tolist() for name, point in zip(self.data.targets, self.tool_points, strict=True)
-            },
-            "missing": self.missing,
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was read."""
-        where = "" if self.out is None else f": {self.out}"
-        text = [f"{counted(self.data.configurations, 'configuration')}{where}"]
-        for name, point in zip(self.data.targets, self.tool_points, strict=True):
-            text.append(f"  target {name}: tool point ({', '.join(f'{1e3 * v:g}' for v in point)}) mm")
-        return text + ([f"  {self.missing} missing {_nouns('reading', self.missing)}"] if self.missing else [])
+    def blocks(self) -> Iterator[Block]:
+        """Give what was read, and where the targets are in the flange frame [mm]."""
+        data, where = self.data, "" if self.out is None else f": {self.out}"
+        yield say(f"{counted(data.configurations, 'configuration')}{where}", configurations=data.configurations)
+        points = {n: (1e3 * point).tolist() for n, point in zip(data.targets, self.tool_points, strict=True)}
+        lines = (f"  target {n}: tool point ({', '.join(f'{v:g}' for v in point)}) mm" for n, point in points.items())
+        yield say(*lines, tool_points_mm=points)
+        lost = [f"  {self.missing} missing {_nouns('reading', self.missing)}"] if self.missing else []
+        yield say(*lost, missing=self.missing)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -228,18 +211,13 @@ class ImportedCircles(Record):
         """How many distances are missing, where the line has gaps."""
         return int(np.sum(~self.data.has_reading))
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {"configurations": self.data.configurations, "pages": list(self.pages), "missing": self.gaps}
-
-    def lines(self) -> list[str]:
-        """Return what was read."""
-        where = "" if self.out is None else f": {self.out}"
-        many = counted(self.data.configurations, "configuration")
-        text = [f"{many} on {counted(len(self.pages), 'page')}{where}"]
-        if self.gaps:
-            text.append(f"  {self.gaps} missing {_nouns('distance', self.gaps)}, where the line has gaps")
-        return text
+    def blocks(self) -> Iterator[Block]:
+        """Give what was read."""
+        configurations, where = self.data.configurations, "" if self.out is None else f": {self.out}"
+        on = f"{counted(configurations, 'configuration')} on {counted(len(self.pages), 'page')}"
+        yield say(f"{on}{where}", configurations=configurations, pages=list(self.pages))
+        words = f"  {self.gaps} missing {_nouns('distance', self.gaps)}, where the line has gaps"
+        yield say(*([words] if self.gaps else []), missing=self.gaps)
 
 
 def _nouns(noun: str, count: int) -> str:

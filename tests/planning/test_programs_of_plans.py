@@ -241,7 +241,7 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         assert "Nobody said the load of the flange" in notices[1].message
         assert "what is assumed, 0 kg at (0, 0, 0) mm. A wrong load" in notices[1].message
         by_hand = {"fanuc": "Payload schedule 1 on", "inform": "Tool file 0 on", "val3": "The tool flange on"}
-        assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.lines())
+        assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.answer)
 
 
 def test_joints_of_a_short_arm_are_driven() -> None:

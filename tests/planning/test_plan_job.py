@@ -40,7 +40,7 @@ def test_the_record_tells_what_constraints_cost() -> None:
     cost = planned.made.rejected["moment_2"]
     assert planned.lines()[0] == f"10 of {60 - cost} usable configurations, chosen by O1."
     assert f"  moment_2: broken by {cost} of 60" in planned.lines()
-    assert planned.lines()[-4:-1] == list(planned.answer)
+    assert planned.lines()[-4:-1] == planned.answer
     assert planned.summary()["rejected"] == {"limits": 0, "moment_2": cost}
 
 

@@ -14,6 +14,7 @@ from tests.simulated import campaign
 import truearm
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.manifest import MANIFEST, hash_of
+from truearm.engine.document.document import held_by
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.devices import named_device
@@ -184,7 +185,7 @@ def test_a_speed_below_the_lowest_share_of_a_language_is_told(planned: Plan) -> 
         assert bool(slow.speeds) == (robot is known)
         assert ("as fast as any" in slow.warnings[0].message) == (program == "krl" and robot is unknown)
         assert (slow.fastest > 0.011) == (program == "krl")
-        assert slow.summary()["speed_mm_s"] == 1e3 * slow.fastest
+        assert held_by(slow.blocks())["speed_mm_s"] == 1e3 * slow.fastest
     assert "KRL says no share below 1 %" not in "\n".join(planned.lines())
 
 
@@ -240,7 +241,7 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
         assert "Nobody said the load of the flange" in notices[1].message
         assert "what is assumed, 0 kg at (0, 0, 0) mm. A wrong load" in notices[1].message
         by_hand = {"fanuc": "Payload schedule 1 on", "inform": "Tool file 0 on", "val3": "The tool flange on"}
-        assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.lines())
+        assert by_hand.get(program, "It tells the controller of") in "\n".join(driven.answer)
 
 
 def test_joints_of_a_short_arm_are_driven() -> None:

@@ -24,8 +24,7 @@ _TURNED: Final = 0.01
 #: With so few targets and no frame, a correction without a mean is no correction.
 _FEW_TARGETS: Final = 3
 _LISTED: Final = 5
-#: Said before everything else.
-NOTHING_CORRECTED: Final = "nothing-corrected"
+_NOTHING_CORRECTED: Final = "nothing-corrected"
 #: Share by which masses differ that are the same load.
 _SAME_MASS: Final = 0.1
 #: A tool is measured where the program has it, within what a calibration cannot know of the flange [m].
@@ -190,11 +189,11 @@ def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
 def _nothing(alone: int) -> list[Notice]:
     """Say that no target was corrected, and why not if single ones were without a frame whose place is known."""
     if not alone:
-        return [Notice(NOTHING_CORRECTED, "Nothing was corrected: the programs are as they were.")]
+        return [Notice(_NOTHING_CORRECTED, "Nothing was corrected: the programs are as they were.")]
     left = "only one target is left to correct" if alone == 1 else f"{alone} targets are left, each alone in its frame"
     return [
         Notice(
-            NOTHING_CORRECTED,
+            _NOTHING_CORRECTED,
             f"Nothing can be corrected: {left}, and `frames` is not given. The error of a single target could as well "
             f"be that of its frame. {'It stays as it is' if alone == 1 else 'They stay as they are'}: give `frames`.",
         )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -48,7 +48,8 @@ from truearm.engine.command.arguments import (
 from truearm.engine.command.split import accept_argument, changed_since, refuse_unaccepted, told_of
 from truearm.engine.command.texts import positions_of
 from truearm.engine.diagnose.external_force import check_force
-from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, say, under
+from truearm.engine.document.records import Record, joints_lines
 from truearm.engine.motion.path_file import read_path
 from truearm.engine.programs import BY_NAME
 from truearm.engine.programs.chosen_targets import refuse_unanswered
@@ -98,27 +99,6 @@ class FollowedPath(Record):
         """What the corrections that were made know, from nothing to most."""
         return tuple(name for name in KNOWLEDGE if name in self.path.joints)
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it: lengths in mm, times in s."""
-        path = self.path
-        trajectory = path.planned.trajectory
-        return {
-            "samples": len(trajectory.time),
-            "seconds": float(trajectory.time[-1]),
-            "length_mm": float(trajectory.distance[-1]) * 1e3,
-            "sections": list(path.planned.kinds),
-            "frame": path.planned.frame,
-            "calibrated": path.calibrated,
-            "error_mm": {
-                name: {"mean": float(path.errors[name].mean()) * 1e3, "max": float(path.errors[name].max()) * 1e3}
-                for name in self.stages
-                if path.calibrated
-            },
-            "joints_are": self.joints_are,
-            "programs": list(self.programs),
-            "warnings": notice_summaries(self.warnings),
-        }
-
     @property
     def answer(self) -> tuple[str, str]:
         """What the path is, and what can be said of its correction."""
@@ -136,17 +116,30 @@ class FollowedPath(Record):
             "by the model's error."
         )
 
-    def lines(self) -> list[str]:
-        """Return how long the path is, and how far the robot is from it before and after correction."""
-        first, last = self.answer
-        text = [first]
-        if self.path.calibrated:
-            text.append("Off the path, as the calibrated robot predicts it in motion:")
-            wide = max(len(STAGES[name]) for name in self.stages)
-            for name in self.stages:
-                error = self.path.errors[name] * 1e3
-                text.append(f"  {STAGES[name]:<{wide}}  mean {error.mean():.3f}  max {error.max():.3f} mm")
-        return [*text, last, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
+    def blocks(self) -> Iterator[Block]:
+        """Give how long the path is, and how far the robot is from it before and after correction, in mm and s."""
+        path, (first, last) = self.path, self.answer
+        trajectory = path.planned.trajectory
+        yield say(
+            first,
+            *(["Off the path, as the calibrated robot predicts it in motion:"] if path.calibrated else []),
+            samples=len(trajectory.time),
+            seconds=float(trajectory.time[-1]),
+            length_mm=float(trajectory.distance[-1]) * 1e3,
+            sections=list(path.planned.kinds),
+            frame=path.planned.frame,
+            calibrated=path.calibrated,
+        )
+        yield under("error_mm", (self._error(name) for name in self.stages if path.calibrated))
+        yield (detail if path.calibrated else say)(last)
+        yield detail(*joints_lines(self.joints_are), joints_are=self.joints_are, programs=list(self.programs))
+
+    def _error(self, name: Knowledge) -> Block:
+        error = self.path.errors[name] * 1e3
+        mean, most = float(error.mean()), float(error.max())
+        words = f"  {STAGES[name]:<{max(len(STAGES[one]) for one in self.stages)}}  mean {mean:.3f}  max {most:.3f} mm"
+        tell = say if name in ("nothing", self.path.best) else detail
+        return under(name, [tell(words, mean=mean, max=most)])
 
     def motion_csv(self) -> str:
         """Return what the controller would command: time, section, joint positions, and where the tip shall be."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -12,11 +12,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.compensation.advice import NOTHING_CORRECTED, frame_words
+from truearm.compensation.advice import frame_words
 from truearm.compensation.program_correction import CorrectedPrograms, ProgramSplit
 from truearm.engine.base.errors import Notice, counted
 from truearm.engine.base.writing import output_folder
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, each, say
+from truearm.engine.document.records import Record
 from truearm.engine.programs.chosen_targets import Kept
 from truearm.engine.programs.corrected_targets import LedgerEntry, corrected_digests
 from truearm.engine.programs.correction import Correction, Shared, shared_motion
@@ -131,27 +132,47 @@ class FileCorrection(Record):
         """What stays as it is, and why."""
         return tuple(one for one in self.correction.skipped if one.source == self.source)
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, lengths in mm."""
-        millimetres = self.moved * 1e3
-        return {
-            "file": self.name,
-            "language": self.language,
-            "targets": self.targets,
-            "corrected": self.corrected,
-            "kept": {why.replace("`", ""): number for why, number in self.kept.items()},
-            "skipped": [{"line": one.line, "reason": one.reason} for one in self.skipped],
-            "shift_mm": {
-                "mean": float(millimetres.mean()) if self.corrected else 0.0,
-                "max": float(millimetres.max()) if self.corrected else 0.0,
+    def blocks(self) -> Iterator[Block]:
+        """Give the error to expect, what became of the targets, and what was skipped, in mm."""
+        yield from self.told()
+        yield detail(*self.left_unchanged)
+
+    def told(self, *, shared: bool = False) -> Iterator[Block]:
+        """Give it without the lines of what was skipped, with what its targets share if that is wanted, in mm."""
+        moved = (
+            f"; moved by {self.mean_shift * 1e3:.3f} mm on average, {self.largest_shift * 1e3:.3f} mm at most"
+            if self.corrected
+            else ""
+        )
+        yield say(
+            self.headline,
+            f"  {self.name}, {self.count_words}{moved}",
+            file=self.name,
+            language=self.language,
+            targets=self.targets,
+            corrected=self.corrected,
+            kept={why.replace("`", ""): number for why, number in self.kept.items()},
+            skipped=[{"line": one.line, "reason": one.reason} for one in self.skipped],
+            expected_mm=self._expected(),
+            not_better=self._not_better(),
+        )
+        yield detail(
+            *([f"  {self.shared_words}"] if shared and self.shared_words else []),
+            shift_mm={
+                "mean": self.mean_shift * 1e3,
+                "max": self.largest_shift * 1e3,
                 "common": None if self.shared is None else self.shared.moved * 1e3,
                 "remainder": None if self.shared is None else self.shared.remainder * 1e3,
             },
-            "expected_mm": self._expected_summary(),
-            "not_better": [self._not_better_summary(row) for row in self.not_better],
-        }
+        )
 
-    def _expected_summary(self) -> dict[str, dict[str, Any]] | None:
+    @property
+    def left_unchanged(self) -> list[str]:
+        """What was skipped, line by line of the program, and why."""
+        return [f"  {self.name}, line {one.line}: {one.reason}" for one in self.skipped]
+
+    def _expected(self) -> dict[str, dict[str, Any]] | None:
+        """Return the errors to expect as JSON holds them [mm]."""
         if self.expected is None or self.intervals is None:
             return None
         return {
@@ -163,16 +184,19 @@ class FileCorrection(Record):
             for when, values, (low, high) in zip(("before", "after"), self.expected, self.intervals, strict=True)
         }
 
-    def _not_better_summary(self, row: int) -> dict[str, Any]:
+    def _not_better(self) -> list[dict[str, Any]]:
+        """Return the targets whose correction would rather do harm as JSON holds them [mm]."""
         known = self.correction.expected
-        if known is None:
-            return {}
-        return {
-            "line": self.correction.program.targets[row].line,
-            "kept": not self.correction.corrected[row],
-            "probability_worse": float(known.worse[row]),
-            "expected_mm": {"before": float(known.before[row]) * 1e3, "after": float(known.after[row]) * 1e3},
-        }
+        return [
+            {
+                "line": self.correction.program.targets[row].line,
+                "kept": not self.correction.corrected[row],
+                "probability_worse": float(known.worse[row]),
+                "expected_mm": {"before": float(known.before[row]) * 1e3, "after": float(known.after[row]) * 1e3},
+            }
+            for row in self.not_better
+            if known is not None
+        ]
 
     @property
     def headline(self) -> str:
@@ -209,16 +233,6 @@ class FileCorrection(Record):
             f"{self.shared.remainder * 1e3:.3f} mm on average (errors of the robot)"
         )
 
-    def lines(self) -> list[str]:
-        """Return the error to expect, what became of the targets, and what was skipped."""
-        moved = (
-            f"; moved by {self.mean_shift * 1e3:.3f} mm on average, {self.largest_shift * 1e3:.3f} mm at most"
-            if self.corrected
-            else ""
-        )
-        skipped = [f"  {self.name}, line {one.line}: {one.reason}" for one in self.skipped]
-        return [self.headline, f"  {self.name}, {self.count_words}{moved}", *skipped]
-
 
 def _shift_summary(shift: Array) -> dict[str, list[float]]:
     """Return a shift ``(4, 4)`` as a record holds it."""
@@ -237,15 +251,15 @@ class SimulatedRun:
     corrected: Array
     robot: str  #: Which robot, in words.
 
-    def lines(self) -> list[str]:
-        """Return it in words and figures."""
-        return [
+    def blocks(self) -> Iterator[Block]:
+        """Give it in words and figures, in mm."""
+        yield say(
             f"Distance of {self.robot} from where the program meant it to be:",
             *(
                 f"  {name:17}  mean {1e3 * missed.mean():.3f}  max {1e3 * missed.max():.3f} mm"
                 for name, missed in (("original program", self.original), ("corrected program", self.corrected))
             ),
-        ]
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -265,42 +279,30 @@ class ProgramCorrection(Record):
     date: str = ""  #: When they were corrected.
     ledger: Path | None = None  #: Where their targets are remembered beside their records; None for nowhere.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, lengths in mm."""
-        return {
-            "programs": [file.summary() for file in self.files],
-            "expected_is_lower_bound": self.lower_bound,
-            "expected_is_relative": bool(self.relative),
-            **({"notes": self.notes} if self.notes else {}),
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return a line for each file, what was skipped and what to know."""
-        parts = [file.lines() for file in self.files]
-        first = [one for one in self.warnings if one.code == NOTHING_CORRECTED]
-        text = notice_lines(first)
-        for file, (headline, counts, *_) in zip(self.files, parts, strict=True):
-            text += [headline, counts]
-            if file.shared_words and self.result.frames.frames != "assumed":
-                text.append(f"  {file.shared_words}")
-        skipped = [line for _, _, *lines in parts for line in lines]
+    def blocks(self) -> Iterator[Block]:
+        """Give each file with the error to expect, what is to be known of these errors, and what was skipped."""
+        shared = self.result.frames.frames != "assumed"
+        yield each("programs", (file.told(shared=shared) for file in self.files))
         known = any(file.expected is not None for file in self.files)
-        if known and self.relative:
-            text.append(f"  {self.relative}")
+        yield detail(
+            *([f"  {self.relative}"] if known and self.relative else []), expected_is_relative=bool(self.relative)
+        )
         if known and any(file.kept.keys() & {"in `keep`", "not in `only`"} for file in self.files):
-            text.append("  Targets that stay because of `keep` or `only` are not in these errors.")
-        if self.lower_bound and known:
-            text.append("  These errors may be larger: the calibration cannot know all errors of the robot.")
-        text += skipped[:_EXPLAINED]
+            yield detail("  Targets that stay because of `keep` or `only` are not in these errors.")
+        more = "  These errors may be larger: the calibration cannot know all errors of the robot."
+        yield detail(*([more] if known and self.lower_bound else []), expected_is_lower_bound=self.lower_bound)
+        skipped = [line for file in self.files for line in file.left_unchanged]
+        yield detail(*skipped[:_EXPLAINED])
         if len(skipped) > _EXPLAINED:
-            text.append(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")
+            yield detail(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")
         for split in self.splits:
             if split.moves:
-                moves, more = split.moves, split.added
-                text.append(f"  {moves} move{'s'[: moves > 1]} split by {more} more target{'s'[: more > 1]}")
-        text += notice_lines([one for one in self.warnings if one not in first])
-        return text if self.simulated is None else [*text, *self.simulated.lines()]
+                moves, added = split.moves, split.added
+                yield say(f"  {moves} move{'s'[: moves > 1]} split by {added} more target{'s'[: added > 1]}")
+        if self.simulated is not None:
+            yield from self.simulated.blocks()
+        if self.notes:
+            yield say(notes=self.notes)
 
     @property
     def lower_bound(self) -> bool:
@@ -417,13 +419,10 @@ class RestoredPrograms(Record):
         """Where the originals were written, or their names if they were not."""
         return tuple((self.folder or Path()) / file.name for file in self.files)
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {"reverted": [str(path) for path in self.paths]}
-
-    def lines(self) -> list[str]:
-        """Return a line for each program."""
-        return [f"{path}: as it was before the correction" for path in self.paths]
+    def blocks(self) -> Iterator[Block]:
+        """Give the path of each program."""
+        lines = (f"{path}: as it was before the correction" for path in self.paths)
+        yield say(*lines, reverted=[str(path) for path in self.paths])
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the originals into a folder, all or nothing.

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from truearm.engine.document.document import Document, answer, pictured, tabled
+from truearm.engine.document.document import Document, answer, lines_of, pictured, tabled
 from truearm.engine.document.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure, rounded_to
-from truearm.engine.document.records import notice_lines
 from truearm.engine.robot.chain import Array
 from truearm.measuring.campaign import nest_drift
 from truearm.measuring.session import REASONS, Session
@@ -144,11 +143,10 @@ def measure_report(measured: Measured) -> str:
             "Scatter of the samples while the arm stood, reading by reading. It does not say how well a reading fits."
         )
         pictures.append(pictured("dwell", "Dwells", words, scatter))
-    said = notice_lines(measured.warnings)
     return Document(
         f"Measured: {measured.title}",
         [
-            answer([line for line in measured.lines() if line not in said], measured.warnings),
+            answer(lines_of(measured.blocks()), measured.warnings),
             *tables,
             *pictures,
             *details,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from truearm.engine.base.errors import Notice, counted, listed
 from truearm.engine.base.units import Marked
@@ -14,7 +14,8 @@ from truearm.engine.base.writing import write_files
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.data.readers.rows import Configurations
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, Words, detail, say, under
+from truearm.engine.document.records import Record
 from truearm.measuring.campaign import NestDrift, nest_drift
 from truearm.measuring.kept_readings import StatedSigma, kept_readings, stated_sigma
 from truearm.measuring.reading_log import About
@@ -88,68 +89,55 @@ class Measured(Record):
         if data is not None:
             write_files(self.folder, {DATA: csv_text(data), PAGE: measure_report(self)}, self.command)
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm."""
-        session, drift = self.session, self.drift
-        return {
-            "finished": self.finished,
-            "configurations": {"measured": self._measured(), "planned": len(session.labels)},
-            "targets": list(session.targets),
-            "kept": {"targets": self._kept(), "nests": len(session.kept) - self._kept()},
-            "set_aside": session.aside_by_reason,
-            "left_out": len(session.left_out),
-            "outstanding": session.outstanding,
-            "nests": None
-            if drift is None
-            else {
-                "names": list(drift.names),
-                "rounds": len(drift.rounds),
-                "largest_mm": drift.largest * 1e3,
-                "together_mm": self._together(drift) * 1e3,
-                "sigma_mm": None if drift.sigma is None else drift.sigma * 1e3,
-            },
-            "sigma_mm": None if self.sigma.value is None else self.sigma.value * 1e3,
-            "sigma_from": self.sigma.words,
-            "about": {**self.about.fixed, "environment": [air.__dict__ for air in self.about.environment]},
-            "files": list(self.files),
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what is kept, what is not and why, how the nests moved, and the standard deviation, in mm."""
         session = self.session
-        text = [
-            f"{self._measured()} of {counted(len(session.labels), 'configuration')} measured, "
-            f"{counted(self._kept(), 'reading')} of {counted(len(session.targets), 'target')} kept."
-        ]
+        measured = len({entry.label for entry in session.kept if not entry.is_nest})
+        kept = sum(not entry.is_nest for entry in session.kept)
+        yield say(
+            f"{measured} of {counted(len(session.labels), 'configuration')} measured, "
+            f"{counted(kept, 'reading')} of {counted(len(session.targets), 'target')} kept.",
+            finished=self.finished,
+            configurations={"measured": measured, "planned": len(session.labels)},
+            targets=list(session.targets),
+            kept={"targets": kept, "nests": len(session.kept) - kept},
+            outstanding=session.outstanding,
+            files=list(self.files),
+        )
         counts: Mapping[str, int] = session.aside_by_reason
         total = sum(counts.values())
-        if total:
-            why = ", ".join(f"{count} {reason} ({REASONS[reason]})" for reason, count in counts.items())
-            text.append(f"{counted(total, 'reading')} set aside: {why}.")
-        if session.left_out:
-            places = listed([f"{label}/{name}" for label, name in session.left_out])
-            text.append(f"{counted(len(session.left_out), 'reading')} left out (configuration/target): {places}.")
-        if (drift := self.drift) is not None:
-            text.append(f"Nests {listed(drift.names)} in {counted(len(drift.rounds), 'round')}: {self._how(drift)}.")
-        if self._kept():
-            size = "" if self.sigma.value is None else f"{self.sigma.value * 1e3:.4f} mm, "
-            text.append(f"Standard deviation in the file: {size}{self.sigma.words}.")
-        return [*text, *notice_lines(self.warnings)]
+        why = ", ".join(f"{count} {reason} ({REASONS[reason]})" for reason, count in counts.items())
+        yield say(*([f"{counted(total, 'reading')} set aside: {why}."] if total else []), set_aside=counts)
+        left_out = session.left_out
+        places = listed([f"{label}/{name}" for label, name in left_out])
+        words = f"{counted(len(left_out), 'reading')} left out (configuration/target): {places}."
+        yield detail(*([words] if left_out else []), left_out=len(left_out))
+        yield say(nests=None) if (drift := self.drift) is None else under("nests", [self._nests(drift)])
+        size = None if self.sigma.value is None else self.sigma.value * 1e3
+        shown = "" if size is None else f"{size:.4f} mm, "
+        yield detail(
+            *([f"Standard deviation in the file: {shown}{self.sigma.words}."] if kept else []),
+            sigma_mm=size,
+            sigma_from=self.sigma.words,
+            about={**self.about.fixed, "environment": [air.__dict__ for air in self.about.environment]},
+        )
 
-    def _kept(self) -> int:
-        return sum(not entry.is_nest for entry in self.session.kept)
-
-    def _measured(self) -> int:
-        return len({entry.label for entry in self.session.kept if not entry.is_nest})
-
-    def _how(self, drift: NestDrift) -> str:
-        if len(drift.rounds) == 1:
-            return "whether they move shows from the second round on"
-        repeat = "" if drift.sigma is None else f"; they repeat to {drift.sigma * 1e3:.4f} mm in a coordinate"
-        return (
-            f"moved by up to {drift.largest * 1e3:.4f} mm, together by up to {self._together(drift) * 1e3:.4f} mm"
-            f"{repeat}. No reading is corrected for it"
+    def _nests(self, drift: NestDrift) -> Words:
+        together, sigma = self._together(drift) * 1e3, None if drift.sigma is None else drift.sigma * 1e3
+        how = "whether they move shows from the second round on"
+        if len(drift.rounds) > 1:
+            repeat = "" if sigma is None else f"; they repeat to {sigma:.4f} mm in a coordinate"
+            how = (
+                f"moved by up to {drift.largest * 1e3:.4f} mm, together by up to {together:.4f} mm{repeat}. No reading "
+                "is corrected for it"
+            )
+        return say(
+            f"Nests {listed(drift.names)} in {counted(len(drift.rounds), 'round')}: {how}.",
+            names=list(drift.names),
+            rounds=len(drift.rounds),
+            largest_mm=drift.largest * 1e3,
+            together_mm=together,
+            sigma_mm=sigma,
         )
 
     @staticmethod

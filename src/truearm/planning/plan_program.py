@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from truearm.engine.base.errors import Notice, counted
 from truearm.engine.base.units import IN_PROGRAMS, from_si
-from truearm.engine.document.records import notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, lines_of, say
+from truearm.engine.document.records import notice_summaries
 from truearm.engine.motion.tour import Stop, Tour
 from truearm.engine.programs.joint_speeds import (
     counts_comments,
@@ -243,19 +244,44 @@ class PlanProgram:
     speeds: str = ""  #: How fast the joints go at 100 %, in words; empty where it is not known.
 
     @property
-    def answer(self) -> tuple[str, ...]:
+    def answer(self) -> list[str]:
         """What it does, in words."""
-        driving = self.driving
+        return lines_of(self.blocks())
+
+    def blocks(self) -> Iterator[Block]:
+        """Give what it does, what it waits for, and what the controller is told, in mm, s, kg and percent."""
+        driving, carried = self.driving, self.carried
         approached = any(stop.kind == "approach" for stop in self.tour.stops)
+        measured = self.tour.measured
+        way = f"{counted(len(measured), 'configuration')} from Home and back"
+        yield say(
+            f"Measuring program in {self.language}: {way}{', each approached from one side' if approached else ''}.",
+            language=self.language,
+            files=list(self.files),
+            order=[stop.label for stop in measured],
+            approached=approached,
+        )
         waits = _WAITS[driving.wait].format(driving.input, number(driving.longest, 2))
-        way = [f"{counted(len(self.tour.measured), 'configuration')} from Home and back"]
-        way += ["each approached from one side"] if approached else []
-        return (
-            f"Measuring program in {self.language}: {', '.join(way)}.",
-            f"At most {shown_speed(self.fastest)} mm/s and {number(100 * driving.share, 2)} % of the joints' "
+        share = 100.0 * driving.share
+        yield detail(
+            f"At most {shown_speed(self.fastest)} mm/s and {number(share, 2)} % of the joints' "
             f"speed{f' ({self.speeds})' if self.speeds else ''}; it stands for {number(driving.dwell, 2)} s{waits}.",
+            speed_mm_s=1e3 * self.fastest,
+            joint_speed_percent=share,
+            joint_speeds=self.speeds or None,
+            dwell_s=driving.dwell,
+            wait=driving.words,
+        )
+        yield detail(
             self._told,
+            tip=carried.name or None,
+            tip_mm=[1e3 * v for v in carried.tip],
+            load_kg=carried.mass,
+            load_cog_mm=[1e3 * v for v in carried.cog],
+        )
+        yield say(
             "It is not verified and no safety function: run it step by step first, at reduced speed, nobody near.",
+            warnings=notice_summaries(self.warnings),
         )
 
     @property
@@ -267,27 +293,3 @@ class PlanProgram:
             return f"{_BY_HAND[self.language]} on the controller must hold {load}: programs do not set it."
         tip = f"target {carried.name}" if carried.name else "the flange"
         return f"It tells the controller of {tip} at ({', '.join(carried.tip_mm)}) mm and of {load}."
-
-    def lines(self) -> list[str]:
-        """Return what it does, and what to know about it."""
-        return [*self.answer, *notice_lines(self.warnings)]
-
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        driving, carried = self.driving, self.carried
-        return {
-            "language": self.language,
-            "files": list(self.files),
-            "order": [stop.label for stop in self.tour.measured],
-            "approached": any(stop.kind == "approach" for stop in self.tour.stops),
-            "speed_mm_s": 1e3 * self.fastest,
-            "joint_speed_percent": 100.0 * driving.share,
-            "joint_speeds": self.speeds or None,
-            "dwell_s": driving.dwell,
-            "wait": driving.words,
-            "tip": carried.name or None,
-            "tip_mm": [1e3 * v for v in carried.tip],
-            "load_kg": carried.mass,
-            "load_cog_mm": [1e3 * v for v in carried.cog],
-            "warnings": notice_summaries(self.warnings),
-        }

@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from truearm.engine.command.driving import tip_argument
 from truearm.engine.data.controller_joints import in_controller_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
-from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, say
+from truearm.engine.document.records import Record, joints_lines
 from truearm.engine.motion.cube import DOWN, Cube
 from truearm.engine.motion.largest_cube import largest_cube
 from truearm.engine.robot.chain import Array
@@ -76,19 +77,6 @@ class PlannedPoses(Record):
             ),
         )
 
-    def summary(self) -> dict[str, Any]:
-        """Return the set as JSON holds it: lengths in mm."""
-        made = self.made
-        return {
-            "set": made.name,
-            "poses": len(made.labels),
-            "target": made.target,
-            **({} if made.cube is None else {"cube_mm": _cube(made)}),
-            "joints_are": self.joints_are,
-            "missed": list(made.missed),
-            "warnings": notice_summaries(self.warnings),
-        }
-
     @property
     def answer(self) -> list[str]:
         """What the set is, in words."""
@@ -96,9 +84,14 @@ class PlannedPoses(Record):
         first = f"{counted(len(made.labels), 'pose')} of the set {made.name}{self._where()}."
         return [first, *(self._moves() if made.name == "118" else ())]
 
-    def lines(self) -> list[str]:
-        """Return what the set is, and what cannot be reached."""
-        return [*self.answer, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
+    def blocks(self) -> Iterator[Block]:
+        """Give what the set is, and where, in mm."""
+        made = self.made
+        missed = list(made.missed)
+        yield say(*self.answer, set=made.name, poses=len(made.labels), target=made.target, missed=missed)
+        if made.cube is not None:
+            yield say(cube_mm={"centre": (made.cube.centre * 1e3).tolist(), "side": made.cube.side * 1e3})
+        yield detail(*joints_lines(self.joints_are), joints_are=self.joints_are)
 
     def _moves(self) -> list[str]:
         """Return by how much every joint moves from one pose to the next."""
@@ -189,11 +182,6 @@ def places(file: object, inputs: tuple[Path, ...], parameter: str = "file") -> t
         raise InputError("the set is a CSV file", parameter=parameter, came=table.name, allowed="SET.csv")
     poses = output_file(table.with_name(f"{table.stem}{POSES}"), inputs, parameter, ours=True)
     return table, poses, output_file(table.with_suffix(PAGE), inputs, parameter, ours=True)
-
-
-def _cube(made: PoseSet) -> dict[str, Any]:
-    assert made.cube is not None
-    return {"centre": (made.cube.centre * 1e3).tolist(), "side": made.cube.side * 1e3}
 
 
 def _shown(value: float, decimals: int) -> str:

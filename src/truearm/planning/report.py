@@ -59,7 +59,7 @@ def plan_html(planned: Plan) -> str:
     return Document(
         f"Measurements of {plan.robot.title}",
         [
-            answer((*planned.answer, *planned.driving), planned.warnings),
+            answer((*planned.answer, *planned.driving), planned.own_notices),
             pictured("number", "How many poses", number, number_figure(plan.prediction, len(plan.joints))),
             pictured("workspace", "Where the robot will be accurate", space, workspace_figure(plan)),
             _observability(plan),
@@ -220,7 +220,7 @@ def plan_sheet(planned: Plan) -> str:
         title=f"Measuring {made.robot.title}",
         subtitle=f"Plan {mark}{files}: {len(tour.measured)} configurations, joint positions {shown}.",
         words=(*(() if program is None else program.answer), *planned.driving),
-        notices=worst_first(planned.warnings),
+        notices=worst_first(planned.own_notices),
         command=planned.command,
         followed="plan" if program is None else "program",
         noted=_NOTED,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.writing import output_file, output_folder, write_files
-from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, lines_of, say, under
+from truearm.engine.document.records import Record, joints_lines
 from truearm.engine.motion.tour import Tour, sheet_beside, tour_csv, tour_summary, tour_words, ways_beside
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
@@ -55,9 +56,9 @@ class Plan(Record):
         return f"the error {self.accurate_at}" if self.made.objective == ERROR else self.made.objective
 
     @property
-    def answer(self) -> tuple[str, ...]:
+    def answer(self) -> list[str]:
         """How accurate the calibration will be and how many poses it needs, in words."""
-        return (*self._there, *self._everywhere)
+        return lines_of(self._accuracy())
 
     @property
     def driving(self) -> tuple[str, ...]:
@@ -69,107 +70,97 @@ class Plan(Record):
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
+        """What to know of it, and of another plan that it was written over."""
+        return (*self.own_notices, *self.replaced)
+
+    @property
+    def own_notices(self) -> tuple[Notice, ...]:
         """What to know of what it was made with, of the ways that were checked, and of the program."""
         if self.program is not None:
             return self.program.warnings
         robot = self.made.robot
         return (*self.told, *(() if self.tour is None else self.tour.notices), *wider_limits_notices(robot))
 
-    @property
-    def _there(self) -> tuple[str, ...]:
-        """How accurate the robot will be where it shall be, in words."""
-        from truearm.engine.document.drawing import significant
-
-        there = self.made.prediction.there
-        if there is None:
-            return ()
-        mean, most = (significant(1e3 * value, 3) for value in (there.error.mean(), there.error.max()))
-        told = f"The model itself will be off by {mean} mm on average {self.accurate_at}, at most by {most} mm."
-        if there.by_o1 is None:
-            return (told,)
-        return (
-            told,
-            f"As many configurations chosen by O1 would leave {significant(1e3 * there.by_o1.mean(), 3)} mm there.",
+    def blocks(self) -> Iterator[Block]:
+        """Give what was chosen, what constraints cost, and how accurate the calibration will be, in mm and deg."""
+        made = self.made
+        yield say(
+            f"{len(made.joints)} of {made.usable} usable configurations, chosen by {self.chosen_by}.",
+            poses=len(made.joints),
+            objective=made.objective,
+            candidates=made.candidates,
+            usable=made.usable,
+            left_out=list(made.left_out),
+            seconds=made.seconds,
         )
+        broken = (f"  {name}: broken by {lost} of {made.candidates}" for name, lost in made.rejected.items() if lost)
+        yield detail(*broken, rejected=dict(made.rejected))
+        yield detail(
+            "  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()), indices=dict(made.indices)
+        )
+        if made.fixtures:
+            places = {name: (1e3 * place).tolist() for name, place in made.fixtures.items()}
+            at = {name: ", ".join(f"{v:.1f}" for v in place) for name, place in places.items()}
+            yield detail(*(f"  {name} at ({v}) mm in the base frame" for name, v in at.items()), fixtures_mm=places)
+        if self.tour is not None:
+            yield detail(*self.driving, ways=tour_summary(self.tour, made.robot, self.joints_are))
+        yield under("prediction", self._accuracy())
+        yield detail(*joints_lines(self.joints_are), joints_are=self.joints_are)
+        if self.program is not None:
+            yield under("program", self.program.blocks())
 
-    @property
-    def _everywhere(self) -> tuple[str, ...]:
+    def _accuracy(self) -> Iterator[Block]:
+        """Give how accurate the robot will be where it shall be, and everywhere, in mm."""
         from truearm.engine.document.drawing import significant
 
         prediction = self.made.prediction
-        planned, floor = (significant(value * 1e3, 3) for value in (prediction.planned, prediction.floor))
-        first = (
+        if prediction.there is not None:
+            yield under("there", self._there(prediction.there))
+        planned, floor = prediction.planned * 1e3, prediction.floor * 1e3
+        yield say(
             f"Measured at these {len(self.joints)} configurations, the {self.made.model.name} model will miss readings "
-            f"elsewhere by {planned} mm on average. No number of poses brings that below {floor} mm, the noise."
+            f"elsewhere by {significant(planned, 3)} mm on average. No number of poses brings that below "
+            f"{significant(floor, 3)} mm, the noise.",
+            planned_mm=planned,
+            floor_mm=floor,
         )
-        assumed = (
-            f"That assumes that a coordinate of a reading is off by {significant(self.noise * 1e3, 3)} mm about the "
-            "model, by the instrument and by what the model cannot follow; give `noise` where you know better."
-        )
-        if prediction.sufficient_number is None and prediction.tells_little:
-            little = (
-                f"Before a calibration the robot misses them by about {significant(prediction.nominal * 1e3, 3)} mm, "
-                "by the priors of its parameters: these configurations tell little of it. Take more, or widen the "
-                "limits that keep them together."
+        nominal, enough = prediction.nominal * 1e3, prediction.sufficient_number
+        words = f"{enough} well-chosen poses are enough to come within 10 % of that."
+        if enough is None and prediction.tells_little:
+            words = (
+                f"Before a calibration the robot misses them by about {significant(nominal, 3)} mm, by the priors of "
+                "its parameters: these configurations tell little of it. Take more, or widen the limits that keep them "
+                "together."
             )
-            return first, little, assumed
-        if prediction.sufficient_number is None:
-            return first, "More poses than were looked at are needed to come within 10 % of that.", assumed
-        enough = f"{prediction.sufficient_number} well-chosen poses are enough to come within 10 % of that."
-        return first, enough, assumed
+        elif enough is None:
+            words = "More poses than were looked at are needed to come within 10 % of that."
+        yield say(words, enough=enough, nominal_mm=nominal)
+        numbers = zip(prediction.numbers, prediction.chosen.tolist(), prediction.random.tolist(), strict=True)
+        yield detail(
+            f"That assumes that a coordinate of a reading is off by {significant(self.noise * 1e3, 3)} mm about the "
+            "model, by the instrument and by what the model cannot follow; give `noise` where you know better.",
+            by_number=[{"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3} for n, c, r in numbers],
+        )
 
-    def summary(self) -> dict[str, Any]:
-        """Return the figures as JSON holds them: errors in mm."""
-        made, prediction = self.made, self.made.prediction
-        return {
-            "poses": len(made.joints),
-            "objective": made.objective,
-            "joints_are": self.joints_are,
-            "indices": dict(made.indices),
-            "candidates": made.candidates,
-            "usable": made.usable,
-            "rejected": dict(made.rejected),
-            "left_out": list(made.left_out),
-            "warnings": notice_summaries((*self.warnings, *self.replaced)),
-            **({} if self.tour is None else {"ways": tour_summary(self.tour, made.robot, self.joints_are)}),
-            **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
-            "seconds": made.seconds,
-            **({} if self.program is None else {"program": self.program.summary()}),
-            "prediction": {
-                "floor_mm": prediction.floor * 1e3,
-                "planned_mm": prediction.planned * 1e3,
-                "enough": prediction.sufficient_number,
-                "nominal_mm": prediction.nominal * 1e3,
-                **({} if prediction.there is None else {"there": self._there_summary(prediction.there)}),
-                "by_number": [
-                    {"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3}
-                    for n, c, r in zip(
-                        prediction.numbers, prediction.chosen.tolist(), prediction.random.tolist(), strict=True
-                    )
-                ],
-            },
-        }
+    def _there(self, there: There) -> Iterator[Block]:
+        """Give how accurate the robot will be where it shall be, in mm."""
+        from truearm.engine.document.drawing import significant
 
-    def _there_summary(self, there: There) -> dict[str, Any]:
-        return {
-            "accurate_at": self.accurate_at,
-            "places": len(there.error),
-            "mean_mm": 1e3 * float(there.error.mean()),
-            "max_mm": 1e3 * float(there.error.max()),
-            "by_O1_mean_mm": None if there.by_o1 is None else 1e3 * float(there.by_o1.mean()),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was chosen, what constraints cost, and how accurate the calibration will be."""
-        made = self.made
-        text = [f"{len(made.joints)} of {made.usable} usable configurations, chosen by {self.chosen_by}."]
-        text += [f"  {name}: broken by {lost} of {made.candidates}" for name, lost in made.rejected.items() if lost]
-        text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
-        for name, place in made.fixtures.items():
-            text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
-        answer = () if self.program is None else self.program.answer
-        driven = [*answer, *notice_lines((*self.warnings, *self.replaced))]
-        return [*text, *self.driving, *self.answer, *joints_lines(self.joints_are), *driven]
+        mean, most = 1e3 * float(there.error.mean()), 1e3 * float(there.error.max())
+        yield say(
+            f"The model itself will be off by {significant(mean, 3)} mm on average {self.accurate_at}, at most by "
+            f"{significant(most, 3)} mm.",
+            accurate_at=self.accurate_at,
+            places=len(there.error),
+            mean_mm=mean,
+            max_mm=most,
+        )
+        by_o1 = None if there.by_o1 is None else 1e3 * float(there.by_o1.mean())
+        if by_o1 is None:
+            yield say(by_O1_mean_mm=None)
+        else:
+            words = f"As many configurations chosen by O1 would leave {significant(by_o1, 3)} mm there."
+            yield detail(words, by_O1_mean_mm=by_o1)
 
     def contents(self) -> dict[str, str]:
         """Return the texts of all files of a plan with a program, by their names."""

@@ -436,8 +436,8 @@ def _zones(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
     answer = lines_of(run.zones.blocks())[0]
     words = (
         f"{answer} A zone has a model of its own that starts at the values of the whole, and is kept where it is "
-        "better on its held-out readings by more than two standard errors of the difference. The nominal flange says in "
-        "which zone a configuration is."
+        "better on its held-out readings by more than two standard errors of the difference. The nominal flange says "
+        "in which zone a configuration is."
     )
     pictures = [Picture("zone-errors", drawn["zone-errors"])] if "zone-errors" in drawn else []
     return [Section("Zones of the workspace", [Words(words), *pictures, zones_table(run.zones)], "zones")]

@@ -41,13 +41,7 @@ from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
 from truearm.engine.document.document import Block, detail, each, held_by, lines_of, say, under
 from truearm.engine.document.records import Record
-from truearm.engine.document.summaries import (
-    error_line,
-    errors_summary,
-    expected_blocks,
-    noise_blocks,
-    selection_block,
-)
+from truearm.engine.document.summaries import error_line, errors_summary, expected_blocks, noise_blocks, selection_block
 from truearm.engine.document.tables import parameter_lines
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.effects.joint_curve import JointCurve

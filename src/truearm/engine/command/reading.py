@@ -51,10 +51,7 @@ def excluded_block(excluded: Sequence[Excluded]) -> Block:
         }
         for one in excluded
     ]
-    return detail(
-        f"Excluded: {counted(parts.total(), 'reading')} ({told}): {reasons(excluded)}",
-        excluded=rows,
-    )
+    return detail(f"Excluded: {counted(parts.total(), 'reading')} ({told}): {reasons(excluded)}", excluded=rows)
 
 
 def reasons(excluded: Sequence[Excluded]) -> str:

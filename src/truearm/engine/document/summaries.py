@@ -150,10 +150,7 @@ def noise_blocks(fit: Fit, again: Repeatability | None) -> Iterator[Block]:
         scattered=fit.scattered,
     )
     if fit.bootstrap:
-        yield detail(
-            f"Deviations of the parameters: from {fit.bootstrap} {BOOTSTRAPPED}",
-            bootstrap=fit.bootstrap,
-        )
+        yield detail(f"Deviations of the parameters: from {fit.bootstrap} {BOOTSTRAPPED}", bootstrap=fit.bootstrap)
     if again is None:
         yield detail(repeatability=None)
     else:

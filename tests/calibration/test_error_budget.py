@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.calibration.parts import budget_lines, budget_summary
+from truearm.calibration.parts import budget_block
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import table_motion, without_table_motion
 from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
 from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.document.document import held_by, lines_of
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import MODELS
 from truearm.engine.robot.chain import Array
@@ -74,9 +75,9 @@ def test_the_shares_add_up_to_the_held_out_square() -> None:
     budget, *_ = judged("tracker-triangular", 40, 0.02e-3, 1)
     shares = [share.square for share in budget.shares if share.square is not None]
     assert sum(shares) == pytest.approx(budget.square, rel=1e-12)
-    summary = budget_summary(budget)
+    summary = held_by([budget_block(budget)])["limits_of_accuracy"]
     assert sum(s["square_mm2"] or 0.0 for s in summary["shares"]) == pytest.approx(summary["rms_mm"] ** 2, rel=1e-9)
-    (line,) = budget_lines(budget)
+    (line,) = lines_of([budget_block(budget)])
     parts = line.split("; ")[0].split(": ")[1].split(", ")
     assert parts[0].startswith("what the model cannot express ")
     assert parts[-1] == "instrument noise 0.035 mm"
@@ -85,13 +86,13 @@ def test_the_shares_add_up_to_the_held_out_square() -> None:
 
 def test_noise_that_nobody_declared_is_apparent_and_large_shares_are_told_though_they_may_be_chance() -> None:
     budget, *_ = judged("random", 20, 0.02e-3, 1, declared=None)
-    (line,) = budget_lines(budget)
+    (line,) = lines_of([budget_block(budget)])
     assert line.startswith("What limits the accuracy: apparent noise 0.03")
     unsure = tuple(
         replace(share, square=4e-6, deviation=3e-6) if share.source == "parameters" else share
         for share in budget.shares
     )
-    (line,) = budget_lines(replace(budget, shares=unsure))
+    (line,) = lines_of([budget_block(replace(budget, shares=unsure))])
     assert line.startswith("What limits the accuracy: uncertain parameters perhaps 2.000 mm, apparent noise 0.03")
 
 
@@ -149,7 +150,7 @@ def test_declared_deviations_that_are_too_large_show_as_a_negative_share() -> No
     assert share.square is not None
     assert share.square < -3 * share.deviation
     assert share.words.startswith("negative: the training residuals are smaller than the declared deviations")
-    assert "; what the model cannot express takes 0." in budget_lines(budget)[0]
+    assert "; what the model cannot express takes 0." in lines_of([budget_block(budget)])[0]
 
 
 def test_an_effect_outside_the_training_part_is_a_remainder_that_is_not_explained() -> None:
@@ -163,7 +164,7 @@ def test_an_effect_outside_the_training_part_is_a_remainder_that_is_not_explaine
     assert not budget.remainder_is_chance
     assert square(budget, "remainder") == pytest.approx(0.5e-3**2, rel=0.1)
     assert budget.share("remainder").words.startswith("not explained: the robot errs more")
-    assert budget_lines(budget)[0].endswith("mm more than they explain")
+    assert lines_of([budget_block(budget)])[0].endswith("mm more than they explain")
 
 
 def test_nothing_held_out_leaves_no_remainder() -> None:
@@ -174,7 +175,7 @@ def test_nothing_held_out_leaves_no_remainder() -> None:
     assert not budget.held_out
     assert {share.source for share in budget.shares} == {"instrument", "table", "repeatability", "model", "parameters"}
     assert budget.square == pytest.approx(sum(share.square or 0.0 for share in budget.shares))
-    assert "mm, to expect at configurations like these" in budget_lines(budget)[0]
+    assert "mm, to expect at configurations like these" in lines_of([budget_block(budget)])[0]
     assert budget.workspace is not None
     expected = expected_error(fit).overall
     assert sum(share.square or 0.0 for share in budget.workspace) == pytest.approx(expected.mean**2, rel=0.6)

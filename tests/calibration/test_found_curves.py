@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from truearm.calibration.parts import curve_lines, curves_summary
+from truearm.calibration.parts import curve_block
 from truearm.engine.diagnose.curves import FoundCurve, found_curves
+from truearm.engine.document.document import held_by, lines_of
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
@@ -64,13 +65,17 @@ def test_the_strongest_periods_are_told_with_their_neighbours() -> None:
     found = curve({1: 3.0, 19: 5.0, 20: 6.0, 21: 5.5, 22: 4.5, 50: 1.0, 58: 0.1}, np.linspace(-180, 180, 90))
     assert [one.range for one in found.strongest] == ["19 to 22", "1", "50"]
     assert math.degrees(found.strongest[0].amplitude) == pytest.approx(1e-3 * math.sqrt(25 + 36 + 30.25 + 20.25))
-    assert curve_lines([found]) == ["Joint 2: curve of 0.0078 +- 0.0004 deg rms, strongest at 19 to 22 periods a turn"]
+    assert lines_of([curve_block(found)]) == [
+        "Joint 2: curve of 0.0078 +- 0.0004 deg rms, strongest at 19 to 22 periods a turn"
+    ]
     several = curve({1: 10.0, 28: 6.0, 58: 5.0, 40: 2.0}, np.linspace(-180, 180, 90))
-    assert curve_lines([several])[0].endswith("0.0091 +- 0.0004 deg rms, strongest at 1, 28 and 58 periods a turn")
-    assert curve_lines([curve({1: 1.414214}, np.linspace(-180, 180, 90))]) == [
+    assert lines_of([curve_block(several)])[0].endswith(
+        "0.0091 +- 0.0004 deg rms, strongest at 1, 28 and 58 periods a turn"
+    )
+    assert lines_of([curve_block(curve({1: 1.414214}, np.linspace(-180, 180, 90)))]) == [
         "Joint 2: curve of 0.0010 +- 0.0004 deg rms, strongest at 1 period a turn"
     ]
-    (summary,) = curves_summary([found])
+    summary = held_by([curve_block(found)])
     assert list(summary) == ["joint", "rms_mdeg", "rms_deviation_mdeg", "strongest", "measured_deg"]
     assert summary["strongest"][1] == {"periods": [1, 1], "amplitude_mdeg": pytest.approx(3.0)}
     assert summary["measured_deg"] == [[-180.0, 180.0]]

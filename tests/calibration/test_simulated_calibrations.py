@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from tests.simulated import campaign
 
 from truearm.calibration.calibrate import calibrate
-from truearm.calibration.parts import simulated_lines
+from truearm.calibration.parts import simulated_block
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations, check_linear, simulated_calibrations
+from truearm.engine.document.document import lines_of
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import MODELS
@@ -111,7 +112,7 @@ def test_intervals_that_are_too_narrow_and_lost_trials_are_told() -> None:
     assert [n.code for n in check_linear(fit, lost(fit, data, 1.0, 90))] == ["trials-lost"]
     nothing = lost(fit, data, 1.0, 0)
     assert [n.code for n in check_linear(fit, nothing)] == ["trials-lost"]
-    assert "none of 100 simulated calibrations" in simulated_lines(nothing, fit.robot)[0]
+    assert "none of 100 simulated calibrations" in lines_of([simulated_block(nothing, fit.robot)])[0]
 
 
 def test_the_job_puts_both_intervals_side_by_side(tmp_path: Path) -> None:

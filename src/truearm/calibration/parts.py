@@ -22,6 +22,7 @@ from truearm.engine.diagnose.error_budget import ErrorBudget, Share
 from truearm.engine.diagnose.expected_error import ExpectedError, covariance_root, uncertain_names
 from truearm.engine.diagnose.gain import NO_GAIN
 from truearm.engine.diagnose.simulated_calibrations import PredictedError, SimulatedCalibrations
+from truearm.engine.document.document import Block, detail, say
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.programs.gauge import held_by
@@ -64,22 +65,6 @@ def name_of(share: Share) -> str:
     return _APPARENT if share.apparent else _SOURCES[share.source]
 
 
-def budget_summary(budget: ErrorBudget) -> dict[str, Any]:
-    """Return what limits the accuracy as JSON holds it: squares in mm^2, which add up, and their roots in mm."""
-    return {
-        "of": "held-out" if budget.held_out else "expected",
-        "kind": budget.kind,
-        "configurations": budget.configurations,
-        "readings": budget.readings,
-        "rms_mm": budget.rms * 1e3,
-        "square_mm2": budget.square * 1e6,
-        "square_deviation_mm2": budget.deviation * 1e6,
-        "shares": _summaries(budget.shares, budget.square),
-        "table_motion_removed_mm": None if budget.removed is None else budget.removed * 1e3,
-        "workspace": None if budget.workspace is None else _summaries(budget.workspace, _sum(budget.workspace)),
-    }
-
-
 def _summaries(shares: Sequence[Share], total: float) -> list[dict[str, Any]]:
     return [
         {
@@ -98,10 +83,13 @@ def _sum(shares: Sequence[Share]) -> float:
     return sum(share.square or 0.0 for share in shares)
 
 
-def budget_lines(budget: ErrorBudget | None) -> list[str]:
-    """Return what limits the accuracy in a line: the shares that are more than chance, or large, the largest first."""
+def budget_block(budget: ErrorBudget | None) -> Block:
+    """Return what limits the accuracy: the shares that are more than chance, or large, the largest first.
+
+    JSON holds squares in mm^2, which add up, and their roots in mm.
+    """
     if budget is None:
-        return []
+        return detail(limits_of_accuracy=None)
     places = min(max(3, 1 - math.floor(math.log10(max(budget.rms * 1e3, 1e-9)))), 6)
     what = "held out" if budget.held_out else "to expect at configurations like these"
     shares = sum(share.square or 0.0 for share in budget.shares if share.source != "remainder")
@@ -123,45 +111,44 @@ def budget_lines(budget: ErrorBudget | None) -> list[str]:
     for share in budget.shares:
         if share.square is not None and share.source != "remainder" and share.square < -_SURE * share.deviation:
             rest += f"; {name_of(share)} takes {abs(share.rms or 0.0) * 1e3:.{places}f} mm away, see the report"
-    return [
+    return detail(
         f"What limits the accuracy: {', '.join(parts) or 'nothing that is more than chance'}; all shares together, in "
-        f"squares, {together * 1e3:.{places}f} mm, {what} {budget.rms * 1e3:.{places}f} mm, {rest}"
-    ]
+        f"squares, {together * 1e3:.{places}f} mm, {what} {budget.rms * 1e3:.{places}f} mm, {rest}",
+        limits_of_accuracy={
+            "of": "held-out" if budget.held_out else "expected",
+            "kind": budget.kind,
+            "configurations": budget.configurations,
+            "readings": budget.readings,
+            "rms_mm": budget.rms * 1e3,
+            "square_mm2": budget.square * 1e6,
+            "square_deviation_mm2": budget.deviation * 1e6,
+            "shares": _summaries(budget.shares, budget.square),
+            "table_motion_removed_mm": None if budget.removed is None else budget.removed * 1e3,
+            "workspace": None if budget.workspace is None else _summaries(budget.workspace, _sum(budget.workspace)),
+        },
+    )
 
 
 def _is_sure(share: Share) -> bool:
     return share.square is not None and share.square > _SURE * share.deviation
 
 
-def curves_summary(curves: Sequence[FoundCurve]) -> list[dict[str, Any]]:
-    """Return size, strongest periods and measured ranges of each curve, as JSON holds them."""
-    return [
-        {
-            "joint": curve.number,
-            "rms_mdeg": mdeg(curve.rms),
-            "rms_deviation_mdeg": mdeg(curve.rms_deviation),
-            "strongest": [
-                {"periods": [one.lowest, one.highest], "amplitude_mdeg": mdeg(one.amplitude)} for one in curve.strongest
-            ],
-            "measured_deg": [[math.degrees(low), math.degrees(high)] for low, high in curve.measured],
-        }
-        for curve in curves
-    ]
-
-
-def curve_lines(curves: Sequence[FoundCurve]) -> list[str]:
-    """Return a line for each curve, with the periods whose amplitude is at least half of the strongest."""
-    lines = []
-    for curve in curves:
-        strong = [one for one in curve.strongest if 2.0 * one.amplitude >= curve.strongest[0].amplitude]
-        *others, last = [one.range for one in strong]
-        periods = f"{', '.join(others)} and {last}" if others else last
-        lines.append(
-            f"Joint {curve.number}: curve of {math.degrees(curve.rms):#.2g} +- "
-            f"{math.degrees(curve.rms_deviation):.1g} deg rms, strongest at {periods} "
-            f"{'period' if periods == '1' else 'periods'} a turn"
-        )
-    return lines
+def curve_block(curve: FoundCurve) -> Block:
+    """Return size, strongest periods and measured ranges of a curve; told are amplitudes of half of the strongest."""
+    *others, last = [one.range for one in curve.strongest if 2.0 * one.amplitude >= curve.strongest[0].amplitude]
+    periods = f"{', '.join(others)} and {last}" if others else last
+    return detail(
+        f"Joint {curve.number}: curve of {math.degrees(curve.rms):#.2g} +- "
+        f"{math.degrees(curve.rms_deviation):.1g} deg rms, strongest at {periods} "
+        f"{'period' if periods == '1' else 'periods'} a turn",
+        joint=curve.number,
+        rms_mdeg=mdeg(curve.rms),
+        rms_deviation_mdeg=mdeg(curve.rms_deviation),
+        strongest=[
+            {"periods": [one.lowest, one.highest], "amplitude_mdeg": mdeg(one.amplitude)} for one in curve.strongest
+        ],
+        measured_deg=[[math.degrees(low), math.degrees(high)] for low, high in curve.measured],
+    )
 
 
 def mdeg(angle: float) -> float:
@@ -169,11 +156,33 @@ def mdeg(angle: float) -> float:
     return 1e3 * math.degrees(angle)
 
 
-def simulated_summary(found: SimulatedCalibrations, robot: Robot) -> dict[str, Any]:
-    """Return intervals of parameters and predictions, those by Monte Carlo beside the linear ones."""
+def simulated_block(found: SimulatedCalibrations, robot: Robot) -> Block:
+    """Return what simulated calibrations say of intervals, those by Monte Carlo beside the linear ones."""
     made: dict[str, Any] = {"trials": found.asked, "settled": found.settled, "seed": found.seed}
     if not found.settled:
-        return made
+        return detail(f"Monte Carlo: none of {found.asked} simulated calibrations converged", monte_carlo=made)
+    coverage, error, words = arm_coverage(found, robot), found.held_out, ""
+    if error is not None:
+        ends, linear = (
+            " to ".join(f"{end * 1e3:.3f}" for end in pair) for pair in (error.interval_90, error.linear_interval_90)
+        )
+        words = (
+            f"; uncertain parameters move unseen positions by {error.mean * 1e3:.3f} mm on average "
+            f"(90 %: {ends}; linear: {error.linear_mean * 1e3:.3f}, {linear})"
+        )
+    made |= {
+        "coverage": coverage,
+        "predictions_mm": {"held_out": _predicted(error), "workspace": _predicted(found.workspace)},
+        "parameters": _interval_rows(found, robot),
+    }
+    return detail(
+        f"Monte Carlo: in {found.settled} simulated calibrations {100.0 * coverage:.1f} % of the linear 95 % intervals "
+        f"held the truth{words}",
+        monte_carlo=made,
+    )
+
+
+def _interval_rows(found: SimulatedCalibrations, robot: Robot) -> list[dict[str, Any]]:
     rows = []
     for name, deviation, linear, interval, of_linear, coverage in zip(
         found.names,
@@ -198,12 +207,7 @@ def simulated_summary(found: SimulatedCalibrations, robot: Robot) -> dict[str, A
                 "coverage": coverage,
             }
         )
-    return {
-        **made,
-        "coverage": arm_coverage(found, robot),
-        "predictions_mm": {"held_out": _predicted(found.held_out), "workspace": _predicted(found.workspace)},
-        "parameters": rows,
-    }
+    return rows
 
 
 def _predicted(error: PredictedError | None) -> dict[str, Any] | None:
@@ -224,28 +228,6 @@ def arm_coverage(found: SimulatedCalibrations, robot: Robot) -> float:
     """
     own = np.array([robot.parameters[name].group not in (*PLACES, JointCurve.name) for name in found.names])
     return float(found.coverage[own if own.any() else ~own].mean())
-
-
-def simulated_lines(found: SimulatedCalibrations | None, robot: Robot) -> list[str]:
-    """Return what the simulated calibrations say, in a line."""
-    if found is None:
-        return []
-    if not found.settled:
-        return [f"Monte Carlo: none of {found.asked} simulated calibrations converged"]
-    error = found.held_out
-    words = ""
-    if error is not None:
-        ends, linear = (
-            " to ".join(f"{end * 1e3:.3f}" for end in pair) for pair in (error.interval_90, error.linear_interval_90)
-        )
-        words = (
-            f"; uncertain parameters move unseen positions by {error.mean * 1e3:.3f} mm on average "
-            f"(90 %: {ends}; linear: {error.linear_mean * 1e3:.3f}, {linear})"
-        )
-    return [
-        f"Monte Carlo: in {found.settled} simulated calibrations {100.0 * arm_coverage(found, robot):.1f} % of the "
-        f"linear 95 % intervals held the truth{words}"
-    ]
 
 
 # The result that is in a folder already: a sound one is not replaced by one that is not, unless that is asked for.
@@ -429,10 +411,11 @@ class Residuals(Record):
         for (configuration, target, part, kind, norm), error in zip(rows, self.error, strict=True):
             yield Residual(configuration, target, part, kind, error, norm)
 
-    def summary(self) -> dict[str, Any]:
-        """Return every row, in mm and mrad."""
-        return {
-            "residuals": [
+    def blocks(self) -> Iterator[Block]:
+        """Give every row, in mm and mrad, and in words the largest, worst first."""
+        yield say(
+            f"{len(self)} residuals; the largest of each kind:",
+            residuals=[
                 {
                     "configuration": row.configuration,
                     "target": row.target,
@@ -442,18 +425,13 @@ class Residuals(Record):
                     "norm": row.norm * 1e3,
                 }
                 for row in self
-            ]
-        }
-
-    def lines(self) -> list[str]:
-        """Return the largest of them, worst first."""
-        text = [f"{len(self)} residuals; the largest of each kind:"]
+            ],
+        )
         for kind, unit in (("position", "mm"), ("orientation", "mrad"), ("length", "mm")):
             rows = np.flatnonzero(self.kind == kind)
             for row in rows[np.argsort(-self.norm[rows], kind="stable")][:_SHOWN].tolist():
                 where = f"{self.configuration[row]}/{self.target[row]}"
-                text.append(f"  {kind:<11} {where:<16} {self.part[row]:<8} {self.norm[row] * 1e3:.3f} {unit}")
-        return text
+                yield say(f"  {kind:<11} {where:<16} {self.part[row]:<8} {self.norm[row] * 1e3:.3f} {unit}")
 
     def to_pandas(self) -> Any:
         """Return the rows as a pandas DataFrame, the error in columns ``ex``, ``ey``, ``ez``; pandas is needed for it.

@@ -27,7 +27,7 @@ from truearm.calibration.figures import (
     zones_figure,
     zones_table,
 )
-from truearm.calibration.parts import simulated_lines
+from truearm.calibration.parts import simulated_block
 from truearm.engine.base.errors import worst_first
 from truearm.engine.diagnose.expected_error import expected_map
 from truearm.engine.document.document import (
@@ -43,6 +43,7 @@ from truearm.engine.document.document import (
     Table,
     Warned,
     Words,
+    lines_of,
     pictured,
 )
 from truearm.engine.document.figures import correlation_map, expected_error_map, histogram, residuals, workspace
@@ -432,10 +433,11 @@ def _curves(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
 def _zones(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
     if run.zones is None:
         return []
+    answer = lines_of(run.zones.blocks())[0]
     words = (
-        f"{run.zones.lines()[0]} A zone has a model of its own that starts at the values of the whole, and is kept "
-        "where it is better on its held-out readings by more than two standard errors of the difference. The nominal "
-        "flange says in which zone a configuration is."
+        f"{answer} A zone has a model of its own that starts at the values of the whole, and is kept where it is "
+        "better on its held-out readings by more than two standard errors of the difference. The nominal flange says "
+        "in which zone a configuration is."
     )
     pictures = [Picture("zone-errors", drawn["zone-errors"])] if "zone-errors" in drawn else []
     return [Section("Zones of the workspace", [Words(words), *pictures, zones_table(run.zones)], "zones")]
@@ -485,10 +487,11 @@ def _monte_carlo(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
     simulated = run.monte_carlo
     if simulated is None or "coverage" not in drawn:
         return []
+    said = lines_of([simulated_block(simulated, run.fit.robot)])[0]
     words = (
-        f"{''.join(simulated_lines(simulated, run.fit.robot))}. Each simulated calibration measures the calibrated "
-        "robot again, with noise and joint errors as they were found, and begins from a nominal robot that is off as "
-        f"the priors say (seed {simulated.seed}). A dot is the share of them in which the linear interval of a "
+        f"{said}. Each simulated calibration measures the calibrated robot again, with noise and "
+        "joint errors as they were found, and begins from a nominal robot that is off as the priors say "
+        f"(seed {simulated.seed}). A dot is the share of them in which the linear interval of a "
         "parameter held the truth; where the intervals are right, 95 of 100 dots lie between the dotted lines."
     )
     table = intervals_table(simulated, run.fit.robot)

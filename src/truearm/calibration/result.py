@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,14 +17,11 @@ from truearm.calibration.parts import (
     Part,
     Residuals,
     ResultKeptError,
-    budget_lines,
-    budget_summary,
-    curve_lines,
-    curves_summary,
+    budget_block,
+    curve_block,
     proof_of,
     residuals_of,
-    simulated_lines,
-    simulated_summary,
+    simulated_block,
     sound_result,
 )
 from truearm.calibration.zones import ZONES_FILE, ZoneChoice, robot_file_of, zone_files
@@ -33,7 +30,7 @@ from truearm.engine.base.units import SHOWN_AS, Marked, from_si
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.choosing.selection import Selection
 from truearm.engine.choosing.zones import ZoneVerdict, flange_places
-from truearm.engine.command.reading import Excluded, excluded_line
+from truearm.engine.command.reading import Excluded, excluded_block
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
 from truearm.engine.diagnose.curves import FoundCurve, found_curves
@@ -42,17 +39,9 @@ from truearm.engine.diagnose.expected_error import ExpectedError, expected_error
 from truearm.engine.diagnose.gain import NO_GAIN, Repeatability, repeatability
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
-from truearm.engine.document.summaries import (
-    error_line,
-    errors_summary,
-    expected_lines,
-    expected_summary,
-    noise_lines,
-    noise_summary,
-    selection_lines,
-    selection_summary,
-)
+from truearm.engine.document.document import Block, detail, each, held_by, lines_of, say, under
+from truearm.engine.document.records import Record
+from truearm.engine.document.summaries import error_line, errors_summary, expected_blocks, noise_blocks, selection_block
 from truearm.engine.document.tables import parameter_lines
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.effects.joint_curve import JointCurve
@@ -159,21 +148,48 @@ class Calibration(Record):
             return "See the errors before you use the result."
         return self.status.advice
 
-    def summary(self) -> dict[str, Any]:
-        """Return the figures as ``result.json`` begins with them: errors in mm and mrad."""
-        return {
-            "status": self.status.value,
-            "warnings": notice_summaries(self.warnings),
-            "next": [step.summary() for step in self.next],
-            "nominal": errors_summary(self.nominal),
-            "train": errors_summary(self.train),
-            "validation": None if self.validation is None else errors_summary(self.validation),
-            "expected_mm": expected_summary(self.expected),
-            **({"held": list(self.fit.held.words)} if self.fit.held else {}),
-            **({"without": list(self.without)} if self.without else {}),
-            **({"excluded": [one.summary() for one in self.excluded]} if self.excluded else {}),
-            **({"notes": self.notes} if self.notes else {}),
-        }
+    def blocks(self) -> Iterator[Block]:
+        """Give the figures people look for, the held-out error first, in mm and mrad."""
+        unseen, trained = self.validation, counted(self.train.configurations, "training configuration")
+        before, after = f"  nominal     {error_line(self.nominal)}", f"  calibrated  {error_line(self.train)}"
+        if unseen is None:
+            yield say(f"Nothing was held out; on the {trained}:", before, after, validation=None)
+        else:
+            yield say(
+                f"On {counted(unseen.configurations, 'configuration')} the fit has not seen:",
+                before,
+                f"  calibrated  {error_line(unseen)}",
+                validation=errors_summary(unseen),
+            )
+            yield detail(f"On the {trained}:", after)
+        yield say(nominal=errors_summary(self.nominal), train=errors_summary(self.train))
+        if self.fit.held:
+            yield detail(f"Held at known places: {listed(self.fit.held.words)}", held=list(self.fit.held.words))
+        if self.without:
+            left_out = f"{counted(len(self.without), 'configuration')} ({listed(self.without)})"
+            yield detail(f"Left out: {left_out}", without=list(self.without))
+        if self.excluded:
+            yield excluded_block(self.excluded)
+        yield from expected_blocks(self.expected)
+        yield detail(*lines_of(self._further()))
+        yield say(f"Status: {self.status.value}. {self.advice}".rstrip(), status=self.status.value)
+        if self.notes:
+            yield say(notes=self.notes)
+
+    def _further(self) -> Iterator[Block]:
+        """Give what only ``result.json`` holds the figures of."""
+        if self.curves:
+            yield each("curves", ([curve_block(curve)] for curve in self.curves))
+        yield under("noise", noise_blocks(self.fit, self.repeatability))
+        yield budget_block(self.budget)
+        if self.monte_carlo is not None:
+            yield simulated_block(self.monte_carlo, self.robot)
+        if self.zones is not None:
+            yield under("zones", self.zones.blocks())
+        if self.selection is not None:
+            yield selection_block(self.selection)
+        if self.fit.model.name == "frames":
+            yield detail(*self._target_lines())
 
     def result(self) -> dict[str, Any]:
         """Return what ``result.json`` holds: the summary and every parameter but those of curves, which it sums up."""
@@ -183,46 +199,9 @@ class Calibration(Record):
             "command": self.command,
             "history": self.history,
             "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
-            "noise": noise_summary(self.fit, self.repeatability),
-            "limits_of_accuracy": None if self.budget is None else budget_summary(self.budget),
             "parameters": list(self._parameters()),
-            **({"curves": curves_summary(self.curves)} if self.curves else {}),
-            **({} if self.monte_carlo is None else {"monte_carlo": simulated_summary(self.monte_carlo, self.robot)}),
-            **({} if self.zones is None else {"zones": self.zones.summary()}),
-            **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
+            **held_by(self._further()),
         }
-
-    def lines(self) -> list[str]:
-        """Return the figures people look for, the held-out error first."""
-        text = []
-        if self.validation is not None:
-            text.append(f"On {counted(self.validation.configurations, 'configuration')} the fit has not seen:")
-            text.append(f"  nominal     {error_line(self.nominal)}")
-            text.append(f"  calibrated  {error_line(self.validation)}")
-            text.append(f"On the {counted(self.train.configurations, 'training configuration')}:")
-        else:
-            text.append(f"Nothing was held out; on the {counted(self.train.configurations, 'training configuration')}:")
-            text.append(f"  nominal     {error_line(self.nominal)}")
-        text.append(f"  calibrated  {error_line(self.train)}")
-        if self.fit.held:
-            text.append(f"Held at known places: {listed(self.fit.held.words)}")
-        if self.without:
-            text.append(f"Left out: {counted(len(self.without), 'configuration')} ({listed(self.without)})")
-        if self.excluded:
-            text.append(excluded_line(self.excluded))
-        text += expected_lines(self.expected)
-        text += curve_lines(self.curves)
-        text += noise_lines(self.fit, self.repeatability)
-        text += budget_lines(self.budget)
-        text += simulated_lines(self.monte_carlo, self.robot)
-        text += [] if self.zones is None else self.zones.lines()
-        if self.selection is not None:
-            text += selection_lines(self.selection)
-        if self.fit.model.name == "frames":
-            text += self._target_lines()
-        text.append(f"Status: {self.status.value}. {self.advice}".rstrip())
-        text += [step.line for step in self.next]
-        return text + notice_lines(self.warnings)
 
     def residuals(self) -> Residuals:
         """Return what the calibrated robot leaves of every reading: training first, then held out."""

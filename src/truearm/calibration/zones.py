@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from truearm.engine.base.errors import InputError, counted, millimetres, refusals_of
 from truearm.engine.base.files import path_argument
@@ -27,6 +27,7 @@ from truearm.engine.choosing.zones import (
 )
 from truearm.engine.command.arguments import whole_argument
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.document.document import Block, detail, each
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.losses import Loss
@@ -59,43 +60,40 @@ class ZoneChoice:
         """The zones that stay."""
         return tuple(verdict for verdict in self.verdicts if verdict.kept)
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it, in mm."""
-        return {
-            "kept": [verdict.box.name for verdict in self.kept],
-            "overlap_mm": self.overlap * 1e3,
-            "whole_mm": self.whole * 1e3,
-            "with_kept_zones_mm": self.zoned * 1e3,
-            "zones": [
-                {
-                    "name": verdict.box.name,
-                    "box_mm": shown_box(verdict.box),
-                    "training": verdict.training,
-                    "held_out": verdict.held_out,
-                    "whole_mm": None if verdict.whole is None else verdict.whole * 1e3,
-                    "zone_mm": None if verdict.zone is None else verdict.zone * 1e3,
-                    "standard_error_mm": None if verdict.error is None else verdict.error * 1e3,
-                    "kept": verdict.kept,
-                    "why": verdict.why,
-                }
-                for verdict in self.verdicts
-            ],
-        }
-
-    def lines(self) -> list[str]:
-        """Return which zones are kept, and why the others are not."""
-        count = counted(len(self.verdicts), "zone")
-        if not self.kept:
-            text = [f"Zones: none of {count} is kept; one model is as good on held-out readings."]
-        else:
-            text = [
+    def blocks(self) -> Iterator[Block]:
+        """Give which zones are kept, and why the others are not, in mm."""
+        text = (
+            f"Zones: none of {counted(len(self.verdicts), 'zone')} is kept; one model is as good on held-out readings."
+        )
+        if self.kept:
+            text = (
                 f"Zones: {len(self.kept)} of {len(self.verdicts)} kept; mean held-out error {self.zoned * 1e3:.3f} mm "
                 f"with them, {self.whole * 1e3:.3f} mm with one model (the held-out part has chosen them: validate "
                 "with new data)."
-            ]
-        for verdict in self.verdicts:
-            text.append(f"  zone {verdict.box.name}: {_words(verdict)}")
-        return text
+            )
+        yield detail(
+            text,
+            kept=[verdict.box.name for verdict in self.kept],
+            overlap_mm=self.overlap * 1e3,
+            whole_mm=self.whole * 1e3,
+            with_kept_zones_mm=self.zoned * 1e3,
+        )
+        yield each("zones", ([_verdict_block(verdict)] for verdict in self.verdicts))
+
+
+def _verdict_block(verdict: ZoneVerdict) -> Block:
+    return detail(
+        f"  zone {verdict.box.name}: {_words(verdict)}",
+        name=verdict.box.name,
+        box_mm=shown_box(verdict.box),
+        training=verdict.training,
+        held_out=verdict.held_out,
+        whole_mm=None if verdict.whole is None else verdict.whole * 1e3,
+        zone_mm=None if verdict.zone is None else verdict.zone * 1e3,
+        standard_error_mm=None if verdict.error is None else verdict.error * 1e3,
+        kept=verdict.kept,
+        why=verdict.why,
+    )
 
 
 def _words(verdict: ZoneVerdict) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from truearm.engine.base.errors import InputError, Notice, listed
 from truearm.engine.base.units import Marked, parts_of
@@ -21,7 +22,8 @@ from truearm.engine.diagnose.data_check import compared_with
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.next_steps import steps_after_check
 from truearm.engine.diagnose.unmodelled import LeftOver
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, say
+from truearm.engine.document.records import Record
 
 if TYPE_CHECKING:
     from truearm.checking.check import Check
@@ -36,21 +38,16 @@ class DataCheck(Record):
     next: tuple[NextStep, ...] = ()  #: What to do next, three steps at most, the most useful first.
     simulated_from: tuple[Marked, ...] = ()  #: What of measurements and robot comes from a virtual instrument.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "configurations": self.data.configurations,
-            "targets": list(self.data.targets),
-            "warnings": notice_summaries(self.warnings),
-            "next": [step.summary() for step in self.next],
-        }
-
-    def lines(self) -> list[str]:
-        """Return what the command prints."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what was read, and whether anything is wrong with it."""
         data = self.data
-        text = [f"{data.source}: {data.configurations} configurations, targets {listed(data.targets)}"]
-        text += notice_lines(self.warnings) or [self._clean]
-        return text + [step.line for step in self.next]
+        yield say(
+            f"{data.source}: {data.configurations} configurations, targets {listed(data.targets)}",
+            configurations=data.configurations,
+            targets=list(data.targets),
+        )
+        if not self.warnings:
+            yield say(self._clean)
 
     @property
     def _clean(self) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Unpack
+from typing import TYPE_CHECKING, Final, Unpack
 
 import numpy as np
 
@@ -29,7 +29,8 @@ from truearm.engine.data.inclinations import (
     deviation_of_reading,
 )
 from truearm.engine.data.readers.canonical import csv_text
-from truearm.engine.document.records import Record, joints_lines, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, each, say
+from truearm.engine.document.records import Record, joints_lines
 from truearm.engine.fit.design import OfInterest, most_informative
 from truearm.engine.motion.tour import Tour, tour_csv, tour_summary, tour_words, ways_beside
 from truearm.engine.motion.touring import tour_of
@@ -233,36 +234,39 @@ class InclinometerPlan(Record):
         """Constants that stay about as unknown as they were."""
         return tuple(name for name, _, deviation, prior in self._expected() if deviation > 0.7 * prior)
 
-    def summary(self) -> dict[str, Any]:
-        """Return the figures as JSON holds them."""
-        return {
-            "inclined": 2 * len(self.made.inclined),
-            "posed": 2 * len(self.made.posed),
-            "pull_n": self.pull,
-            "joints_are": self.joints_are,
-            "ways": tour_summary(self.tour, self.robot, self.joints_are),
-            "expected": [
-                {"name": name, "unit": unit, "deviation": deviation, "prior": prior}
-                for name, unit, deviation, prior in self._expected()
-            ],
-            "unseen": list(self.unseen),
-            "warnings": notice_summaries(self.warnings),
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was chosen, and how accurate every constant will be."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what was chosen, and how accurate every constant will be."""
         how = f"under pulls of {self.pull:g} N at the flange" if self.pull else "by gravity alone"
-        text = [f"{counted(2 * len(self.made.inclined), 'configuration')} for inclinometers, in pairs, {how}."]
-        if len(self.made.posed):
-            text.append(
-                f"{counted(2 * len(self.made.posed), 'configuration')} for poses, in pairs under pulls: they tell what "
+        inclined, posed = 2 * len(self.made.inclined), 2 * len(self.made.posed)
+        yield say(
+            f"{counted(inclined, 'configuration')} for inclinometers, in pairs, {how}.",
+            inclined=inclined,
+            posed=posed,
+            pull_n=self.pull,
+        )
+        if posed:
+            yield say(
+                f"{counted(posed, 'configuration')} for poses, in pairs under pulls: they tell what "
                 "inclinometers cannot see, the turn of a joint about a vertical axis."
             )
-        text += tour_words(self.tour, self.robot, self.joints_are)
-        for name, unit, deviation, prior in self._expected():
-            known = "stays unknown" if name in self.unseen else f"known to {deviation:.2g} {unit}"
-            text.append(f"  {name:<14} {known} (before: {prior:.2g} {unit})")
-        return [*text, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
+        ways = tour_summary(self.tour, self.robot, self.joints_are)
+        yield say(*tour_words(self.tour, self.robot, self.joints_are), ways=ways)
+        unseen = self.unseen
+        yield each(
+            "expected",
+            (
+                detail(
+                    f"  {name:<14} {'stays unknown' if name in unseen else f'known to {deviation:.2g} {unit}'} "
+                    f"(before: {prior:.2g} {unit})",
+                    name=name,
+                    unit=unit,
+                    deviation=deviation,
+                    prior=prior,
+                )
+                for name, unit, deviation, prior in self._expected()
+            ),
+        )
+        yield say(*joints_lines(self.joints_are), unseen=list(unseen), joints_are=self.joints_are)
 
     def csv_text(self) -> str:
         """Return the plan as CSV: one row a configuration, in the order of measurement, and what is read there."""
@@ -318,27 +322,23 @@ class InclinometerSimulation(Record):
             return ()
         return (self.out,) if self.pushed is None else (self.out, pushed_file(self.out))
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {
-            "robot": self.robot,
-            "truth": self.truth,
-            "configurations": len(self.inclinations.labels),
-            "instruments": list(self.inclinations.instruments.names),
-            "joints_are": self.inclinations.joints_are,
-            "angles": int(np.isfinite(self.inclinations.angle).sum()),
-            "pushed": 0 if self.pushed is None else self.pushed.configurations,
-        }
-
-    def lines(self) -> list[str]:
-        """Return what was read."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what was read."""
         read = self.inclinations
-        many, angles = counted(len(read.labels), "configuration"), int(np.isfinite(read.angle).sum())
+        angles, pushed = int(np.isfinite(read.angle).sum()), 0 if self.pushed is None else self.pushed.configurations
+        beside = "" if self.pushed is None else f"; {counted(pushed, 'configuration')} for poses under loads"
         where = f": {listed([str(file) for file in self.files])}" if self.files else ""
-        text = f"{many} of {self.robot} ({self.truth}), {angles} angles of {len(read.instruments)} inclinometers"
-        if self.pushed is not None:
-            text += f"; {counted(self.pushed.configurations, 'configuration')} for poses under loads"
-        return [text + where]
+        yield say(
+            f"{counted(len(read.labels), 'configuration')} of {self.robot} ({self.truth}), {angles} angles of "
+            f"{len(read.instruments)} inclinometers{beside}{where}",
+            robot=self.robot,
+            truth=self.truth,
+            configurations=len(read.labels),
+            instruments=list(read.instruments.names),
+            joints_are=read.joints_are,
+            angles=angles,
+            pushed=pushed,
+        )
 
     def texts(self) -> dict[str, str]:
         """Return what its files hold, by name."""

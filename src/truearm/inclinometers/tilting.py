@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -30,7 +30,8 @@ from truearm.engine.command.split import train_count
 from truearm.engine.data.checks import check_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.inclinations import Inclinations, InclinometerReadings
-from truearm.engine.document.records import Record, notice_lines, notice_summaries
+from truearm.engine.document.document import Block, detail, say
+from truearm.engine.document.records import Record, notice_summaries
 from truearm.engine.document.summaries import error_line
 from truearm.engine.fit.models import MODELS as EVERY_MODEL
 from truearm.engine.robot.chain import Array
@@ -120,13 +121,18 @@ class Tilting(Record):
             )
         return rows
 
-    def summary(self) -> dict[str, Any]:
-        """Return the figures as ``result.json`` begins with them."""
+    def blocks(self) -> Iterator[Block]:
+        """Give what was found of every joint, then what that does to the errors of poses."""
         changed, left = (math.degrees(size) for size in self.sizes)
-        return {
-            "status": "converged" if self.fit.converged else "not-converged",
-            "warnings": notice_summaries(self.notices),
-            "inclinations": {
+        beside = f" and {counted(self.pushed, 'configuration')} of poses under loads" if self.pushed else ""
+        over = f"{self.fit.excess:.2f} times" if self.fit.excess > 1.0 else "no more than"
+        # Without poses this is the answer.
+        tell = say if self.geometry is None else detail
+        yield tell(
+            f"From {counted(self.used, 'change')} of inclination in {counted(len(self.read.pairs), 'pair')}{beside}:",
+            f"  rms {changed:.4f} deg, left {left:.5f} deg, {over} what is declared",
+            status="converged" if self.fit.converged else "not-converged",
+            inclinations={
                 "pairs": len(self.read.pairs),
                 "changes": self.used,
                 "rms_deg": changed,
@@ -134,10 +140,31 @@ class Tilting(Record):
                 "excess": self.fit.excess,
                 "pushed": self.pushed,
             },
-            "constants": self.constants(),
-            "geometry": None if self.geometry is None else self.geometry.summary(),
-            "geometry_alone": None if self.geometry_alone is None else self.geometry_alone.summary(),
-        }
+        )
+        rows = self.constants()
+        joints = dict.fromkeys(row["joint"] for row in rows)
+        words = {joint: ", ".join(_words(row) for row in rows if row["joint"] == joint) for joint in joints}
+        yield tell(*(f"  joint {joint}: {said}" for joint, said in words.items()), constants=rows)
+        after, alone = self.geometry, self.geometry_alone
+        yield say(
+            geometry=None if after is None else after.summary(),
+            geometry_alone=None if alone is None else alone.summary(),
+        )
+        if after is not None and alone is not None:
+            part = "the fit has not seen" if after.validation is not None else "it was trained on"
+            judged = after.validation or after.train
+            yield say(
+                f"On {counted(judged.configurations, 'configuration')} {part}:",
+                f"  nominal          {error_line(alone.nominal)}",
+                f"  geometry alone   {error_line(alone.validation or alone.train)}",
+                f"  tilting first    {error_line(judged)}",
+                f"Status of the geometry: {after.status.value}. {after.advice}".rstrip(),
+                *(step.line for step in after.next if step.code not in _OF_CALIBRATE),
+            )
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as ``result.json`` begins with them; the geometry holds its own notices."""
+        return {**super().summary(), "warnings": notice_summaries(self.notices)}
 
     def result(self) -> dict[str, Any]:
         """Return what ``result.json`` holds: the summary, how the instruments sit, and every parameter."""
@@ -162,31 +189,6 @@ class Tilting(Record):
                 self.read.instruments.names, self.mounting.turns, self.mounting.zeros, strict=True
             )
         ]
-
-    def lines(self) -> list[str]:
-        """Return what was found of every joint, then what that does to the errors of poses."""
-        changed, left = (math.degrees(size) for size in self.sizes)
-        beside = f" and {counted(self.pushed, 'configuration')} of poses under loads" if self.pushed else ""
-        over = f"{self.fit.excess:.2f} times" if self.fit.excess > 1.0 else "no more than"
-        text = [
-            f"From {counted(self.used, 'change')} of inclination in {counted(len(self.read.pairs), 'pair')}{beside}:",
-            f"  rms {changed:.4f} deg, left {left:.5f} deg, {over} what is declared",
-        ]
-        rows = self.constants()
-        for joint in dict.fromkeys(row["joint"] for row in rows):
-            parts = [_words(row) for row in rows if row["joint"] == joint]
-            text.append(f"  joint {joint}: {', '.join(parts)}")
-        if self.geometry is not None and self.geometry_alone is not None:
-            after, alone = self.geometry, self.geometry_alone
-            part = "the fit has not seen" if after.validation is not None else "it was trained on"
-            judged = after.validation or after.train
-            text.append(f"On {counted(judged.configurations, 'configuration')} {part}:")
-            text.append(f"  nominal          {error_line(alone.nominal)}")
-            text.append(f"  geometry alone   {error_line(alone.validation or alone.train)}")
-            text.append(f"  tilting first    {error_line(judged)}")
-            text.append(f"Status of the geometry: {after.status.value}. {after.advice}".rstrip())
-            text += [step.line for step in after.next if step.code not in _OF_CALIBRATE]
-        return text + notice_lines(self.warnings)
 
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write ``calibrated.yaml``, ``result.json``, ``report.html`` and ``calibrated.urdf`` into a folder.

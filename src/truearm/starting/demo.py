@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.base.writing import write_files
 from truearm.engine.command.arguments import folder_for
 from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.document.document import Block, say
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import Status
 from truearm.engine.programs.gauge import best_agreement
@@ -52,20 +53,19 @@ class Demonstration(Record):
         """Whether the calibration can be used as it is."""
         return self.calibration.finished
 
-    def summary(self) -> dict[str, Any]:
-        """Return both results as JSON holds them."""
-        return {
-            "calibration": self.calibration.summary(),
-            "correction": None if self.correction is None else self.correction.summary(),
-        }
-
-    def lines(self) -> list[str]:
-        """Return both results, and where their reports are."""
-        text = self.calibration.lines()
-        if self.correction is not None:
-            text += self.correction.lines()
-            text.append(f"The corrected program is in {self.corrected_folder}, with a report of its own, {REPORT}.")
-        return [*text, f"The report is {self.folder / 'report.html'}; open it in a browser."]
+    def blocks(self) -> Iterator[Block]:
+        """Give both results, and where their reports are."""
+        calibration, correction = self.calibration, self.correction
+        yield say(*calibration.lines(), calibration=calibration.summary())
+        if correction is None:
+            yield say(correction=None)
+        else:
+            yield say(
+                *correction.lines(),
+                f"The corrected program is in {self.corrected_folder}, with a report of its own, {REPORT}.",
+                correction=correction.summary(),
+            )
+        yield say(f"The report is {self.folder / 'report.html'}; open it in a browser.")
 
 
 #: The program that is corrected, and where its work object is in the controller's base: the numbers it has itself.

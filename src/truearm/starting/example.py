@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import write_files, write_new_text
 from truearm.engine.command.arguments import folder_for, new_file_for
 from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.document.document import Block, say
 from truearm.engine.document.records import Record
 from truearm.engine.robot.robot_file.reading import robot_from_file
 from truearm.engine.robot.robot_file.schema import RobotFile
@@ -36,13 +38,10 @@ class ExampleSession(Record):
         """``data``: a virtual instrument reads."""
         return ("data",)
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {"files": [str(file) for file in self.files]}
-
-    def lines(self) -> list[str]:
-        """Return a line for each file."""
-        return [str(file) for file in self.files]
+    def blocks(self) -> Iterator[Block]:
+        """Give the files."""
+        files = [str(file) for file in self.files]
+        yield say(*files, files=files)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,13 +50,9 @@ class RobotTemplate(Record):
 
     file: Path  #: The file.
 
-    def summary(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return {"file": str(self.file)}
-
-    def lines(self) -> list[str]:
-        """Return what to do with it."""
-        return [f"{self.file}: fill it in, then look at it with 'truearm show {self.file}'."]
+    def blocks(self) -> Iterator[Block]:
+        """Give what to do with it."""
+        yield say(f"{self.file}: fill it in, then look at it with 'truearm show {self.file}'.", file=str(self.file))
 
 
 def new_file(asked: NewRobot) -> RobotTemplate:

@@ -30,7 +30,7 @@ from truearm.engine.diagnose.external_force import check_force, check_payload
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.document.document import Block, each, say
 from truearm.engine.document.records import Record
-from truearm.engine.document.summaries import error_line, errors_summary, refit_lines, refit_summary
+from truearm.engine.document.summaries import error_line, errors_summary, refit_block
 from truearm.engine.fit.refit import Refit
 from truearm.engine.fit.refit import refit as find_moved
 from truearm.engine.robot.effects.warm_up import LEFT
@@ -124,7 +124,7 @@ class Validation(Record):
                 ),
             )
         if self.refit is not None:
-            yield say(*refit_lines(self.refit), refit=refit_summary(self.refit))
+            yield refit_block(self.refit)
         if self.notes:
             yield say(*(f"{name}: {said}" for name, said in self.notes.items()), notes=self.notes)
 

@@ -13,6 +13,7 @@ from truearm.engine.base.files import path_argument
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.excluded import Exclusion, read_exclusions, without_readings
 from truearm.engine.data.statistics import Errors, errors_of, without_table_motion
+from truearm.engine.document.document import Block, detail
 from truearm.engine.robot.robot import Robot
 
 Part = Literal["training", "held out", "left out"]
@@ -31,27 +32,26 @@ class Excluded:
     readings: int  #: How many readings it means.
     part: Part  #: The part of the split that they would belong to; ``left out`` if their whole configuration is.
 
-    def summary(self) -> dict[str, str | int]:
-        """Return it as JSON holds it."""
-        row = self.row
-        return {
-            "configuration": row.configuration,
-            "target": row.target,
-            **({"visit": row.visit} if row.visit else {}),
-            **({"fixture": row.fixture} if row.fixture else {}),
-            "reason": row.reason,
-            "readings": self.readings,
-            "part": self.part,
-        }
 
-
-def excluded_line(excluded: Sequence[Excluded]) -> str:
+def excluded_block(excluded: Sequence[Excluded]) -> Block:
     """Return how many readings of each part were excluded, and why."""
     parts = Counter[str]()
     for one in excluded:
         parts[one.part] += one.readings
     told = ", ".join(f"{count} {_OF[part]}" for part, count in parts.items())
-    return f"Excluded: {counted(parts.total(), 'reading')} ({told}): {reasons(excluded)}"
+    rows = [
+        {
+            "configuration": one.row.configuration,
+            "target": one.row.target,
+            **({"visit": one.row.visit} if one.row.visit else {}),
+            **({"fixture": one.row.fixture} if one.row.fixture else {}),
+            "reason": one.row.reason,
+            "readings": one.readings,
+            "part": one.part,
+        }
+        for one in excluded
+    ]
+    return detail(f"Excluded: {counted(parts.total(), 'reading')} ({told}): {reasons(excluded)}", excluded=rows)
 
 
 def reasons(excluded: Sequence[Excluded]) -> str:

@@ -1,8 +1,9 @@
-"""Figures as JSON and the command show them, in mm and mrad."""
+"""What several results say of a fit: figures in words and as JSON holds them, in mm and mrad."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, Final
 
 from truearm.engine.base.errors import counted, degrees, listed, millimetres
@@ -12,6 +13,7 @@ from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.statistics import Errors, Spread
 from truearm.engine.diagnose.expected_error import Expectation, ExpectedError
 from truearm.engine.diagnose.gain import Repeatability
+from truearm.engine.document.document import Block, detail, say
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.refit import Refit
 from truearm.engine.robot.parts import Payload
@@ -22,9 +24,14 @@ LAYOUT: Final = {"path": "follow a path", "grid": "lie on a grid", "close": "lie
 BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 
 
-def selection_summary(selection: Selection) -> dict[str, Any]:
-    """Return how a model was chosen, as JSON holds it: errors in mm."""
-    return {
+def selection_block(selection: Selection) -> Block:
+    """Return how a model was chosen: errors in mm."""
+    text = [f"Chosen model: {selection.model.summary}"]
+    if selection.blocks:
+        text.append(
+            f"  judged on {selection.blocks} blocks of neighbours: the configurations {LAYOUT[selection.layout]}"
+        )
+    figures = {
         "geometric_mm": selection.geometric * 1e3,
         "elastic_mm": None if selection.elastic is None else selection.elastic * 1e3,
         "error_mm": selection.error * 1e3,
@@ -62,16 +69,7 @@ def selection_summary(selection: Selection) -> dict[str, Any]:
         ],
         "passed_over": [{"effects": list(effects), "status": status} for effects, status in selection.passed_over],
     }
-
-
-def selection_lines(selection: Selection) -> list[str]:
-    """Return how a model was chosen, as the command prints it."""
-    text = [f"Chosen model: {selection.model.summary}"]
-    if selection.blocks:
-        text.append(
-            f"  judged on {selection.blocks} blocks of neighbours: the configurations {LAYOUT[selection.layout]}"
-        )
-    return text
+    return detail(*text, selection=figures)
 
 
 def errors_summary(errors: Errors) -> dict[str, Any]:
@@ -87,20 +85,8 @@ def errors_summary(errors: Errors) -> dict[str, Any]:
     return made
 
 
-def refit_summary(found: Refit) -> dict[str, Any]:
-    """Return what was found anew, as JSON holds it, in mm and deg."""
-    return {
-        "moved": found.moved,
-        "readings": found.readings,
-        "parameters": found.parameters,
-        "shift_mm": found.shift * 1e3,
-        "turn_deg": None if found.turn is None else math.degrees(found.turn),
-        "shifts_mm": {name: shift * 1e3 for name, shift in found.shifts.items()},
-    }
-
-
-def refit_lines(found: Refit) -> list[str]:
-    """Return what was found anew, by how much it moved, and what that means for the errors."""
+def refit_block(found: Refit) -> Block:
+    """Return what was found anew, by how much it moved, and what that means for the errors, in mm and deg."""
     from_these = f"found anew from {counted(found.readings, 'reading')} ({counted(found.parameters, 'number')})"
     turned = "" if found.turn is None else f" and turned by {degrees(found.turn)} deg"
     moved = f"moved by {millimetres(found.shift)} mm"
@@ -112,7 +98,18 @@ def refit_lines(found: Refit) -> list[str]:
     }
     if found.moved == "base" and found.shifts:
         words["base"] = f"The fixtures were {from_these}; they moved before the base by (mm): {each}."
-    return [words[found.moved], "The errors of each configuration are those of what is found without it."]
+    return say(
+        words[found.moved],
+        "The errors of each configuration are those of what is found without it.",
+        refit={
+            "moved": found.moved,
+            "readings": found.readings,
+            "parameters": found.parameters,
+            "shift_mm": found.shift * 1e3,
+            "turn_deg": None if found.turn is None else math.degrees(found.turn),
+            "shifts_mm": {name: shift * 1e3 for name, shift in found.shifts.items()},
+        },
+    )
 
 
 def joint_error_text(fit: Fit) -> str:
@@ -125,20 +122,23 @@ def joint_error_text(fit: Fit) -> str:
     return " and ".join(shown)
 
 
-def noise_summary(fit: Fit, again: Repeatability | None) -> dict[str, Any]:
-    """Return the deviations of readings and joints, as JSON holds them: mm, mrad and deg.
+def noise_blocks(fit: Fit, again: Repeatability | None) -> Iterator[Block]:
+    """Give deviations of readings, what those of a configuration share, and how well the robot comes back.
 
-    That of the joints is one for all of a kind, as it is estimated.
+    In mm, mrad and deg. The deviation of joints is one for all of a kind, as it is estimated.
     """
+    shared = joint_error_text(fit)
+    words = f"errors of the joints of {shared}, repeatability plus what the model leaves"
     units = {observation.name: observation.unit for observation in OBSERVATIONS}
     of_kind: dict[str, list[int]] = {}
     for number, joint in enumerate(fit.robot.joints, 1):
         of_kind.setdefault(joint.kind, []).append(number)
-    return {
-        "sigma": {f"{name}_{'mm' if units[name] == 'm' else 'mrad'}": value * 1e3 for name, value in fit.sigma.items()},
-        "declared": fit.declared,
-        "excess": fit.excess,
-        "joint_error": [
+    yield detail(
+        *([f"Shared by the readings of a configuration: {words}"] if shared else []),
+        sigma={f"{name}_{'mm' if units[name] == 'm' else 'mrad'}": value * 1e3 for name, value in fit.sigma.items()},
+        declared=fit.declared,
+        excess=fit.excess,
+        joint_error=[
             {
                 "kind": kind,
                 "joints": joints,
@@ -147,31 +147,18 @@ def noise_summary(fit: Fit, again: Repeatability | None) -> dict[str, Any]:
             }
             for kind, joints in of_kind.items()
         ],
-        "scattered": fit.scattered,
-        **({"bootstrap": fit.bootstrap} if fit.bootstrap else {}),
-        "repeatability": None
-        if again is None
-        else {"rp_mm": again.rp * 1e3, "postures": again.postures, "visits": again.visits},
-    }
-
-
-def noise_lines(fit: Fit, again: Repeatability | None) -> list[str]:
-    """Return what readings of a configuration share, and how well the robot comes back, as lines."""
-    shared = joint_error_text(fit)
-    lines = []
-    if shared:
-        lines.append(
-            f"Shared by the readings of a configuration: errors of the joints of {shared}, repeatability plus what the "
-            "model leaves"
-        )
+        scattered=fit.scattered,
+    )
     if fit.bootstrap:
-        lines.append(f"Deviations of the parameters: from {fit.bootstrap} {BOOTSTRAPPED}")
-    if again is not None:
-        lines.append(
+        yield detail(f"Deviations of the parameters: from {fit.bootstrap} {BOOTSTRAPPED}", bootstrap=fit.bootstrap)
+    if again is None:
+        yield detail(repeatability=None)
+    else:
+        yield detail(
             f"Repeatability at {counted(again.postures, 'posture')} visited again, as RP of ISO 9283 but pooled over "
-            f"them and without the instrument's noise: {again.rp * 1e3:.2g} mm"
+            f"them and without the instrument's noise: {again.rp * 1e3:.2g} mm",
+            repeatability={"rp_mm": again.rp * 1e3, "postures": again.postures, "visits": again.visits},
         )
-    return lines
 
 
 def _scaled(spread: Spread, scale: float) -> dict[str, float]:
@@ -194,27 +181,13 @@ def error_line(errors: Errors) -> str:
     return "   ".join(parts) if parts else "no readings"
 
 
-def expected_summary(expected: ExpectedError) -> dict[str, Any]:
-    """Return the error to expect over the workspace in mm, as JSON holds it."""
-    return {
-        **_expectation(expected.overall, expected.lower_bound),
-        "lower_bound": expected.lower_bound,
-        "omissions": list(expected.omissions),
-        "targets": {
-            name: _expectation(of_target, expected.lower_bound) for name, of_target in expected.targets.items()
-        },
-        "frame": expected.frame,
-        "payload": payload_words(expected.payload),
-    }
-
-
 def _expectation(of: Expectation, lower_bound: bool) -> dict[str, Any]:
     low, high = (end * 1e3 for end in of.interval_90)
     return {"mean": of.mean * 1e3, "p95": of.p95 * 1e3, "interval_90": [low, None if lower_bound else high]}
 
 
-def expected_lines(expected: ExpectedError) -> list[str]:
-    """Return the error to expect over the workspace in words."""
+def expected_blocks(expected: ExpectedError) -> Iterator[Block]:
+    """Give the error to expect over the workspace, in mm."""
     mean, p95, low, high = (
         figure * 1e3 for figure in (expected.overall.mean, expected.overall.p95, *expected.overall.interval_90)
     )
@@ -223,10 +196,19 @@ def expected_lines(expected: ExpectedError) -> list[str]:
         figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} or more), 95 % {p95:.{places}f} mm"
     else:
         figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), 95 % below {p95:.{places}f} mm"
-    lines = [f"Expected over the workspace: mean {figures}; {expected_of(expected)}"]
+    yield say(
+        f"Expected over the workspace: mean {figures}; {expected_of(expected)}",
+        expected_mm={
+            **_expectation(expected.overall, expected.lower_bound),
+            "lower_bound": expected.lower_bound,
+            "omissions": list(expected.omissions),
+            "targets": {name: _expectation(one, expected.lower_bound) for name, one in expected.targets.items()},
+            "frame": expected.frame,
+            "payload": payload_words(expected.payload),
+        },
+    )
     if expected.lower_bound:
-        lines.append(f"  may be larger: {'; '.join(expected.omissions)}")
-    return lines
+        yield detail(f"  may be larger: {'; '.join(expected.omissions)}")
 
 
 def expected_of(expected: ExpectedError) -> str:

@@ -78,7 +78,7 @@ class ImportedBag(Record):
             ]
         yield detail(*text, missed_pauses_s=list(found.missed))
         words = "  No deviations are declared: in a standstill all samples are the same."
-        yield detail(*([] if found.declares_sigma else [words]), declares_sigma=found.declares_sigma)
+        yield detail("" if found.declares_sigma else words, declares_sigma=found.declares_sigma)
         yield detail(*joints_lines("controller" if self.data.joints_are == "controller" else "model"))
 
     def written_at(self, out: str) -> str:
@@ -124,7 +124,7 @@ def _of_target(target: TargetStream, row: tuple[Sighting, ...]) -> Iterator[Bloc
         ("set_aside", aside, f"{counted(aside, 'sample')} set aside, far from the others of their standstill"),
         ("without_numbers", target.lost, f"{counted(target.lost, 'message')} without numbers"),
     ):
-        yield detail(*([f"    {words}"] if count else []), **{key: count})
+        yield detail(f"    {words}" if count else "", **{key: count})
 
 
 def _number(value: float) -> float | None:

@@ -290,7 +290,7 @@ class ProgramCorrection(Record):
         if known and any(file.kept.keys() & {"in `keep`", "not in `only`"} for file in self.files):
             yield detail("  Targets that stay because of `keep` or `only` are not in these errors.")
         more = "  These errors may be larger: the calibration cannot know all errors of the robot."
-        yield detail(*([more] if known and self.lower_bound else []), expected_is_lower_bound=self.lower_bound)
+        yield detail(more if known and self.lower_bound else "", expected_is_lower_bound=self.lower_bound)
         skipped = [line for file in self.files for line in file.left_unchanged]
         yield detail(*skipped[:_EXPLAINED])
         if len(skipped) > _EXPLAINED:

@@ -107,11 +107,11 @@ class Measured(Record):
         counts: Mapping[str, int] = session.aside_by_reason
         total = sum(counts.values())
         why = ", ".join(f"{count} {reason} ({REASONS[reason]})" for reason, count in counts.items())
-        yield say(*([f"{counted(total, 'reading')} set aside: {why}."] if total else []), set_aside=counts)
+        yield say(f"{counted(total, 'reading')} set aside: {why}." if total else "", set_aside=counts)
         left_out = session.left_out
         places = listed([f"{label}/{name}" for label, name in left_out])
         words = f"{counted(len(left_out), 'reading')} left out (configuration/target): {places}."
-        yield detail(*([words] if left_out else []), left_out=len(left_out))
+        yield detail(words if left_out else "", left_out=len(left_out))
         yield say(nests=None) if (drift := self.drift) is None else under("nests", [self._nests(drift)])
         size = None if self.sigma.value is None else self.sigma.value * 1e3
         shown = "" if size is None else f"{size:.4f} mm, "

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from truearm.engine.base.errors import InputError, Notice, counted, did_you_mean, refusals_of
-from truearm.engine.base.units import Marked, with_mark
+from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import write_new_text
 from truearm.engine.command.arguments import (
     joints_argument,
@@ -22,8 +22,8 @@ from truearm.engine.command.split import told_of
 from truearm.engine.data.controller_joints import in_controller_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.robodk import robodk_csv
-from truearm.engine.document.document import Block, Words, lines_of, say
-from truearm.engine.document.records import Record, joints_lines, notice_lines
+from truearm.engine.document.document import Block, Words, say
+from truearm.engine.document.records import Record, joints_lines
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 from truearm.engine.robot.conversion import converted
@@ -88,19 +88,10 @@ class ExportedRobot(Record):
         """Whether it was exported, whatever speaks against the calibration."""
         return True
 
-    @property
-    def asides(self) -> int:
-        """All lines but the first: what was left out, and what speaks against the calibration."""
-        return len(self.lines()) - 1
-
     def blocks(self) -> Iterator[Block]:
         """Give what was written."""
         words = f"{self.robot.name} as {self.format}. {self.frames}"
         yield _of_file(self.file, words, format=self.format, frames=self.frames)
-
-    def lines(self) -> list[str]:
-        """Return what was written, and then what was left out, which tells for itself that it is a warning."""
-        return with_mark([*lines_of(self.blocks()), *self.left_out, *notice_lines(self.told)], self.simulated_from)
 
 
 def exported_robot(asked: ExportRobot) -> ExportedRobot:

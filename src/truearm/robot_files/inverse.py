@@ -155,7 +155,7 @@ class JointTable(Record):
             name = f"{entry['pose']} ({entry['branch']})" if entry["branch"] else entry["pose"]
             yield detail(f"  {name}: {entry['status']}. {entry['advice']}")
         rest = len(attention) - _EXPLAINED
-        yield detail(*([f"  and {rest} more; the JSON summary lists all"] if rest > 0 else []), attention=[*attention])
+        yield detail(f"  and {rest} more; the JSON summary lists all" if rest > 0 else "", attention=[*attention])
         yield say(*joints_lines(self.joints_are))
 
 

@@ -235,7 +235,7 @@ class RobotDescription(Record):
         reach = () if robot.reach is None else (f"Reach: {robot.reach.text}",)
         yield say(*reach, **reach_summary(robot.reach))
         fall = "Free fall: {:g}, {:g}, {:g} m/s^2 in the base frame".format(*robot.gravity)
-        yield say(*([fall] if robot.gravity != GRAVITY else []), gravity=list(robot.gravity))
+        yield say(fall if robot.gravity != GRAVITY else "", gravity=list(robot.gravity))
         yield self._controller()
         targets = [target.name for target in robot.targets]
         yield say(*_named_list("Joint effects", robot.effect_names), effects=list(robot.effect_names))
@@ -285,9 +285,9 @@ class RobotDescription(Record):
         yield say(*text, balancers=balancers)
         mass, (x, y, z) = robot.payload.mass, (written(v, "mm") for v in robot.payload.cog)
         words = f"Payload: {mass:g} kg at x {x:g}  y {y:g}  z {z:g} mm of the flange"
-        yield say(*([words] if mass else []), payload={"mass_kg": mass, "cog_mm": [x, y, z]})
+        yield say(words if mass else "", payload={"mass_kg": mass, "cog_mm": [x, y, z]})
         load = robot.rated_load
-        yield say(*([] if load is None else [f"Rated load: {load:g} kg"]), rated_load_kg=load)
+        yield say("" if load is None else f"Rated load: {load:g} kg", rated_load_kg=load)
 
     def _controller(self) -> Words:
         entry = controller_entry(self.robot.controller, self.robot.joints)

@@ -66,7 +66,7 @@ class Simulation(Record):
             fixtures=list(data.fixtures),
         )
         words = "Before each the arm stopped at its approach_i; the order of the data counts these stops, too."
-        yield detail(*([words] if self.stopped_before else []), stopped_before=self.stopped_before)
+        yield detail(words if self.stopped_before else "", stopped_before=self.stopped_before)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

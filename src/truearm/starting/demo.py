@@ -21,7 +21,7 @@ from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.base.writing import write_files
 from truearm.engine.command.arguments import folder_for
 from truearm.engine.data.readers.canonical import csv_text
-from truearm.engine.document.document import Block, say
+from truearm.engine.document.document import Block, say, under
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import Status
 from truearm.engine.programs.gauge import best_agreement
@@ -55,16 +55,12 @@ class Demonstration(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give both results, and where their reports are."""
-        calibration, correction = self.calibration, self.correction
-        yield say(*calibration.lines(), calibration=calibration.summary())
-        if correction is None:
+        yield under("calibration", self.calibration.everything())
+        if self.correction is None:
             yield say(correction=None)
         else:
-            yield say(
-                *correction.lines(),
-                f"The corrected program is in {self.corrected_folder}, with a report of its own, {REPORT}.",
-                correction=correction.summary(),
-            )
+            yield under("correction", self.correction.everything())
+            yield say(f"The corrected program is in {self.corrected_folder}, with a report of its own, {REPORT}.")
         yield say(f"The report is {self.folder / 'report.html'}; open it in a browser.")
 
 

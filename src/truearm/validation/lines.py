@@ -234,7 +234,7 @@ class LineTest(Record):
     def blocks(self) -> Iterator[Block]:
         """Give the errors of each line of poses, in mm."""
         reached = f"The robot can go to all {len(self.poses.labels)} poses."
-        yield say(*([reached] if self.before is None else []), poses=len(self.poses.labels))
+        yield say(reached if self.before is None else "", poses=len(self.poses.labels))
         yield each("lines", (self._line(direction, self.before) for direction in DIRECTIONS if self.before))
         if self.out is not None:
             said = "compensated" if self.compensated else "nominal"

@@ -142,10 +142,8 @@ def print_record(record: Record, *, details: bool = True) -> None:
     """Print a result in words and figures: all of it, or what fits a first screen."""
     from truearm.engine.document.records import first_screen
 
-    lines = record.lines() if details else first_screen(record)
-    results = len(lines) - record.asides
-    for number, line in enumerate(lines):
-        print_line(spelled(line), err=number >= results)
+    for line in record.lines() if details else first_screen(record):
+        print_line(spelled(line))
 
 
 def print_line(line: str, *, err: bool = False) -> None:

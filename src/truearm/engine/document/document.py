@@ -221,13 +221,13 @@ class Document:
 
 
 def say(*lines: str, **held: Any) -> Words:
-    """Return lines of text, with what JSON holds of them by its keys; either may be missing."""
-    return Words("\n".join(lines), held=held)
+    """Return lines of text, with what JSON holds of them by its keys; either may be missing, and lines may be empty."""
+    return Words("\n".join(filter(None, lines)), held=held)
 
 
 def detail(*lines: str, **held: Any) -> Words:
     """Return lines that are not on the first screen; arguments as for :func:`say`."""
-    return Words("\n".join(lines), held=held, is_detail=True)
+    return Words("\n".join(filter(None, lines)), held=held, is_detail=True)
 
 
 def under(key: str, blocks: Iterable[Block]) -> Under:

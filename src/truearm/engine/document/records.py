@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import wraps
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -28,12 +27,6 @@ class Record:
 
     Where it holds data or a robot that are simulated, both begin with that, whatever the record's own class returns.
     """
-
-    def __init_subclass__(cls, **keywords: Any) -> None:
-        super().__init_subclass__(**keywords)
-        for name, marked in (("lines", _marked_lines), ("summary", _marked_summary)):
-            if name in vars(cls):
-                setattr(cls, name, marked(vars(cls)[name]))
 
     #: What was asked for; None of what no job has made. It says itself as a call in Python and as a command.
     request: Any = None
@@ -58,11 +51,6 @@ class Record:
         return f"Written to {out}: {', '.join(self.written)}" if self.written else ""
 
     @property
-    def asides(self) -> int:
-        """How many of its last lines are no part of the result: the command prints them on standard error."""
-        return 0
-
-    @property
     def finished(self) -> bool:
         """Whether it can be used as it is: no notice is an error."""
         return not has_error(getattr(self, "warnings", ()))
@@ -74,16 +62,21 @@ class Record:
         """
         raise NotImplementedError
 
+    def everything(self) -> list[Block]:
+        """Return its blocks, and behind them what to do next and what to know, as a result holds it that has this one."""
+        parts = self.simulated_from
+        made = [say(simulated=True, simulated_parts=[*parts])] if parts else []
+        made += self.blocks()
+        if hasattr(self, "next"):
+            made.append(detail(*(step.line for step in self.next), next=[step.summary() for step in self.next]))
+        if hasattr(self, "warnings"):
+            made.append(detail(*notice_lines(self.warnings), warnings=notice_summaries(self.warnings)))
+        return made
+
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them, units in the names."""
-        parts, held = self.simulated_from, held_by(self.blocks())
-        schema = {name: held[name] for name in ("truearm",) if name in held}
-        made = schema | ({"simulated": True, "simulated_parts": [*parts]} if parts else {}) | held
-        if hasattr(self, "next"):
-            made["next"] = [step.summary() for step in self.next]
-        if hasattr(self, "warnings"):
-            made["warnings"] = notice_summaries(self.warnings)
-        return made
+        held = held_by(self.everything())
+        return {name: held[name] for name in ("truearm",) if name in held} | held
 
     def as_json(self) -> Any:
         """Return what the command prints as JSON."""
@@ -91,35 +84,13 @@ class Record:
 
     def lines(self) -> list[str]:
         """Return the result in words and figures, line by line, as the command prints it."""
-        steps = [step.line for step in getattr(self, "next", ())]
-        text = [*lines_of(self.blocks()), *steps, *notice_lines(getattr(self, "warnings", ()))]
-        return with_mark(text, self.simulated_from)
+        return with_mark(lines_of(self.everything()), self.simulated_from)
 
     def __repr__(self) -> str:
         return short_text(self.lines())
 
     def _repr_html_(self) -> str:
         return as_html(repr(self))
-
-
-def _marked_lines(lines: Callable[[Any], list[str]]) -> Callable[[Any], list[str]]:
-    @wraps(lines)
-    def marked(record: Record) -> list[str]:
-        return with_mark(lines(record), record.simulated_from)
-
-    return marked
-
-
-def _marked_summary(summary: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[str, Any]]:
-    @wraps(summary)
-    def marked(record: Record) -> dict[str, Any]:
-        parts, content = record.simulated_from, summary(record)
-        if not parts:
-            return content
-        schema = {name: content[name] for name in ("truearm",) if name in content}
-        return {**schema, "simulated": True, "simulated_parts": [*parts], **content}
-
-    return marked
 
 
 def joints_lines(joints_are: JointsOf) -> list[str]:
@@ -137,10 +108,9 @@ def notice_lines(notices: Sequence[Notice]) -> list[str]:
 def first_screen(record: Record) -> list[str]:
     """Return at most ten lines, with the one that says where files are: the answer, the next step, and what to know.
 
-    The last of these counts what is not among them. What goes to standard error, as what a file cannot hold, and the
-    answers of lists are told as a whole.
+    The last of these counts what is not among them. Lists are shown as a whole.
     """
-    if record.is_list or record.asides:
+    if record.is_list:
         return record.lines()
     notices, steps = worst_first(getattr(record, "warnings", ())), getattr(record, "next", ())
     mark, answer = said_of(record.simulated_from), without_mark(lines_of(record.blocks(), details=False))
@@ -148,7 +118,7 @@ def first_screen(record: Record) -> list[str]:
     grave = sum(notice.level == "error" for notice in notices)
     shown = min(len(notices), _FIRST, max(1, grave, room - len(answer)))
     text = [*mark, *answer[: room - shown], *(step.line for step in steps[:1]), *notice_lines(notices[:shown])]
-    rest = Counter(notice.level for notice in notices[shown:])
+    rest = Counter[str](notice.level for notice in notices[shown:])
     rest["line"] = len(record.lines()) - len(text) - rest.total()
     more = listed([counted(count, what) for what, count in rest.items() if count])
     return [*text, f"And {more} more, which `details` shows."] if more else text
@@ -217,7 +187,7 @@ class ImportedCircles(Record):
         on = f"{counted(configurations, 'configuration')} on {counted(len(self.pages), 'page')}"
         yield say(f"{on}{where}", configurations=configurations, pages=list(self.pages))
         words = f"  {self.gaps} missing {_nouns('distance', self.gaps)}, where the line has gaps"
-        yield say(*([words] if self.gaps else []), missing=self.gaps)
+        yield say(words if self.gaps else "", missing=self.gaps)
 
 
 def _nouns(noun: str, count: int) -> str:

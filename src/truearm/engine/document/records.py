@@ -63,9 +63,9 @@ class Record:
         raise NotImplementedError
 
     def everything(self) -> list[Block]:
-        """Return its blocks, and behind them what to do next and what to know, as a result holds it that has this one."""
+        """Return its blocks, then what to do next and what to know, as a result has it that holds this one."""
         parts = self.simulated_from
-        made = [say(simulated=True, simulated_parts=[*parts])] if parts else []
+        made: list[Block] = [say(simulated=True, simulated_parts=[*parts])] if parts else []
         made += self.blocks()
         if hasattr(self, "next"):
             made.append(detail(*(step.line for step in self.next), next=[step.summary() for step in self.next]))

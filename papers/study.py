@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 from papers.verdicts import SILENT, VERDICTS, Claim, Comparison, Verdict
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import output_folder, write_files
+from truearm.engine.document.document import Block, Words, detail, each, say
 from truearm.engine.document.drawing import Figure
 from truearm.engine.document.page import page
 from truearm.engine.document.records import Record
@@ -72,24 +72,30 @@ class Row:
         """How our median stands to the published figure; None where nothing is published."""
         return None if self.comparison is None else self.comparison.verdict
 
-    def summary(self) -> dict[str, Any]:
-        """Return the row as ``study.json`` holds it."""
+    def block(self) -> Words:
+        """Return it as a line where something is published, and as ``study.json`` holds it."""
         shown = self.comparison
-        return {
-            "what": self.what,
-            "unit": self.unit,
-            "ours": list(self.values),
-            "median": self.median,
-            "lowest": self.lowest,
-            "highest": self.highest,
-            "published": None if shown is None else shown.value,
-            "printed": self.published,
-            "source": self.source,
-            "claim": None if shown is None else self.claim,
-            "tolerance": None if shown is None else shown.tolerance,
-            "verdict": self.verdict or SILENT,
-            "explanation": self.explanation,
-        }
+        line = ""
+        if shown is not None:
+            within = "" if shown.tolerance is None else f", within {shown.tolerance:.2g}"
+            line = f"  {self.verdict:16}{self.what}: {self.median:.3g}, published {self.published} {self.unit}".rstrip()
+            line += within
+        return detail(
+            line,
+            what=self.what,
+            unit=self.unit,
+            ours=list(self.values),
+            median=self.median,
+            lowest=self.lowest,
+            highest=self.highest,
+            published=None if shown is None else shown.value,
+            printed=self.published,
+            source=self.source,
+            claim=None if shown is None else self.claim,
+            tolerance=None if shown is None else shown.tolerance,
+            verdict=self.verdict or SILENT,
+            explanation=self.explanation,
+        )
 
 
 @dataclass(frozen=True)
@@ -104,6 +110,11 @@ class Table:
     def compares(self) -> bool:
         """Whether the document prints any of it."""
         return any(row.published is not None for row in self.rows)
+
+    def blocks(self) -> Iterator[Block]:
+        """Give its heading, and its rows."""
+        yield detail(f"{self.title}:" if self.compares else "", title=self.title, words=self.words)
+        yield each("rows", (row.block() for row in self.rows))
 
 
 @dataclass(frozen=True)
@@ -153,33 +164,14 @@ class Study(Record):
         found = [row.verdict for row in self.rows]
         return {verdict: found.count(verdict) for verdict in VERDICTS}
 
-    def summary(self) -> dict[str, Any]:
-        """Return what ``study.json`` holds."""
-        return {
-            "truearm": "truearm-study/2",
-            "name": self.name,
-            "title": self.title,
-            "source": self.source,
-            "answer": self.answer,
-            "seeds": self.seeds,
-            "counts": self.counts,
-            "tables": [
-                {"title": table.title, "words": table.words, "rows": [row.summary() for row in table.rows]}
-                for table in self.tables
-            ],
-            "pictures": {picture.name: picture.figure for picture in self.pictures},
-            "notes": list(self.notes),
-        }
-
-    def lines(self) -> list[str]:
-        """Return the title, every figure that has a published one beside it, and how many have which verdict."""
-        text = [self.title]
-        for table in self.tables:
-            if table.compares:
-                text.append(f"{table.title}:")
-            text += [line for row in table.rows if (line := _line(row))]
+    def blocks(self) -> Iterator[Block]:
+        """Give every figure that has a published one beside it, and how many have which verdict."""
+        yield say(self.title, truearm="truearm-study/2", name=self.name, title=self.title, source=self.source)
+        yield say(answer=self.answer, seeds=self.seeds, notes=list(self.notes))
+        yield each("tables", (table.blocks() for table in self.tables))
         counted = ", ".join(f"{verdict} {count}" for verdict, count in self.counts.items())
-        return [*text, f"Verdicts: {counted}."]
+        yield say(f"Verdicts: {counted}.", counts=self.counts)
+        yield say(pictures={picture.name: picture.figure for picture in self.pictures})
 
     def html(self) -> str:
         """Return the report as one HTML page."""
@@ -199,15 +191,6 @@ class Study(Record):
         files = {**dict(zip(STUDY_FILES, (self.html(), text), strict=True)), **self.files}
         write_files(folder, files, self.command or None)
         return tuple(folder / name for name in files)
-
-
-def _line(row: Row) -> str:
-    """Return a row as one line; empty where nothing is published."""
-    if row.comparison is None:
-        return ""
-    allowed = row.comparison.tolerance
-    within = "" if allowed is None else f", within {allowed:.2g}"
-    return f"  {row.verdict:16}{row.what}: {row.median:.3g}, published {row.published} {row.unit}".rstrip() + within
 
 
 def number(value: float) -> str:

@@ -170,7 +170,7 @@ def _joint_error(p: Parameter, words: str) -> Words:
     value, low, high = (from_si(v, unit) for v in (p.value, p.value - half, p.value + half))
     line = f"  {words:<24} {value:9.4f} {unit:<4} {low:9.4f} to {high:.4f}"
     held = {"value": value, "deviation": from_si(p.deviation or 0.0, unit), "interval": [low, high], "is": words}
-    return detail(line, name=p.name, unit=unit, **held)
+    return say(line, name=p.name, unit=unit, **held)
 
 
 def _circle(measured: AxisCircle) -> Words:

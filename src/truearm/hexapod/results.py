@@ -137,6 +137,7 @@ class HexapodSolution(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give the cups of each pose, and how well the tool changer repeats them, in mm."""
+        yield say(f"{counted(len(self.poses), 'pose')} solved." if len(self.poses) > 1 else "")
         yield each("poses", (pose.block(among=self.poses) for pose in self.poses))
         missing = [f"Left out, not all legs measured: {', '.join(self.left_out)}"] if self.left_out else []
         yield say(*missing, left_out=list(self.left_out))

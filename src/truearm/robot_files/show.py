@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
@@ -41,6 +41,7 @@ class RobotList(Record):
     """The robots of the library."""
 
     robots: tuple[Robot, ...]  #: In the order of their ids.
+    is_list: ClassVar = True
 
     def blocks(self) -> Iterator[Block]:
         """Give one line a robot, below what its columns are."""
@@ -214,6 +215,7 @@ class RobotDescription(Record):
 
     robot: Robot  #: The robot.
     at: ShownPose | None = None  #: Where it stands, if joint positions were given.
+    is_list: ClassVar = True
 
     def blocks(self) -> Iterator[Block]:
         """Give its joints, its reach at zero, and what else is known about it, lengths in mm and angles in deg."""

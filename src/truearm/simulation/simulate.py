@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -74,6 +74,7 @@ class DeviceList(Record):
     """The instruments that can be simulated and planned for."""
 
     devices: tuple[Device, ...]  #: In the order of the registry.
+    is_list: ClassVar = True
 
     def as_json(self) -> Any:
         """Return the rows alone."""

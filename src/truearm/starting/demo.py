@@ -21,7 +21,7 @@ from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.base.writing import write_files
 from truearm.engine.command.arguments import folder_for
 from truearm.engine.data.readers.canonical import csv_text
-from truearm.engine.document.document import Block, say, under
+from truearm.engine.document.document import Block, detail, say, under
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import Status
 from truearm.engine.programs.gauge import best_agreement
@@ -60,8 +60,11 @@ class Demonstration(Record):
             yield say(correction=None)
         else:
             yield under("correction", self.correction.everything())
-            yield say(f"The corrected program is in {self.corrected_folder}, with a report of its own, {REPORT}.")
-        yield say(f"The report is {self.folder / 'report.html'}; open it in a browser.")
+            yield detail(f"The corrected program is in {self.corrected_folder}, with a report of its own, {REPORT}.")
+
+    def written_at(self, out: str) -> str:
+        """Return the line that says where the report is."""
+        return f"The report is {Path(out) / 'report.html'}; open it in a browser."
 
 
 #: The program that is corrected, and where its work object is in the controller's base: the numbers it has itself.

@@ -229,17 +229,18 @@ class LineTest(Record):
     #: Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     joints_are: JointsOf = "model"
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
-    out: Path | None = None  #: The file that holds the joint positions; None if none was written.
 
     def blocks(self) -> Iterator[Block]:
         """Give the errors of each line of poses, in mm."""
         reached = f"The robot can go to all {len(self.poses.labels)} poses."
         yield say(reached if self.before is None else "", poses=len(self.poses.labels))
         yield each("lines", (self._line(direction, self.before) for direction in DIRECTIONS if self.before))
-        if self.out is not None:
-            said = "compensated" if self.compensated else "nominal"
-            shown = " as the controller shows them (axis_i)" if self.joints_are == "controller" else ""
-            yield say(f"{self.out}: {len(self.joints)} configurations, {said} joint positions{shown}.")
+
+    def written_at(self, out: str) -> str:
+        """Return the line that says which file holds the joint positions."""
+        said = "compensated" if self.compensated else "nominal"
+        shown = " as the controller shows them (axis_i)" if self.joints_are == "controller" else ""
+        return f"{out}: {len(self.joints)} configurations, {said} joint positions{shown}."
 
     def _line(self, direction: str, before: LineErrors) -> Words:
         figures = before.figures(direction)
@@ -293,7 +294,7 @@ def tested(asked: TestLines) -> LineTest:
         with refusals_of("data"):
             before = from_data(poses, _placed(nominal, errors, measured), measured)
     marks = parts_of((nominal, errors, measured)) if asked.truth is None else ("data",)
-    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are, marks, path)
+    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are, marks)
     if path is not None:
         found.save(path)
     return found

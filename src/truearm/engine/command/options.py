@@ -182,7 +182,8 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
             said = {"command": asked.as_command(), "progress": say, "tell": partial(print_line, err=as_json)}
             result = replace(asked, **{name: value for name, value in said.items() if name in own}).result()
         _show(result, as_json=as_json, details=details)
-        written = result.written_at(given["out"]) if "out" in given else ""
+        out = getattr(asked, "out", None)
+        written = "" if out is None else result.written_at(str(out))
         if written and not as_json:
             print_line(written)
         if wanted.judged and not result.finished:

@@ -118,6 +118,8 @@ def first_screen(record: Record) -> list[str]:
     grave = sum(notice.level == "error" for notice in notices)
     shown = min(len(notices), _FIRST, max(1, grave, room - len(answer)))
     text = [*mark, *answer[: room - shown], *(step.line for step in steps[:1]), *notice_lines(notices[:shown])]
+    if len(record.lines()) == len(text) + 1:  # no shorter than what counts it
+        return record.lines()
     rest = Counter[str](notice.level for notice in notices[shown:])
     rest["line"] = len(record.lines()) - len(text) - rest.total()
     more = listed([counted(count, what) for what, count in rest.items() if count])
@@ -145,7 +147,7 @@ class Imported(Record):
         many, targets = counted(data.configurations, "configuration"), list(data.targets)
         yield say(f"{many}, targets {', '.join(targets)}{where}", configurations=data.configurations, targets=targets)
         lines = (f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items())
-        yield detail(*lines, missing=dict(self.missing))
+        yield say(*lines, missing=dict(self.missing))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -79,11 +79,8 @@ def test_tolerances_of_one_depth_are_those_of_the_same_depth_each(found: AxisCal
 def test_lines_are_planned_tried_and_judged(found: AxisCalibration, tmp_path: Path) -> None:
     plan = truearm.lines("kr5", CENTRE, out=tmp_path / "plan.csv")
     assert plan.summary() == {"poses": 77, "lines": []}
-    file = tmp_path / "plan.csv"
-    assert plan.lines() == [
-        "The robot can go to all 77 poses.",
-        f"{file}: 77 configurations, nominal joint positions.",
-    ]
+    assert plan.lines() == ["The robot can go to all 77 poses."]
+    assert plan.written_at("plan.csv") == "plan.csv: 77 configurations, nominal joint positions."
     rows = (tmp_path / "plan.csv").read_text().splitlines()
     assert rows[0].startswith("configuration,joint_1 [deg],")
     assert np.radians([float(cell) for cell in rows[1].split(",")[1:]]) == pytest.approx(plan.joints[0])

@@ -204,7 +204,17 @@ def test_zones_are_for_validate_alone(cut: tuple[Path, Calibration], tmp_path: P
 def test_the_command_takes_a_number_or_a_file(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(csv_text(campaign("irb120", 60, 0.02e-3, 7)[1]))
     told = CliRunner().invoke(
-        program(), ["calibrate", "irb120", str(tmp_path / "data.csv"), "--zones", "2", "--out", str(tmp_path / "out")]
+        program(),
+        [
+            "calibrate",
+            "irb120",
+            str(tmp_path / "data.csv"),
+            "--zones",
+            "2",
+            "--details",
+            "--out",
+            str(tmp_path / "out"),
+        ],
     )
     assert told.exit_code == 0
     assert "\nZones: " in told.stdout

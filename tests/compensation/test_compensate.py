@@ -180,7 +180,7 @@ def test_what_cannot_be_corrected_is_listed_and_refused_unless_accepted(truearm:
     assert f"{program}, line 9: out of reach of the nominal robot" in said
     assert "with --keep; or accept all of them with --accept skipped." in " ".join(said.split())
     assert not (cell / "out").exists()
-    code, said = run(truearm, cell, "--accept", "skipped")
+    code, said = run(truearm, cell, "--accept", "skipped", "--details")
     assert code == 0
     assert "plate.mod, line 9: out of reach of the nominal robot" in said
     assert "44 targets: 40 corrected, 1 kept (given by joints), 3 left unchanged" in said

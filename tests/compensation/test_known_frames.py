@@ -342,7 +342,7 @@ def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
     frames_of(twin.robot, tmp_path / "frames.yaml")
     words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--hold", "base, 1", "--hold", "2"]
     words += ["--out", str(tmp_path / "out")]
-    done = CliRunner().invoke(program(), [*words, "--frames", str(tmp_path / "frames.yaml")])
+    done = CliRunner().invoke(program(), [*words, "--details", "--frames", str(tmp_path / "frames.yaml")])
     assert done.exit_code == 0, done.output
     assert "Held at known places: base, target 1, target 2" in done.output
     lacking = CliRunner().invoke(program(), words)

@@ -30,7 +30,7 @@ def test_both_stages_from_files_into_files(truearm: Truearm, campaign: Path, tmp
     assert run.code == 0, run.err
     told = json.loads(run.out)
     keys = ["status", "warnings", "inclinations", "constants", "geometry", "geometry_alone"]
-    assert list(told) == ["simulated", "simulated_parts", *keys]
+    assert {*told} == {"simulated", "simulated_parts", *keys}
     assert told["inclinations"]["pairs"] == 12
     assert told["inclinations"]["pushed"] == 16
     after, alone = (told[key]["validation"]["position_mm"]["mean"] for key in ("geometry", "geometry_alone"))
@@ -99,7 +99,7 @@ def test_inclinometers_are_planned_and_simulated(truearm: Truearm, tmp_path: Pat
     assert [row["order"] for row in rows] == [str(number) for number in range(1, 25)]
     assert rows[0]["joint_1 [deg]"] == rows[1]["joint_1 [deg]"]
     assert {abs(float(rows[0][f"force_{axis} [N]"])) for axis in "xyz"} == {0.0, 20.0}
-    run = truearm("plan", "katana450", "--poses", 8, *words, "--pull", 0)
+    run = truearm("plan", "katana450", "--poses", 8, *words, "--pull", 0, "--details")
     assert "by gravity alone" in run.out
     assert "compliance_1   stays unknown" in run.out
     made = tmp_path / "read.csv"
@@ -143,7 +143,7 @@ def test_a_pull_is_of_inclinometers_alone(truearm: Truearm, tmp_path: Path) -> N
 
 
 def test_influence_with_and_without_data(truearm: Truearm, campaign: Path, tmp_path: Path) -> None:
-    run = truearm("influence", "katana450", "--poses", 6, "--angle", 0.1, "--length", 0.2)
+    run = truearm("influence", "katana450", "--poses", 6, "--angle", 0.1, "--length", 0.2, "--details")
     assert run.code == 0, run.err
     assert "theta_offset_2 +0.1 deg" in run.out
     assert "d_5            +0.2 mm                mean 0.2000 mm" in run.out

@@ -88,7 +88,7 @@ def test_a_study_is_written_whole(tmp_path: Path) -> None:
     files = small().save(tmp_path / "new")
     assert [path.name for path in files] == ["report.html", "study.json"]
     content = json.loads(files[1].read_text())
-    assert list(content) == [
+    assert {*content} == {
         "truearm",
         "simulated",
         "simulated_parts",
@@ -101,7 +101,7 @@ def test_a_study_is_written_whole(tmp_path: Path) -> None:
         "tables",
         "pictures",
         "notes",
-    ]
+    }
     assert content["truearm"] == "truearm-study/2"
     assert content["tables"][0]["rows"][1] == {
         "what": "far",

@@ -131,7 +131,7 @@ def test_floor_room_and_home_of_the_command_line(truearm: Truearm, tmp_path: Pat
     rows = rows_of(tmp_path / "plan-ways.csv")
     assert len(rows) == ways["moves"] + 1
     assert "back in" in (tmp_path / "plan.html").read_text()
-    run = truearm(*words, "--no-floor")
+    run = truearm(*words, "--no-floor", "--details")
     assert run.code == 0
     assert "mm or more from its own links (but for up to 520 mm of the arm where two are connected)." in run.out
     assert f"Written: {out}, {out.with_suffix('.html')}, {tmp_path / 'plan-ways.csv'}" in run.out

@@ -14,7 +14,7 @@ QUICK = ("plan", "irb120", "--poses", "10", "--candidates", "60", "--clearance",
 def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = (*QUICK, "--program", "rapid", "--speed", "100,5", "--dwell", "1.5", "--wait", "input 3,60s", "--out", out)
-    run = truearm(*words)
+    run = truearm(*words, "--details")
     assert (run.code, run.err) == (0, "")
     assert "At most 100 mm/s and 5 % of the joints' speed (250, 250, 250, 320, 320, 420 deg/s); it stands" in run.out
     assert "it stands for 1.5 s, then for input 3 up to 60 s." in run.out

@@ -35,7 +35,7 @@ def test_help_lists_every_study(truearm: Truearm) -> None:
 
 
 def test_it_writes_its_files_and_compares(truearm: Truearm, quick: None, tmp_path: Path) -> None:
-    run = truearm("study", "irb120-simulation", "--seeds", "1", "--out", tmp_path / "new")
+    run = truearm("study", "irb120-simulation", "--seeds", "1", "--details", "--out", tmp_path / "new")
     assert run.code == 0
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["report.html", "study.json", MANIFEST]
     page = (tmp_path / "new" / "report.html").read_text()

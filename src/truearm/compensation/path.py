@@ -138,8 +138,7 @@ class FollowedPath(Record):
         error = self.path.errors[name] * 1e3
         mean, most = float(error.mean()), float(error.max())
         words = f"  {STAGES[name]:<{max(len(STAGES[one]) for one in self.stages)}}  mean {mean:.3f}  max {most:.3f} mm"
-        tell = say if name in ("nothing", self.path.best) else detail
-        return under(name, [tell(words, mean=mean, max=most)])
+        return under(name, [say(words, mean=mean, max=most)])
 
     def motion_csv(self) -> str:
         """Return what the controller would command: time, section, joint positions, and where the tip shall be."""

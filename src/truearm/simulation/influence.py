@@ -137,7 +137,8 @@ class InfluenceResult(Record):
         rows = self.rows()
         width = max(len(row["name"]) for row in rows)
         configurations = len(self.labels)
-        yield say(
+        tell = say if self.identified is None else detail
+        yield tell(
             f"What a change of each parameter does to {self.tip} at {counted(configurations, 'configuration')}:",
             configurations=configurations,
             tip=self.tip,
@@ -149,7 +150,7 @@ class InfluenceResult(Record):
                 f"  {row['name']:<{width}} {change:<22} mean {row['mean_mm']:.4f} mm, {row['least_mm']:.4f} to "
                 f"{row['greatest_mm']:.4f} mm; turned by {row['mean_deg']:.4f} deg"
             )
-        yield say(*lines[:_FIRST], influence=rows)
+        yield tell(*lines[:_FIRST], influence=rows)
         yield detail(*lines[_FIRST:])
         if self.identified is not None:
             yield from _worth(self.identified)

@@ -284,9 +284,8 @@ class ProgramCorrection(Record):
         shared = self.result.frames.frames != "assumed"
         yield each("programs", (file.told(shared=shared) for file in self.files))
         known = any(file.expected is not None for file in self.files)
-        yield detail(
-            *([f"  {self.relative}"] if known and self.relative else []), expected_is_relative=bool(self.relative)
-        )
+        words = f"  {self.relative}" if known and self.relative else ""
+        yield say(words, expected_is_relative=bool(self.relative))
         if known and any(file.kept.keys() & {"in `keep`", "not in `only`"} for file in self.files):
             yield detail("  Targets that stay because of `keep` or `only` are not in these errors.")
         more = "  These errors may be larger: the calibration cannot know all errors of the robot."

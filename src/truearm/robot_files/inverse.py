@@ -29,7 +29,7 @@ from truearm.engine.command.split import told_of
 from truearm.engine.command.texts import positions_of
 from truearm.engine.data.readers.configurations import read_poses
 from truearm.engine.diagnose.external_force import check_force
-from truearm.engine.document.document import Block, detail, say
+from truearm.engine.document.document import Block, say
 from truearm.engine.document.records import Record, joints_lines
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import Controller, JointsOf
@@ -153,9 +153,9 @@ class JointTable(Record):
         attention = self.attention
         for entry in attention[:_EXPLAINED]:
             name = f"{entry['pose']} ({entry['branch']})" if entry["branch"] else entry["pose"]
-            yield detail(f"  {name}: {entry['status']}. {entry['advice']}")
+            yield say(f"  {name}: {entry['status']}. {entry['advice']}")
         rest = len(attention) - _EXPLAINED
-        yield detail(f"  and {rest} more; the JSON summary lists all" if rest > 0 else "", attention=[*attention])
+        yield say(f"  and {rest} more; the JSON summary lists all" if rest > 0 else "", attention=[*attention])
         yield say(*joints_lines(self.joints_are))
 
 

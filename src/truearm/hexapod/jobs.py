@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import AlsoIntoFile, Drawn, IntoFile, JointsWritten, OfRobot
 from truearm.engine.command.kinds import File, Flag, Given, GivenFiles, Names, Number, Numbers, Text, Whole
-from truearm.engine.command.request import Request, job, option, required
+from truearm.engine.command.request import Request, as_in, job, option, required
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -61,6 +61,14 @@ class _WithTool(Request):
 
     tool: str | None = option(
         Text("NAME"), "Of the robot file.", default=None, shown="first", more="It has the three cups as its targets."
+    )
+
+
+class _OfFixture(Request):
+    """Which cups are beside the robot."""
+
+    base_sides: Sequence[float] = required(
+        _THREE, "B1-B2, B2-B3, B3-B1.", kw_only=False, word="base_sides", formerly=("base", "--base")
     )
 
 
@@ -168,8 +176,12 @@ class SolveCups(_Ranged, AlsoIntoFile):
     legs: Sequence[float] | None = option(
         Numbers("MM,..", "mm", 6), "Without a sheet: six lengths in the order of the pose's legs.", default=None
     )
-    base: Sequence[float] = option(_THREE, "B1-B2, B2-B3, B3-B1.", default=(0.3,) * 3, more="With `pose`.")
-    tool: Sequence[float] = option(_THREE, "T1-T2, T2-T3, T3-T1.", default=(0.15,) * 3, more="With `pose`.")
+    base_sides: Sequence[float] = as_in(
+        _OfFixture, "base_sides", default=(0.3,) * 3, needed=False, shown=True, more="With `pose`."
+    )
+    tool_sides: Sequence[float] = option(
+        _THREE, "T1-T2, T2-T3, T3-T1.", default=(0.15,) * 3, more="With `pose`.", formerly=("tool", "--tool")
+    )
 
     def check(self) -> None:
         """Refuse a sheet and a pose at once, or neither, and a file for what is no data."""
@@ -193,7 +205,7 @@ class SolveCups(_Ranged, AlsoIntoFile):
         return solved(self)
 
 
-class FindFixture(OfRobot, _WithTool, _Ranged):
+class FindFixture(_OfFixture, OfRobot, _WithTool, _Ranged):
     """Find the base fixture from the joint positions at its cups and the distances between them."""
 
     job = "hexapod_world_frame"
@@ -205,8 +217,9 @@ class FindFixture(OfRobot, _WithTool, _Ranged):
         kw_only=False,
         more="Or joint positions at B1, B2 and B3 [rad or m], ``(3, joints)``.",
     )
-    base: Sequence[float] = required(_THREE, "Measured distances B1-B2, B2-B3, B3-B1.", kw_only=False, word="base")
-    target: str | None = option(Text("NAME"), "Cup of the tool that touched.", default=None, shown="first")
+    cup: str | None = option(
+        Text("NAME"), "Of the tool, that touched.", default=None, shown="first", formerly=("target", "--target")
+    )
 
     def run(self) -> HexapodFrame:
         """Find it."""

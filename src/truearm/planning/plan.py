@@ -15,13 +15,15 @@ from truearm.engine.command.groups import (
     JointsWritten,
     Loaded,
     Long,
+    OfCell,
     OfRobot,
     OnFloor,
     Programmed,
     Repeatable,
+    SeenBy,
 )
 from truearm.engine.command.kinds import Choice, File, Flag, Given, Kind, Text
-from truearm.engine.command.request import job, option, required
+from truearm.engine.command.request import as_in, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
@@ -94,12 +96,6 @@ def _models() -> Collection[str]:
     return [model.name for model in MODELS]
 
 
-def _devices() -> Collection[str]:
-    from truearm.engine.twin.devices import DEVICES
-
-    return [device.name for device in DEVICES]
-
-
 class PlanPoses(
     OfRobot,
     AmongCandidates,
@@ -165,28 +161,15 @@ class PlanPoses(
         shown="everywhere",
         more="In Python lowest and highest x, y and z, ``(3, 2)``.",
     )
-    tools: str | Path | None = option(
-        File("FILE"),
-        "Where the tools of the program are.",
-        default=None,
-        shown=False,
-        more="As for :func:`truearm.compensate`.",
-    )
-    frames: str | Path | None = option(
-        File("FILE"),
-        "Where the frames of the program are.",
-        default=None,
-        shown=False,
-        more="As for :func:`truearm.compensate`.",
-    )
+    tools: str | Path | None = as_in(OfCell, "tools", default=None, shown=False)
+    frames: str | Path | None = as_in(OfCell, "frames", default=None, shown=False)
     model: str = option(
         Choice("MODEL", _models), "What will be identified, as in truearm calibrate, without auto.", default="geometric"
     )
-    device: str | None = option(
-        Choice("NAME", _devices),
-        "An instrument of 'truearm devices', or inclinometers; not with `candidates_from`.",
+    device: str | None = as_in(
+        SeenBy,
+        "device",
         default=None,
-        shown="one that reads every target everywhere",
         more="It finds configurations itself. For inclinometers there is :func:`truearm.plan_inclinometers`.",
     )
     approach: bool = option(

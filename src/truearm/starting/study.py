@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import InParts, IntoFolder, Long, Repeatable
 from truearm.engine.command.kinds import File, Text, Whole
-from truearm.engine.command.request import job, option, required
+from truearm.engine.command.request import as_in, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.document.records import Record
@@ -22,8 +22,12 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
 
     job = "study"
     refuses = "If there is no such study, or its data are missing, or it needs none."
-    name: str = required(
-        Text("NAME"), "Which study; see above.", kw_only=False, more="One of :data:`papers.STUDIES` by name."
+    study: str = required(
+        Text("NAME"),
+        "Which study; see above.",
+        kw_only=False,
+        more="One of :data:`papers.STUDIES` by name.",
+        formerly=("name",),
     )
     data: str | Path | None = option(
         File("DIR"), "Folder of measured data, for a study that needs them.", default=None, shown=False
@@ -31,10 +35,11 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
     seeds: int = option(
         Whole(low=1, counts=True), "How often to do it anew.", default=10, more="With seeds 0, 1, 2 and so on."
     )
-    workers: int = option(
-        Whole(low=1, counts=True),
-        "Processes that do the seeds.",
+    workers: int | None = as_in(
+        InParts,
+        "workers",
         default=1,
+        shown=True,
         more="One is this process itself. The figures do not depend on it.",
     )
 

@@ -11,8 +11,9 @@ import inspect
 import shlex
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
-from dataclasses import Field, dataclass, field, fields
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from typing import Any, ClassVar, Final, ParamSpec, Protocol, TypeVar, dataclass_transform
 
 from truearm.engine.command.kinds import ByFlags, Kind
@@ -38,6 +39,7 @@ class Option:
     is_argument: bool  #: Whether it is an argument of the command, and no option.
     repeated: bool  #: Whether it belongs to how a result was made, so that it is said again with the command.
     panel: str | None = None  #: Heading under which the help shows it.
+    formerly: tuple[str, ...] = ()  #: Older names, and older words with --, which still work.
 
     @property
     def in_command(self) -> bool:
@@ -59,6 +61,7 @@ def option(
     kw_only: bool = True,
     is_argument: bool = False,
     panel: str | None = None,
+    formerly: tuple[str, ...] = (),
 ) -> Any:
     """Declare an option with a default; arguments as in :class:`Option`.
 
@@ -66,7 +69,7 @@ def option(
         kw_only: Whether Python takes it by its name alone; the command has another as an argument if it has no word.
     """
     argument = is_argument or (not kw_only and word is None)
-    made = Option(kind, help, metavar, word, shown, more, needed, argument, repeated, panel)
+    made = Option(kind, help, metavar, word, shown, more, needed, argument, repeated, panel, formerly)
     return field(default=default, kw_only=kw_only, metadata={"option": made})
 
 
@@ -79,17 +82,24 @@ def required(
     word: str | None = None,
     more: str = "",
     repeated: bool = True,
+    formerly: tuple[str, ...] = (),
 ) -> Any:
     """Declare what a job needs: the command has it as an argument, or as an option if it has a word.
 
     Args:
         kw_only: Whether Python takes it by its name alone.
     """
-    made = Option(kind, help, metavar, word, False, more, needed=True, is_argument=not word, repeated=repeated)
+    made = Option(kind, help, metavar, word, False, more, True, not word, repeated, formerly=formerly)
     return field(kw_only=kw_only, metadata={"option": made})
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option, required))
+def as_in(group: type[Request], name: str, *, default: Any = MISSING, kw_only: bool = True, **other: Any) -> Any:
+    """Declare an option as a group does, but with another default, or needed, or otherwise shown."""
+    made = replace(group.__dataclass_fields__[name].metadata["option"], **other)
+    return field(default=default, kw_only=kw_only, metadata={"option": made})
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option, required, as_in))
 class Request:
     """What a job is asked for; the method ``run`` of a subclass does it, and its docstring is that of the job."""
 
@@ -136,6 +146,16 @@ class Request:
     def default(cls, name: str) -> Any:
         """Return the default of an option."""
         return cls.__dataclass_fields__[name].default
+
+    @classmethod
+    def renamed(cls, named: Mapping[str, Any]) -> dict[str, Any]:
+        """Return arguments of the job by the names of today, and warn of older ones."""
+        today = {old: name for name, one in cls.options() for old in one.formerly}
+        for old in [name for name in named if name in today]:
+            warnings.warn(f"`{old}` of {cls.job} is `{today[old]}` now.", DeprecationWarning, stacklevel=3)
+            if today[old] in named:
+                raise TypeError(f"{cls.job}() got both {today[old]} and {old}, its older name")
+        return {today.get(name, name): value for name, value in named.items()}
 
     @classmethod
     def command_words(cls) -> str:
@@ -209,7 +229,7 @@ def job(request: Callable[P, Runs[R]]) -> Callable[P, R]:
     made: Any = request
 
     def run(*given: P.args, **named: P.kwargs) -> R:
-        return request(*given, **named).run()
+        return request(*given, **made.renamed(named)).run()
 
     frame = sys._getframe(1)
     run.__name__ = run.__qualname__ = made.job

@@ -38,12 +38,12 @@ def data() -> Dataset:
 
 @pytest.fixture(scope="module")
 def found(data: Dataset) -> AxisCalibration:
-    return truearm.axes("kr5", data, frame="robot")
+    return truearm.axes("kr5", data, measurement_frame="robot")
 
 
 def test_axes_are_the_same_from_objects_and_from_files(found: AxisCalibration, data: Dataset, tmp_path: Path) -> None:
     (tmp_path / "axes.csv").write_text(csv_text(data))
-    read = truearm.axes("kr5", tmp_path / "axes.csv", frame="robot", out=tmp_path / "out")
+    read = truearm.axes("kr5", tmp_path / "axes.csv", measurement_frame="robot", out=tmp_path / "out")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         "axes.json",
         "calibrated.yaml",

@@ -25,7 +25,7 @@ class Axes(OfData, IntoFolder, Long):
         Choice(known=("instrument", "robot")),
         "What the data are given in: the instrument's frame, or the robot's base frame, set up before.",
         default="instrument",
-        formerly=("frame", "--frame"),
+        formerly="frame",
     )
 
     def run(self) -> AxisCalibration:

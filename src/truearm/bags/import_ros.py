@@ -71,7 +71,7 @@ class ImportRos(JointsGiven, IntoFile, Repeatable, Long):
         _JointNames("NAME,NAME,...", "names of joints", repeated=False),
         "The robot's joints from base to flange, as the messages call them.",
         default=None,
-        formerly=("--joints",),
+        formerly="joints",
         shown="by the numbers at their ends",
     )
     prismatic: Sequence[str] = option(
@@ -86,7 +86,7 @@ class ImportRos(JointsGiven, IntoFile, Repeatable, Long):
         default=math.radians(0.02),
     )
     shortest_dwell: float = option(
-        Number("s", low=0.05, high=3600.0), "The shortest standstill.", default=1.0, formerly=("hold", "--hold")
+        Number("s", low=0.05, high=3600.0), "The shortest standstill.", default=1.0, formerly="hold"
     )
     settle: float = option(
         Number("s", low=0.0), "What is left out at the beginning and end of a standstill.", default=0.3

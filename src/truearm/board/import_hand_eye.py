@@ -69,7 +69,7 @@ class ImportHandEye(IntoFile):
         "How far before the camera the target is; that of the first session for every later one.",
         default=None,
         shown="where the board was on average",
-        formerly=("ahead", "--ahead"),
+        formerly="ahead",
     )
 
     def check(self) -> None:

@@ -28,10 +28,9 @@ class Check(SeenBy, Excluding, Long):
         default=None,
         kw_only=False,
         metavar="[ROBOT]",
-        needed=False,
         more="It may be left out: ``check(data)``, or None.",
     )
-    data: Dataset | str | Path | None = as_in(Measured, "data", default=None, kw_only=False, needed=False)
+    data: Dataset | str | Path | None = as_in(Measured, "data", default=None, kw_only=False)
 
     def run(self) -> DataCheck:
         """Check."""

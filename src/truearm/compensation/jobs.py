@@ -206,13 +206,13 @@ class FollowPath(OfRobot, Near, Loaded, Forced, OfController, Accepting, JointsW
         "A language to write the corrected path in: rapid, krl, fanuc-ls, urscript, inform, val3 or all.",
         default=(),
         word="program",
-        formerly=("programs",),
+        formerly="programs",
     )
     move_to: TargetKind = option(
         Choice(known=("joints", "poses")),
         "What programs move to: joint positions, or straight to poses.",
         default="joints",
-        formerly=("targets", "--targets"),
+        formerly="targets",
     )
     spacing: float = option(
         Number("s", low=0.0, above=True),

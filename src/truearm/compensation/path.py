@@ -273,7 +273,7 @@ def _followed(asked: FollowPath, arm: Robot, joints_are: JointsOf) -> CorrectedP
     near = None
     if asked.seed_joints is not None:
         seed = positions_of(asked.seed_joints, arm, joints_are, "seed_joints")
-        near = array_argument(seed, "seed", (len(arm.joints),), f"{len(arm.joints)} numbers, one for each joint")
+        near = array_argument(seed, "seed_joints", (len(arm.joints),), f"{len(arm.joints)} numbers, one for each joint")
     with refusals_of("file"):
         return correct_path(arm, read_path(path_argument(asked.file, "file")), near)
 

@@ -64,14 +64,6 @@ class _WithTool(Request):
     )
 
 
-class _OfFixture(Request):
-    """Which cups are beside the robot."""
-
-    base_sides: Sequence[float] = required(
-        _THREE, "B1-B2, B2-B3, B3-B1.", kw_only=False, word="base_sides", formerly=("base", "--base")
-    )
-
-
 class _Ranged(Request):
     """How far the ballbar reads."""
 
@@ -176,11 +168,11 @@ class SolveCups(_Ranged, AlsoIntoFile):
     legs: Sequence[float] | None = option(
         Numbers("MM,..", "mm", 6), "Without a sheet: six lengths in the order of the pose's legs.", default=None
     )
-    base_sides: Sequence[float] = as_in(
-        _OfFixture, "base_sides", default=(0.3,) * 3, needed=False, shown=True, more="With `pose`."
+    base_sides: Sequence[float] = option(
+        _THREE, "B1-B2, B2-B3, B3-B1.", default=(0.3,) * 3, more="With `pose`.", formerly="base"
     )
     tool_sides: Sequence[float] = option(
-        _THREE, "T1-T2, T2-T3, T3-T1.", default=(0.15,) * 3, more="With `pose`.", formerly=("tool", "--tool")
+        _THREE, "T1-T2, T2-T3, T3-T1.", default=(0.15,) * 3, more="With `pose`.", formerly="tool"
     )
 
     def check(self) -> None:
@@ -205,7 +197,7 @@ class SolveCups(_Ranged, AlsoIntoFile):
         return solved(self)
 
 
-class FindFixture(_OfFixture, OfRobot, _WithTool, _Ranged):
+class FindFixture(OfRobot, _WithTool, _Ranged):
     """Find the base fixture from the joint positions at its cups and the distances between them."""
 
     job = "hexapod_world_frame"
@@ -217,9 +209,10 @@ class FindFixture(_OfFixture, OfRobot, _WithTool, _Ranged):
         kw_only=False,
         more="Or joint positions at B1, B2 and B3 [rad or m], ``(3, joints)``.",
     )
-    cup: str | None = option(
-        Text("NAME"), "Of the tool, that touched.", default=None, shown="first", formerly=("target", "--target")
+    base_sides: Sequence[float] = as_in(
+        SolveCups, "base_sides", kw_only=False, word="base_sides", shown=False, more="They were measured."
     )
+    cup: str | None = option(Text("NAME"), "Of the tool, that touched.", default=None, shown="first", formerly="target")
 
     def run(self) -> HexapodFrame:
         """Find it."""

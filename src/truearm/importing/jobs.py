@@ -75,7 +75,7 @@ class ImportTable(ByMapping, _OfTable, JointsGiven, IntoFile):
         "File with the joint positions, one configuration a row.",
         default=None,
         shown="as the mapping says",
-        formerly=("joints", "--joints"),
+        formerly="joints",
     )
 
     def run(self) -> Imported:
@@ -114,7 +114,6 @@ class ImportMatrices(JointsGiven, IntoFile):
         "joints_file",
         kw_only=False,
         word="joints_file",
-        needed=True,
         shown=False,
         more="One column a joint; all joints are revolute.",
     )
@@ -157,9 +156,7 @@ class ImportRoboDK(JointsGiven, IntoFile):
     words = "import robodk"
     refuses = "If the file cannot be used; the message names the line and the column."
     file: str | Path = required(File("FILE"), "Calibration or validation measurements, as exported.", kw_only=False)
-    angle_unit: AngleUnit | None = as_in(
-        ImportMatrices, "angle_unit", default=None, needed=False, more="Only poses are measured with some."
-    )
+    angle_unit: AngleUnit | None = as_in(ImportMatrices, "angle_unit", default=None, more="Of measured poses.")
     delimiter: Delimiter = option(
         Choice(known=("comma", "semicolon", "tab")), "What stands between columns.", default="comma"
     )

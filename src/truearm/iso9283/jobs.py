@@ -161,7 +161,6 @@ class SimulateTests(OfRobot, Instrument, Drawn, IntoFolder, Repeatable, Long):
         OfTruth,
         "truth",
         default="random",
-        needed=False,
         shown=True,
         more="Robots that are exchanged are drawn in the same way; where the truth is not drawn, by the priors of "
         "geometry and joint zeros about it.",

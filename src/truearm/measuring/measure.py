@@ -111,16 +111,9 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
     )
     out: str | Path = required(File("DIR"), "Folder for log, measurements and report.", kw_only=True, word="out")
     device: str | None = as_in(
-        SeenBy,
-        "device",
-        default=None,
-        panel=_VIRTUAL,
-        shown=False,
-        more="It reads where targets are. A plan of which it can read nothing is refused.",
+        SeenBy, "device", default=None, panel=_VIRTUAL, shown=False, more="A plan that shows it nothing is refused."
     )
-    truth: Robot | str | Path | None = as_in(
-        OfTruth, "truth", default=None, needed=False, shown="random", panel=_VIRTUAL
-    )
+    truth: Robot | str | Path | None = as_in(OfTruth, "truth", default=None, shown="random", panel=_VIRTUAL)
     noise: float | None = as_in(Instrument, "noise", default=None, shown="the deviation of the device", panel=_VIRTUAL)
     seed: int | None = as_in(Drawn, "seed", default=None, shown="0", panel=_VIRTUAL)
     disturbed: float | None = option(
@@ -147,7 +140,6 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
         ByMapping,
         "mapping",
         default=None,
-        needed=False,
         panel=_REAL,
         more="As for :func:`truearm.import_table`; the joint positions are the plan's, so that the entry ``joints`` "
         "may be left out.",
@@ -221,7 +213,7 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
         "End after so long without a reading.",
         default=None,
         shown="never",
-        formerly=("wait", "--wait"),
+        formerly="wait",
         more="None waits until all is measured, or Ctrl-C.",
     )
     tell: Callable[[str], None] = option(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -16,6 +16,7 @@ from truearm.engine.command.groups import (
     Loaded,
     Long,
     OfCell,
+    OfModel,
     OfRobot,
     OnFloor,
     Programmed,
@@ -90,14 +91,10 @@ class _Speed(Given):
         return [",".join(f"{one:g}" for one in (written(speed, "mm"), *(share * 100.0 for share in shares)))]
 
 
-def _models() -> Collection[str]:
-    from truearm.engine.fit.models import MODELS
-
-    return [model.name for model in MODELS]
-
-
 class PlanPoses(
     OfRobot,
+    OfModel,
+    SeenBy,
     AmongCandidates,
     Drawn,
     Loaded,
@@ -113,7 +110,8 @@ class PlanPoses(
 
     Without a device every target on the robot's tool is measured at each of them. Writes a CSV file, its page, the
     ways between and a sheet for the operator; with `program` a folder with these and a program that drives the plan.
-    The robot may be calibrated: derivatives are taken at its parameter values.
+    The robot may be calibrated: derivatives are taken at its parameter values. A device finds configurations itself.
+    Inclinometers are a device of the command alone; in Python there is truearm.plan_inclinometers.
     """
 
     job = "plan"
@@ -163,15 +161,6 @@ class PlanPoses(
     )
     tools: str | Path | None = as_in(OfCell, "tools", default=None, shown=False)
     frames: str | Path | None = as_in(OfCell, "frames", default=None, shown=False)
-    model: str = option(
-        Choice("MODEL", _models), "What will be identified, as in truearm calibrate, without auto.", default="geometric"
-    )
-    device: str | None = as_in(
-        SeenBy,
-        "device",
-        default=None,
-        more="It finds configurations itself. For inclinometers there is :func:`truearm.plan_inclinometers`.",
-    )
     approach: bool = option(
         Flag(), "Every joint comes to each configuration from one side, by a stop before it.", default=False
     )

@@ -85,7 +85,7 @@ class PosesOfSet(OfRobot, InBox, InCube, AtTip, Drawn, JointsWritten, Repeatable
         "Of the tip in the base frame.",
         default="free",
         more="``down``: its z axis against that of the base, its x axis along the base's.",
-        formerly=("orientation", "--orientation"),
+        formerly="orientation",
     )
 
     def check(self) -> None:

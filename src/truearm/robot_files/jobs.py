@@ -113,13 +113,10 @@ class ShowRobot(OfRobot):
         default=None,
         shown=False,
         more="That is a text; numbers, ``(joints,)``, are in rad, and in m for prismatic joints.",
-        formerly=("joints", "--joints"),
+        formerly="joints",
     )
     joints_are: JointsOf | None = as_in(
-        JointsGiven,
-        "joints_are",
-        default=None,
-        shown="the controller's where the robot file says that they differ",
+        JointsGiven, "joints_are", default=None, shown="the controller's where the robot file says that they differ"
     )
 
     def run(self) -> RobotDescription:
@@ -237,7 +234,7 @@ class ImportUrKinematics(IntoNewFile):
         File("FILE"), "calibration.conf of the controller, or the ROS driver's file.", kw_only=False
     )
     robot: Robot | str | Path = as_in(
-        OfRobot, "robot", kw_only=False, word="robot", is_argument=False, more="It is the arm's type, such as ur5e."
+        OfRobot, "robot", kw_only=False, word="robot", more="It is the arm's type, such as ur5e."
     )
 
     def run(self) -> ImportedKinematics:

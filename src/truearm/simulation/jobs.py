@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from truearm.engine.command.groups import (
     Loaded,
     Long,
     Measured,
+    OfModel,
     OfRobot,
     OfTruth,
     Repeatable,
@@ -32,12 +32,6 @@ if TYPE_CHECKING:
     from truearm.simulation.influence import Frames, InfluenceResult
     from truearm.simulation.influences import Combination
     from truearm.simulation.simulate import DeviceList, Simulation
-
-
-def _models() -> Collection[str]:
-    from truearm.engine.fit.models import MODELS
-
-    return [model.name for model in MODELS]
 
 
 class Simulate(OfTruth, OfRobot, SeenBy, Drawn, Loaded, ForcedAt, IntoFile, Long):
@@ -92,7 +86,7 @@ class ListDevices(Request):
         return DeviceList(DEVICES)
 
 
-class FindInfluence(OfRobot, Split, Loaded, AlsoIntoFolder, Repeatable, Long):
+class FindInfluence(OfRobot, OfModel, Split, Loaded, AlsoIntoFolder, Repeatable, Long):
     """Change one parameter after the other and see what the tip does; with `data`, identify by that.
 
     With readings the configurations are theirs, and the parameters are identified pose by pose by minimum norm and by
@@ -101,14 +95,7 @@ class FindInfluence(OfRobot, Split, Loaded, AlsoIntoFolder, Repeatable, Long):
     """
 
     job = "influence"
-    data: Dataset | str | Path | None = as_in(
-        Measured, "data", default=None, kw_only=False, metavar="[DATA.csv]", needed=False
-    )
-    model: str = option(
-        Choice("MODEL", _models),
-        "Whose parameters are changed, as in 'truearm calibrate', without auto.",
-        default="geometric",
-    )
+    data: Dataset | str | Path | None = as_in(Measured, "data", default=None, kw_only=False, metavar="[DATA.csv]")
     target: str | None = as_in(
         AtTarget, "target", default=None, shown="the first of the data or the robot, or the flange"
     )
@@ -132,7 +119,7 @@ class FindInfluence(OfRobot, Split, Loaded, AlsoIntoFolder, Repeatable, Long):
         Choice(known=("placed", "robot")),
         "Where base and targets are: fitted with the nominal robot, or as its file says.",
         default="placed",
-        formerly=("frames", "--frames"),
+        formerly="frames",
         more="Where they were fitted they are held, except that the whole calibration finds them anew.",
     )
     combination: Combination = option(

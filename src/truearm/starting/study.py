@@ -27,7 +27,7 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
         "Which study; see above.",
         kw_only=False,
         more="One of :data:`papers.STUDIES` by name.",
-        formerly=("name",),
+        formerly="name",
     )
     data: str | Path | None = option(
         File("DIR"), "Folder of measured data, for a study that needs them.", default=None, shown=False
@@ -36,11 +36,7 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
         Whole(low=1, counts=True), "How often to do it anew.", default=10, more="With seeds 0, 1, 2 and so on."
     )
     workers: int | None = as_in(
-        InParts,
-        "workers",
-        default=1,
-        shown=True,
-        more="One is this process itself. The figures do not depend on it.",
+        InParts, "workers", default=1, shown=True, more="One is this process itself. The figures do not depend on it."
     )
 
     def check(self) -> None:

@@ -115,7 +115,7 @@ class JudgeSphere(OfData, Loaded, AlsoIntoFile, Repeatable):
         "Configuration at which the target was brought to the ball.",
         default=None,
         shown="the centre that fits best",
-        formerly=("taught", "--taught"),
+        formerly="taught",
         more="The centre is where a model says that it was then, so that errors in teaching count; this configuration "
         "is not judged itself.",
     )
@@ -138,26 +138,19 @@ class TestLines(OfRobot, Drawn, JointsWritten, AlsoIntoFile):
     refuses = (
         "If the robot cannot go to a pose, joint errors or data are of another robot, or both truth and data are given."
     )
-    centre: Sequence[float] = as_in(InBox, "centre", kw_only=False, word="centre", needed=True, shown=False)
+    centre: Sequence[float] = as_in(InBox, "centre", kw_only=False, word="centre", shown=False)
     size: Sequence[float] = option(Numbers("X,Y,Z", "mm", 3), "Of the box.", default=(0.6, 0.8, 0.4))
     joint_errors: Robot | str | Path | None = option(
         Given("FILE"),
         "joint-errors.yaml to compensate with.",
         default=None,
-        formerly=("--model",),
+        formerly="model",
         shown=False,
         more="The same robot with joint errors, or its file, as :func:`truearm.axes` writes it.",
     )
-    truth: Robot | str | Path | None = as_in(
-        OfTruth, "truth", default=None, needed=False, more="A twin of it is compensated."
-    )
+    truth: Robot | str | Path | None = as_in(OfTruth, "truth", default=None, more="A twin of it is compensated.")
     data: Dataset | str | Path | None = as_in(
-        Measured,
-        "data",
-        default=None,
-        needed=False,
-        is_argument=False,
-        more="Configurations are named x-1 to xyz-11.",
+        Measured, "data", default=None, more="Configurations are named x-1 to xyz-11."
     )
     noise: float = as_in(Instrument, "noise", default=0.0)
     repeats: int = option(Whole(low=1, counts=True), "Repetitions on the twin.", default=30)

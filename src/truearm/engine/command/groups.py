@@ -62,6 +62,20 @@ def _languages() -> list[str]:
     return [*PROGRAM_LANGUAGES]
 
 
+def _models() -> list[str]:
+    from truearm.engine.fit.models import MODELS
+
+    return [model.name for model in MODELS]
+
+
+class OfModel(Request):
+    """Which parameters."""
+
+    model: str = option(
+        Choice("MODEL", _models), "Whose parameters count, as in 'truearm calibrate'; no auto.", default="geometric"
+    )
+
+
 class OfRobot(Request):
     """Which robot."""
 
@@ -176,7 +190,7 @@ class Near(Request):
         Positions("DEG,DEG,.."),
         "Joint positions to stay near to (mm if sliding), of the kind that is written.",
         default=None,
-        formerly=("seed",),
+        formerly="seed",
         shown="zeros",
         more="That is a text; numbers are positions of the model, ``(joints,)`` or one row a pose [rad; m for "
         "prismatic joints].",
@@ -195,9 +209,7 @@ class InCube(Request):
         Choice(known=("+x", "-x", "+y", "-y")), "Where the largest cube is searched.", default="+x"
     )
     nearest: float = option(Number("mm"), "How far ahead the largest cube begins.", default=0.0)
-    lowest: float = option(
-        Number("mm"), "How high the largest cube begins.", default=0.0, formerly=("floor", "--floor")
-    )
+    lowest: float = option(Number("mm"), "How high the largest cube begins.", default=0.0, formerly="floor")
 
 
 class Instrument(Request):
@@ -470,7 +482,7 @@ class OfCell(Request):
         default=None,
         shown="best with nominal",
         more="See :mod:`truearm.engine.programs.cell`.",
-        formerly=("--tool",),
+        formerly="tool",
     )
     frames: str | Path | None = option(
         File("FILE"),
@@ -478,7 +490,7 @@ class OfCell(Request):
         default=None,
         shown="no shift on average",
         more="See :mod:`truearm.engine.programs.cell`.",
-        formerly=("--frame",),
+        formerly="frame",
     )
 
 
@@ -546,13 +558,15 @@ class IntoFile(Request):
 class AlsoIntoFile(Request):
     """What writes a file where one is asked for."""
 
-    out: str | Path | None = as_in(IntoFile, "out", default=None, needed=False)
+    out: str | Path | None = as_in(IntoFile, "out", default=None)
 
 
 class IntoNewFile(Request):
     """What writes a file that does not exist yet."""
 
-    out: str | Path | None = as_in(IntoFile, "out", default=None, help="File to write; nothing is overwritten.")
+    out: str | Path | None = as_in(
+        IntoFile, "out", default=None, needed=True, help="File to write; nothing is overwritten."
+    )
 
 
 class IntoFolder(Request):
@@ -566,4 +580,4 @@ class IntoFolder(Request):
 class AlsoIntoFolder(Request):
     """What writes files into a folder where one is asked for."""
 
-    out: str | Path | None = as_in(IntoFolder, "out", default=None, needed=False)
+    out: str | Path | None = as_in(IntoFolder, "out", default=None)

@@ -43,8 +43,6 @@ class LoadData(Measured):
         more="The one that was measured: joint positions that its controller shows become its model's.",
         kw_only=False,
         word="",
-        needed=False,
-        is_argument=False,
     )
 
     def run(self) -> Dataset:

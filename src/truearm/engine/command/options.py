@@ -211,7 +211,7 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
     run.__annotations__ = {one.name: one.annotation for one in every}
     run.__doc__ = spelled_by(inspect.cleandoc(request.__doc__ or ""), declared)
     run.__name__ = request.job
-    words = {old: flag_of(name, one) for name, one in declared.items() for old in one.formerly if old[0] == "-"}
+    words = {f"--{one.formerly}": flag_of(name, one) for name, one in declared.items() if one.formerly}
     run.today = words  # type: ignore[attr-defined]
     return run
 

@@ -39,7 +39,7 @@ class Option:
     is_argument: bool  #: Whether it is an argument of the command, and no option.
     repeated: bool  #: Whether it belongs to how a result was made, so that it is said again with the command.
     panel: str | None = None  #: Heading under which the help shows it.
-    formerly: tuple[str, ...] = ()  #: Older names, and older words with --, which still work.
+    formerly: str = ""  #: An older name, which still works in Python and as a word of the command.
 
     @property
     def in_command(self) -> bool:
@@ -61,7 +61,7 @@ def option(
     kw_only: bool = True,
     is_argument: bool = False,
     panel: str | None = None,
-    formerly: tuple[str, ...] = (),
+    formerly: str = "",
 ) -> Any:
     """Declare an option with a default; arguments as in :class:`Option`.
 
@@ -82,7 +82,7 @@ def required(
     word: str | None = None,
     more: str = "",
     repeated: bool = True,
-    formerly: tuple[str, ...] = (),
+    formerly: str = "",
 ) -> Any:
     """Declare what a job needs: the command has it as an argument, or as an option if it has a word.
 
@@ -94,9 +94,10 @@ def required(
 
 
 def as_in(group: type[Request], name: str, *, default: Any = MISSING, kw_only: bool = True, **other: Any) -> Any:
-    """Declare an option as a group does, but with another default, or needed, or otherwise shown."""
-    made = replace(group.__dataclass_fields__[name].metadata["option"], **other)
-    return field(default=default, kw_only=kw_only, metadata={"option": made})
+    """Declare an option as a group does, but with another default or none, or otherwise shown."""
+    made: Option = replace(group.__dataclass_fields__[name].metadata["option"], needed=default is MISSING)
+    made = replace(made, is_argument=not kw_only and other.get("word", made.word) is None)
+    return field(default=default, kw_only=kw_only, metadata={"option": replace(made, **other)})
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option, required, as_in))
@@ -150,7 +151,7 @@ class Request:
     @classmethod
     def renamed(cls, named: Mapping[str, Any]) -> dict[str, Any]:
         """Return arguments of the job by the names of today, and warn of older ones."""
-        today = {old: name for name, one in cls.options() for old in one.formerly}
+        today = {one.formerly: name for name, one in cls.options() if one.formerly}
         for old in [name for name in named if name in today]:
             warnings.warn(f"`{old}` of {cls.job} is `{today[old]}` now.", DeprecationWarning, stacklevel=3)
             if today[old] in named:

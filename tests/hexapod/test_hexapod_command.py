@@ -213,7 +213,7 @@ def test_world_frame(truearm: Truearm, tmp_path: Path) -> None:
     assert found["residuals_mm"] == pytest.approx([0, 0, 0], abs=1e-6)
     assert "x 250.0000" in truearm(*words, "300.3,300,299.6").out
     assert "the length B2-B3 is beyond" in truearm(*words, "300,302,300").err
-    assert "no target of this name" in truearm(*words, "300,300,300", "--cup", "4").err
+    assert "no cup of this name" in truearm(*words, "300,300,300", "--cup", "4").err
 
 
 def test_distances(truearm: Truearm, small: Path, tmp_path: Path) -> None:

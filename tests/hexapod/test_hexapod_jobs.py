@@ -76,7 +76,7 @@ def test_a_plan_and_its_sheet_are_written_and_solved(tmp_path: Path) -> None:
 
 def test_nominal_lengths_are_those_of_the_device() -> None:
     default = truearm.hexapod_solve.request.default  # type: ignore[attr-defined]
-    assert (default("base"), default("tool"), default("reach")) == (
+    assert (default("base_sides"), default("tool_sides"), default("reach")) == (
         (DEVICE.base,) * 3,
         (DEVICE.tool,) * 3,
         DEVICE.reach,
@@ -145,7 +145,7 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
         (lambda: truearm.hexapod_world_frame("irb120", "missing.csv", SIDES), "touches", "there is no such file"),
         (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES[:2]), "base_sides", "3 numbers belong here"),
         (lambda: truearm.hexapod_world_frame("irb120", JOINTS, (0.3, 0.302, 0.3)), "base_sides", "the length B2-B3"),
-        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES, cup="4"), "cup", "no target of this name"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES, cup="4"), "cup", "no cup of this name"),
         (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES), "touches", "lie on one line"),
     ],
 )

@@ -93,7 +93,7 @@ def test_an_option_is_declared_once() -> None:
 
 #: Names and words of the command that are declared several times, and why.
 TWICE = {
-    "data": "what was measured; a study needs a folder of it",
+    "data": "what was measured: lines need names in it, a study a folder of it",
     "file": "the file that is read or written: each format has its own",
     "model": "the same models; of these each job takes what it can",
     "noise": "plans divide by it, and count what a model leaves",

@@ -98,7 +98,7 @@ def test_the_controllers_joint_positions_can_be_asked_for(tmp_path: Path) -> Non
         ({"set": "p1-p5", "plane": "C1"}, "no plane of this name"),
         ({"set": "p1-p5", "ahead": "up"}, "no ahead of this name"),
         ({"set": "p1-p5", "tip_orientation": (1.0, 1.0, 0.0, 0.0)}, "has length 1"),
-        ({"set": "p1-p5", "tip_orientation": "up"}, "no tip_orientation of this name"),
+        ({"set": "p1-p5", "tip_orientation": "up"}, "no orientation of this name"),
         ({"set": "p1-p5", "target": "a", "tip": (0, 0, 0.1)}, "only one of them can go to the poses"),
         ({"set": "p1-p5", "target": "a"}, "there is no target"),
         ({"set": "p1-p5", "lowest": 5.0}, "reaches no cube"),
@@ -194,7 +194,7 @@ def test_poses_for_a_controller_with_kinematics_of_its_own_are_refused(tmp_path:
     [
         ({"languages": ["basic"]}, "no language of this name", "languages"),
         ({"languages": ["rapid"], "name": "2nd"}, "cannot be called so in every language", "name"),
-        ({"languages": ["rapid"], "move_to": "pulses"}, "no move_to of this name", "move_to"),
+        ({"languages": ["rapid"], "move_to": "pulses"}, "no kind of targets of this name", "move_to"),
         ({"seed_joints": (0.0, 0.0)}, "seed_joints", "seed_joints"),
         ({"accept": ["anything"]}, "anything", "accept"),
         ({"seed_joints": (0.0, 0.2, 0.4, 0.0, 0.0, 0.0), "file": "way.yaml"}, "no such file", "file"),

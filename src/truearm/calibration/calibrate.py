@@ -65,7 +65,7 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
     bounds: Bounds | str | Path | None = option(Given("FILE"), "Limits of parameter values.", default=None, shown=False)
     hold: Sequence[str] = option(
         Names("WHAT,...", "base, targets, fixtures, or names of these"),
-        "What is known and not found: base, targets, fixtures, or names.",
+        "What is known and not found: base, targets, fixtures, or names; `frames` says where.",
         default=(),
         more="The calibration is an absolute one then.",
     )

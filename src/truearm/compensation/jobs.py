@@ -209,7 +209,7 @@ class FollowPath(OfRobot, Near, Loaded, Forced, OfController, Accepting, JointsW
         formerly="programs",
     )
     move_to: TargetKind = option(
-        Choice(known=("joints", "poses")),
+        Choice(known=("joints", "poses"), what="kind of targets"),
         "What programs move to: joint positions, or straight to poses.",
         default="joints",
         formerly="targets",

@@ -12,7 +12,7 @@ import numpy as np
 from truearm.engine.base.errors import InputError, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.writing import same_place
-from truearm.engine.command.arguments import array_argument, file_for, files_of, robot_argument
+from truearm.engine.command.arguments import array_argument, choice_argument, file_for, files_of, robot_argument
 from truearm.engine.data.hexapod import (
     DEVICE,
     Device,
@@ -131,8 +131,10 @@ def fixture_found(asked: FindFixture) -> HexapodFrame:
     with refusals_of("tool"):
         arm, _ = with_cups(loaded, asked.tool)
     joints = _touches_argument(asked.touches, arm)
-    with refusals_of("cup"):
-        position, _ = arm.world_poses(joints, arm.targets[0].name if asked.cup is None else asked.cup)
+    cups = {one.name: one.name for one in arm.targets}
+    position, _ = arm.world_poses(
+        joints, next(iter(cups)) if asked.cup is None else choice_argument(asked.cup, "cup", cups)
+    )
     stand = arm.base
     points = (position - np.array(stand.translation)) @ stand.rotation
     with refusals_of("touches"):

@@ -27,7 +27,7 @@ class _Orientation(Given):
         from truearm.engine.data.readers.rows import QUATERNION_TOLERANCE
 
         if isinstance(value, str):
-            return choice_argument(value, name, {"free": "free", "down": "down"})
+            return choice_argument(value, name, {"free": "free", "down": "down"}, "orientation")
         quaternion = numbers_argument(value, name, 4, self._allowed)
         size = math.hypot(*quaternion)
         if abs(size - 1.0) > QUATERNION_TOLERANCE:

@@ -150,7 +150,7 @@ class TestLines(OfRobot, Drawn, JointsWritten, AlsoIntoFile):
     )
     truth: Robot | str | Path | None = as_in(OfTruth, "truth", default=None, more="A twin of it is compensated.")
     data: Dataset | str | Path | None = as_in(
-        Measured, "data", default=None, more="Configurations are named x-1 to xyz-11."
+        Measured, "data", default=None, help="Measured, configurations named x-1 to xyz-11."
     )
     noise: float = as_in(Instrument, "noise", default=0.0)
     repeats: int = option(Whole(low=1, counts=True), "Repetitions on the twin.", default=30)

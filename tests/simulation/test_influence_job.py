@@ -124,7 +124,7 @@ def test_frames_of_the_file_are_held_where_the_readings_are_in_them() -> None:
     assert errors["least squares"] < 0.05e-3 < errors["influence"]
     with pytest.raises(InputError, match="does not say where this target is") as refusal:
         truearm.influence(KATANA, data, placement="robot")
-    assert refusal.value.parameter == "frames"
+    assert refusal.value.parameter == "placement"
 
 
 def test_poses_that_cannot_be_met_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

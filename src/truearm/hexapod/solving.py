@@ -132,9 +132,8 @@ def fixture_found(asked: FindFixture) -> HexapodFrame:
         arm, _ = with_cups(loaded, asked.tool)
     joints = _touches_argument(asked.touches, arm)
     cups = {one.name: one.name for one in arm.targets}
-    position, _ = arm.world_poses(
-        joints, next(iter(cups)) if asked.cup is None else choice_argument(asked.cup, "cup", cups)
-    )
+    cup = arm.targets[0].name if asked.cup is None else choice_argument(asked.cup, "cup", cups)
+    position, _ = arm.world_poses(joints, cup)
     stand = arm.base
     points = (position - np.array(stand.translation)) @ stand.rotation
     with refusals_of("touches"):

@@ -35,7 +35,7 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
     seeds: int = option(
         Whole(low=1, counts=True), "How often to do it anew.", default=10, more="With seeds 0, 1, 2 and so on."
     )
-    workers: int | None = as_in(
+    workers: int = as_in(
         InParts, "workers", default=1, shown=True, more="One is this process itself. The figures do not depend on it."
     )
 

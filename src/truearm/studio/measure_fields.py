@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.units import sized_si, to_si
+from truearm.measuring.measure import Measure
 from truearm.measuring.session import LONGEST_ROUND, MOST_SAMPLES
 
 _Text = Annotated[str, Field(min_length=1)]
@@ -25,8 +25,6 @@ SOURCES: Final[dict[Source, tuple[str, ...]]] = {
 #: Configurations between two rounds of the nests, where nothing is said.
 EVERY: Final = 10
 _LENGTHS: Final = ("noise", "drift", "most_deviation", "most_settling")
-#: Options that have other names than the parameters.
-_OPTIONS: Final = {"mapping": "map", "targets": "target", "nests": "nest"}
 
 
 class MeasureFields(BaseModel):
@@ -126,8 +124,4 @@ def measure_arguments(said: dict[str, Any]) -> dict[str, Any]:
 
 def measure_command(plan: str, robot: str, said: dict[str, Any]) -> str:
     """Return the command that does the same in the project's folder, as the report shows it."""
-    text = ["truearm", "measure", plan, robot]
-    for name, value in said.items():
-        for one in value if isinstance(value, tuple) else (value,):
-            text += [f"--{_OPTIONS.get(name, name).replace('_', '-')}", str(one)]
-    return shlex.join([*text, "--out", "DIR"])
+    return Measure(plan, robot, out="DIR", **measure_arguments(said)).as_command()

@@ -121,7 +121,7 @@ def _entry(name: str) -> Entry:
     names = [entry.name for entry in STUDIES]
     raise InputError(
         "there is no study of this name",
-        parameter="name",
+        parameter="study",
         came=name,
         allowed=", ".join(names),
         cure=did_you_mean(name, names),

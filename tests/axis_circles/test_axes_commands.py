@@ -31,7 +31,7 @@ def kr5(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_axes_tolerance_and_lines(truearm: Truearm, kr5: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    run = truearm("axes", "kr5", kr5, "--frame", "robot", "--out", out, "--json")
+    run = truearm("axes", "kr5", kr5, "--measurement-frame", "robot", "--out", out, "--json")
     assert run.code == 0, run.err
     said = json.loads(run.out)
     assert said == json.loads((out / "axes.json").read_text())
@@ -41,7 +41,7 @@ def test_axes_tolerance_and_lines(truearm: Truearm, kr5: Path, tmp_path: Path) -
     found = {e["name"]: e for e in said["joint_errors"]["found"]}
     assert found["ebeta_2"]["value"] == pytest.approx(0.1813, abs=0.005)
     assert found["ebeta_2"]["interval"][0] < found["ebeta_2"]["value"] < found["ebeta_2"]["interval"][1]
-    plain = truearm("axes", "kr5", kr5, "--frame", "robot", "--out", out)
+    plain = truearm("axes", "kr5", kr5, "--measurement-frame", "robot", "--out", out)
     assert "ez_6 (moves the flange)" in plain.out
     errors = out / "joint-errors.yaml"
 
@@ -50,7 +50,7 @@ def test_axes_tolerance_and_lines(truearm: Truearm, kr5: Path, tmp_path: Path) -
     allowed = json.loads(truearm("tolerance", "kr5", "--depth", "50", "--lean", "0.02", "--json").out)
     assert allowed["together"]["worst_mm"] > allowed["together"]["root_of_squares_mm"] > 0.3
 
-    words = ("lines", "kr5", "--centre", "850,0,600", "--model", errors, "--truth", "axis-tests")
+    words = ("lines", "kr5", "--centre", "850,0,600", "--joint-errors", errors, "--truth", "axis-tests")
     lines = json.loads(truearm(*words, "--out", tmp_path / "plan.csv", "--json").out)["lines"]
     assert len(lines) == 7
     assert min(line["reduction_percent"] for line in lines) > 95.0
@@ -59,7 +59,7 @@ def test_axes_tolerance_and_lines(truearm: Truearm, kr5: Path, tmp_path: Path) -
 
 
 def test_measured_lines_are_judged(truearm: Truearm, kr5: Path, tmp_path: Path) -> None:
-    truearm("axes", "kr5", kr5, "--frame", "robot", "--out", tmp_path)
+    truearm("axes", "kr5", kr5, "--measurement-frame", "robot", "--out", tmp_path)
     truearm("lines", "kr5", "--centre", "850,0,600", "--out", tmp_path / "plan.csv")
     rows = [line.split(",") for line in (tmp_path / "plan.csv").read_text().splitlines()[1:]]
     rng = np.random.default_rng(1)
@@ -71,7 +71,7 @@ def test_measured_lines_are_judged(truearm: Truearm, kr5: Path, tmp_path: Path) 
         text += ",".join([*row, "smr", *map(repr, place)]) + "\n"
     (tmp_path / "measured.csv").write_text(text)
     words = ("lines", "kr5", "--centre", "850,0,600", "--data", tmp_path / "measured.csv", "--json")
-    known = json.loads(truearm(*words, "--model", tmp_path / "joint-errors.yaml").out)["lines"]
+    known = json.loads(truearm(*words, "--joint-errors", tmp_path / "joint-errors.yaml").out)["lines"]
     assert max(line["before_mm"]["max"] for line in known) == pytest.approx(3.7, abs=0.6)
     placed = json.loads(truearm(*words).out)["lines"]  # base and target fitted to the lines themselves
     assert max(line["before_mm"]["max"] for line in placed) < max(line["before_mm"]["max"] for line in known)
@@ -80,7 +80,7 @@ def test_measured_lines_are_judged(truearm: Truearm, kr5: Path, tmp_path: Path) 
 def test_refusals(truearm: Truearm, kr5: Path, small: Path, tmp_path: Path) -> None:
     for words, part in (
         (("axes", "irb120", small / "data.csv", "--out", tmp_path), "one joint moves alone"),
-        (("axes", "kr5", kr5, "--frame", "table", "--out", tmp_path), "there is no frame of this name"),
+        (("axes", "kr5", kr5, "--measurement-frame", "table", "--out", tmp_path), "there is no frame of this name"),
         (("tolerance", "kr5", "--depth", "50"), "not described by joint errors"),
         (("tolerance", "kr5", "--depth", "0", "--lean", "1"), "--depth: a hole needs a depth"),
         (("tolerance", "kr5", "--depth", "50", "--lean", "-1"), "--lean: the length is out of range; got '-1 mm'"),
@@ -88,11 +88,11 @@ def test_refusals(truearm: Truearm, kr5: Path, small: Path, tmp_path: Path) -> N
         (("lines", "kr5", "--centre", "850,0"), "3 lengths"),
         (("lines", "kr5", "--centre", "2850,0,600"), "cannot go to a pose"),
         (("lines", "kr5", "--centre", "850,0,600", "--truth", "random", "--data", "x.csv"), "only one of them"),
-        (("lines", "kr5", "--centre", "850,0,600", "--model", "kr5"), "not described by joint errors"),
+        (("lines", "kr5", "--centre", "850,0,600", "--joint-errors", "kr5"), "not described by joint errors"),
     ):
         run = truearm(*words)
         assert run.code == 2
         assert part in run.err, run.err
     truearm("convert", "irb120", "--convention", "joint-errors", "--out", tmp_path / "other.yaml")
-    other = truearm("lines", "kr5", "--centre", "850,0,600", "--model", tmp_path / "other.yaml")
-    assert "--model: these joint errors belong to another robot than kr5" in other.err
+    other = truearm("lines", "kr5", "--centre", "850,0,600", "--joint-errors", tmp_path / "other.yaml")
+    assert "--joint-errors: these joint errors belong to another robot than kr5" in other.err

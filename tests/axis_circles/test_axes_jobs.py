@@ -38,12 +38,12 @@ def data() -> Dataset:
 
 @pytest.fixture(scope="module")
 def found(data: Dataset) -> AxisCalibration:
-    return truearm.axes("kr5", data, frame="robot")
+    return truearm.axes("kr5", data, measurement_frame="robot")
 
 
 def test_axes_are_the_same_from_objects_and_from_files(found: AxisCalibration, data: Dataset, tmp_path: Path) -> None:
     (tmp_path / "axes.csv").write_text(csv_text(data))
-    read = truearm.axes("kr5", tmp_path / "axes.csv", frame="robot", out=tmp_path / "out")
+    read = truearm.axes("kr5", tmp_path / "axes.csv", measurement_frame="robot", out=tmp_path / "out")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         "axes.json",
         "calibrated.yaml",
@@ -136,7 +136,7 @@ lines: Callable[..., Any] = partial(truearm.lines, "kr5")
         (lambda: lines(CENTRE, size=(0.6, 0.0, 0.4)), "size", "three sizes above zero"),
         (lambda: lines(CENTRE, truth="nominal", data="x.csv"), "truth, data", "only one of them"),
         (lambda: lines(CENTRE, truth="axis-test"), "truth", "Did you mean axis-tests?"),
-        (lambda: lines(CENTRE, truth=4), "truth", "a path belongs here"),
+        (lambda: lines(CENTRE, truth=4), "truth", "a truth belongs here"),
         (lambda: lines(CENTRE, joint_errors="kr5"), "joint_errors", "not described by joint errors"),
     ],
 )
@@ -149,7 +149,7 @@ def test_refusals_name_the_parameter(call: Callable[[], Any], parameter: str, wo
 
 def test_data_of_other_joints_are_refused(data: Dataset) -> None:
     other = replace(data, joints=data.joints[:, :5], joint_kinds=data.joint_kinds[:5], approach=None)
-    for job in (partial(axes, other, frame="robot"), partial(lines, CENTRE, data=other)):
+    for job in (partial(axes, other, measurement_frame="robot"), partial(lines, CENTRE, data=other)):
         with pytest.raises(InputError, match="joints") as refused:
             job()
         assert refused.value.parameter == "data"

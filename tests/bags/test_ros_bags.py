@@ -141,7 +141,7 @@ def test_wild_samples_of_a_slow_camera_are_set_aside(tmp_path: Path) -> None:
 
 
 def test_pauses_that_are_no_standstills_are_said(tmp_path: Path) -> None:
-    assert refused(write_ros2(tmp_path / "all", [*OF_JOINTS, *OF_TARGET]), "never stands still", hold=2.5)
+    assert refused(write_ros2(tmp_path / "all", [*OF_JOINTS, *OF_TARGET]), "never stands still", shortest_dwell=2.5)
     start = 4 * 3.0
     creeping = JOINTS + np.where((TIMES > 2.95) & (TIMES < 5.05), np.radians(0.05) * (TIMES - 2.95), 0.0)[:, None]
     hidden = (TIMES < 8.5) | (start < TIMES)
@@ -158,7 +158,7 @@ def test_pauses_that_are_no_standstills_are_said(tmp_path: Path) -> None:
     )
     crept = JOINTS + np.where(TIMES[:, None] < 10.0, slow, slow[1000])
     bag = write_ros2(tmp_path / "most", [*joint_messages(TIMES, crept), *OF_TARGET])
-    assert refused(bag, "most pauses of the robot are no standstills").parameter == "hold"
+    assert refused(bag, "most pauses of the robot are no standstills").parameter == "shortest_dwell"
 
 
 def with_lost(share: float, stand: float, rate: float = 100.0, seed: int = 3) -> JointStream:
@@ -229,12 +229,12 @@ def test_standstills_without_scatter_declare_no_deviation(tmp_path: Path) -> Non
 
 def test_what_holds_no_standstill(tmp_path: Path) -> None:
     bag = write_ros2(tmp_path / "cell", [*OF_JOINTS, *OF_TARGET])
-    assert refused(bag, "never stands still", hold=5.0).parameter == "still"
+    assert refused(bag, "never stands still", shortest_dwell=5.0).parameter == "still"
     slow = JOINTS[:1] + np.radians(0.015) * TIMES[:, None]
     assert refused(write_ros2(tmp_path / "slow", [*joint_messages(TIMES, slow), *OF_TARGET]), "creep")
-    assert refused(bag, "nothing is left", hold=0.5).parameter == "settle"
-    assert refused(bag, "out of range", hold=1e5).parameter == "hold"
-    assert refused(bag, "too short a time", hold=100.0)
+    assert refused(bag, "nothing is left", shortest_dwell=0.5).parameter == "settle"
+    assert refused(bag, "out of range", shortest_dwell=1e5).parameter == "shortest_dwell"
+    assert refused(bag, "too short a time", shortest_dwell=100.0)
     few = target_messages(SEEN[::19], POSITIONS[::19], TURNS[::19])
     assert refused(write_ros2(tmp_path / "few", [*OF_JOINTS, *few]), "nothing was seen")
 

@@ -256,11 +256,11 @@ def test_every_dictionary_is_one_of_opencv() -> None:
 def test_later_sessions_follow_the_same_point(tmp_path: Path) -> None:
     """The point ahead of the camera is where the board was on average, unless the first session's is given."""
     first = truearm.import_hand_eye(**example(tmp_path))
-    again = truearm.import_hand_eye(**example(tmp_path), ahead=first.ahead)
+    again = truearm.import_hand_eye(**example(tmp_path), working_distance=first.ahead)
     assert again.data.position == pytest.approx(first.data.position)
-    farther = truearm.import_hand_eye(**example(tmp_path), ahead=first.ahead + 0.1)
+    farther = truearm.import_hand_eye(**example(tmp_path), working_distance=first.ahead + 0.1)
     assert farther.ahead == pytest.approx(first.ahead + 0.1)
     apart = np.linalg.norm(farther.data.position - first.data.position, axis=1)
     assert apart == pytest.approx(np.full(len(apart), 0.1))
     with pytest.raises(InputError, match="only a camera on the flange has a point ahead"):
-        truearm.import_hand_eye(**{**example(tmp_path), "on_flange": "board"}, ahead=0.5)
+        truearm.import_hand_eye(**{**example(tmp_path), "on_flange": "board"}, working_distance=0.5)

@@ -104,12 +104,12 @@ def test_without_the_answers_nothing_is_written(truearm: Truearm, cell: Path) ->
     (cell / "answers.yaml").write_text(
         "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\ntaught: [none]\ncontroller_kinematics: nominal\n"
     )
-    words = ("--frame", cell / "answers.yaml", "--out", cell / "out")
+    words = ("--frames", cell / "answers.yaml", "--out", cell / "out")
     assert truearm("compensate", cell / "calibrated.yaml", cell / "plate.mod", *words).code == 0
 
 
 def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) -> None:
-    places = ["--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml"]
+    places = ["--tools", cell / "cell.yaml", "--frames", cell / "cell.yaml"]
     code, said = run(truearm, cell, *places, "--controller-kinematics", "nominal", "--json")
     assert code == 0
     told = json.loads(said)
@@ -133,7 +133,7 @@ def test_a_robot_without_a_payload_is_asked_for_one_if_it_bends(truearm: Truearm
 
 
 def test_the_report_says_how_to_do_it_again(truearm: Truearm, cell: Path) -> None:
-    options = ["--tool", str(cell / "cell.yaml"), "--payload", "1.5kg,0mm,0mm,80mm", "--split", "0.05"]
+    options = ["--tools", str(cell / "cell.yaml"), "--payload", "1.5kg,0mm,0mm,80mm", "--split", "0.05"]
     code, _ = run(truearm, cell, *options)
     assert code == 0
     page = (cell / "out" / "compensation.html").read_text()
@@ -144,7 +144,7 @@ def test_the_report_says_how_to_do_it_again(truearm: Truearm, cell: Path) -> Non
 def test_the_payload_matters(truearm: Truearm, cell: Path) -> None:
     shifts = []
     for number, words in enumerate(([], ["--payload", "0kg,0mm,0mm,0mm"], ["--payload", "4kg,0mm,0mm,100mm"])):
-        options = ("--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml", "--json")
+        options = ("--tools", cell / "cell.yaml", "--frames", cell / "cell.yaml", "--json")
         code, said = run(truearm, cell, *options, *words, out=f"out{number}")
         assert code == 0
         shifts.append(json.loads(said)["programs"][0]["shift_mm"]["mean"])
@@ -244,7 +244,7 @@ def test_a_frame_that_the_program_does_not_define_may_come_from_the_file(truearm
         "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
         "frames:\n  WOBJPLATE: {of: controller, translation: [310, -110, 60]}\n"
     )
-    code, said = run(truearm, cell, "--frame", cell / "cell.yaml", "--json")
+    code, said = run(truearm, cell, "--frames", cell / "cell.yaml", "--json")
     assert code == 0
     assert "frames-assumed" in {warning["code"] for warning in json.loads(said)["warnings"]}
 
@@ -254,7 +254,7 @@ def test_real_places_are_given_for_all_frames_or_for_none(truearm: Truearm, cell
     text = program.read_text().replace("pHole7,v20,fine,tProbe\\WObj:=wobjPlate", "pHole7,v20,fine,tProbe")
     text = text.replace("Offs(pHole7,0,0,15),v200,z5,tProbe\\WObj:=wobjPlate", "Offs(pHole7,0,0,15),v200,z5,tProbe")
     program.write_text(text)
-    code, said = run(truearm, cell, "--frame", cell / "cell.yaml")
+    code, said = run(truearm, cell, "--frames", cell / "cell.yaml")
     assert code == 2
     assert "line 15: only some of the frames in use have a real place in the file; got 'base'" in said
 
@@ -278,7 +278,7 @@ def test_one_joint_target_alone_has_nothing_left_to_correct(truearm: Truearm, ce
     assert code == 0
     assert "\nWarning (nothing-corrected): Nothing can be corrected: only one target is left to correct" in said
     assert said.splitlines()[0] == "plate.mod  RAPID: the error to expect is not known"
-    assert "1 target: 0 corrected, 1 kept (alone, with --frame not given)" in said
+    assert "1 target: 0 corrected, 1 kept (alone, with --frames not given)" in said
     assert (cell / "out" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
 
 

@@ -260,7 +260,7 @@ def test_the_program_of_a_path_is_remembered(tmp_path: Path) -> None:
         "truearm: truearm-path/1\nunits: {length: mm, angle: deg, time: s}\nspeed: 100\nacceleration: 500\nstep: 0.1\n"
         "orientation: {quaternion: [0, 0, 1, 0]}\nstart: [350, -50, 300]\nsections:\n  - line: [350, 50, 300]\n"
     )
-    given = {"programs": ["rapid"], "targets": "poses", "controller_kinematics": "nominal"}
+    given = {"languages": ["rapid"], "move_to": "poses", "controller_kinematics": "nominal"}
     truearm.path(robot, file, out=tmp_path / "out", **given)  # type: ignore[arg-type]
     (written,) = (tmp_path / "out").glob("*.mod")
     with pytest.raises(InputError, match='corrected already; got "the comment'):

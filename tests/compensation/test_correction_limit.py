@@ -347,7 +347,7 @@ def test_the_common_shift_is_told_apart_from_what_remains(tmp_path: Path) -> Non
 def test_a_path_written_as_a_program_has_the_same_limit(tmp_path: Path) -> None:
     file = tmp_path / "path.yaml"
     file.write_text(PATH)
-    given: dict[str, Any] = {"programs": ["rapid"], "controller_kinematics": "nominal"}
+    given: dict[str, Any] = {"languages": ["rapid"], "controller_kinematics": "nominal"}
     assert truearm.path(springy(), file, **given).programs
     with pytest.raises(InputError, match="larger than the errors of this robot explain") as refusal:
         truearm.path(springy(), file, payload="120kg,0mm,0mm,50mm", out=tmp_path / "out", **given)

@@ -47,8 +47,11 @@ def test_one_pose(truearm: Truearm) -> None:
     ("words", "options"),
     [
         ("the length B", ["--pose", "7", "--legs", "301.5,300,300,300,300,300"]),
-        ("the length B1-B2 is beyond", ["--pose", "7", "--legs", "300,300,300,300,300,300", "--base", "310,300,300"]),
-        ("B1, B2, B3 lie on one line", ["--range", "400", "--base", "300,300,600"]),
+        (
+            "the length B1-B2 is beyond",
+            ["--pose", "7", "--legs", ",".join(["300"] * 6), "--base-sides", "310,300,300"],
+        ),
+        ("B1, B2, B3 lie on one line", ["--range", "400", "--base-sides", "300,300,600"]),
         ("legs of these lengths do not meet", ["--range", "400", "--legs", "100,100,100,300,300,300"]),
         ("6 numbers belong here; got 2", ["--legs", "300,300"]),
         ("numbers separated by commas", ["--legs", "300;300"]),
@@ -202,7 +205,7 @@ def test_world_frame(truearm: Truearm, tmp_path: Path) -> None:
     lines = ["cup," + ",".join(f"joint_{n} [deg]" for n in range(1, 7))]
     lines += [f"B{n},{','.join(map(repr, row))}" for n, row in enumerate(joints.tolist(), 1)]
     file.write_text("\n".join(lines) + "\n")
-    words = ["hexapod", "world-frame", "irb120", file, "--base"]
+    words = ["hexapod", "world-frame", "irb120", file, "--base-sides"]
     found = json.loads(truearm(*words, "300.3,300,299.6", "--json").out)
     assert list(found) == ["position_mm", "quaternion", "plain", "distances_by_robot_mm", "residuals_mm"]
     assert found["position_mm"] == pytest.approx([250, -100, 100], abs=1e-6)
@@ -210,7 +213,7 @@ def test_world_frame(truearm: Truearm, tmp_path: Path) -> None:
     assert found["residuals_mm"] == pytest.approx([0, 0, 0], abs=1e-6)
     assert "x 250.0000" in truearm(*words, "300.3,300,299.6").out
     assert "the length B2-B3 is beyond" in truearm(*words, "300,302,300").err
-    assert "no target of this name" in truearm(*words, "300,300,300", "--target", "4").err
+    assert "no cup of this name" in truearm(*words, "300,300,300", "--cup", "4").err
 
 
 def test_distances(truearm: Truearm, small: Path, tmp_path: Path) -> None:

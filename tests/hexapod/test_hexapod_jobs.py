@@ -36,7 +36,7 @@ def test_uncertainty_is_repeated_with_its_seed() -> None:
 
 
 def test_one_pose_is_solved_from_any_sequence_of_lengths() -> None:
-    found = truearm.hexapod_solve(pose=7, legs=np.array(LEGS), base=[0.3] * 3)  # type: ignore[arg-type]
+    found = truearm.hexapod_solve(pose=7, legs=np.array(LEGS), base_sides=[0.3] * 3)  # type: ignore[arg-type]
     assert found.poses[0].cups == pytest.approx(poses()[6].cups, abs=1e-12)
     assert found.data is None
     with pytest.raises(ValueError, match="no joint positions"):
@@ -76,7 +76,7 @@ def test_a_plan_and_its_sheet_are_written_and_solved(tmp_path: Path) -> None:
 
 def test_nominal_lengths_are_those_of_the_device() -> None:
     default = truearm.hexapod_solve.request.default  # type: ignore[attr-defined]
-    assert (default("base"), default("tool"), default("reach")) == (
+    assert (default("base_sides"), default("tool_sides"), default("reach")) == (
         (DEVICE.base,) * 3,
         (DEVICE.tool,) * 3,
         DEVICE.reach,
@@ -94,7 +94,7 @@ def test_the_base_fixture_is_found_from_arrays() -> None:
     robot, _ = with_cups(truearm.load_robot("irb120"))
     cups = triangle([0.3003, 0.3, 0.2996], "B") + np.array([0.25, -0.1, 0.1])
     joints = inverse(robot, cups, np.broadcast_to(np.diag([1.0, -1.0, -1.0]), (3, 3, 3)), target="1").joints
-    frame = truearm.hexapod_world_frame(robot, joints, (0.3003, 0.3, 0.2996), target="1").found.frame
+    frame = truearm.hexapod_world_frame(robot, joints, (0.3003, 0.3, 0.2996), cup="1").found.frame
     assert frame.translation == pytest.approx([0.25, -0.1, 0.1], abs=1e-9)
     assert frame.quaternion == pytest.approx([1, 0, 0, 0], abs=1e-9)
 
@@ -112,11 +112,19 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
         (lambda: truearm.hexapod_solve(pose=7, legs=LEGS[:5]), "legs", "6 numbers belong here"),
         (lambda: truearm.hexapod_solve(pose=7, legs=(*LEGS[:5], np.nan)), "legs", "the number cannot be used"),
         (lambda: truearm.hexapod_solve(pose=7, legs=(*LEGS[:5], 0.302)), "legs", "is beyond the range"),
-        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, base=(0.31, 0.3, 0.3)), "base", "the length B1-B2"),
-        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, tool=(0.15, 0.2, 0.15)), "tool", "the length T2-T3"),
         (
-            lambda: truearm.hexapod_solve(pose=7, legs=LEGS, base=(0.3, 0.3, 0.6), reach=0.4),
-            "base",
+            lambda: truearm.hexapod_solve(pose=7, legs=LEGS, base_sides=(0.31, 0.3, 0.3)),
+            "base_sides",
+            "the length B1-B2",
+        ),
+        (
+            lambda: truearm.hexapod_solve(pose=7, legs=LEGS, tool_sides=(0.15, 0.2, 0.15)),
+            "tool_sides",
+            "the length T2-T3",
+        ),
+        (
+            lambda: truearm.hexapod_solve(pose=7, legs=LEGS, base_sides=(0.3, 0.3, 0.6), reach=0.4),
+            "base_sides",
             "B1, B2, B3 lie on one line",
         ),
         (
@@ -135,9 +143,9 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, out="a", steps="a"), "steps", "must be different files"),
         (lambda: truearm.hexapod_world_frame("irb120", JOINTS[:2], SIDES), "touches", "got '(2, 6)'"),
         (lambda: truearm.hexapod_world_frame("irb120", "missing.csv", SIDES), "touches", "there is no such file"),
-        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES[:2]), "base", "3 numbers belong here"),
-        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, (0.3, 0.302, 0.3)), "base", "the length B2-B3"),
-        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES, target="4"), "target", "no target of this name"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES[:2]), "base_sides", "3 numbers belong here"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, (0.3, 0.302, 0.3)), "base_sides", "the length B2-B3"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES, cup="4"), "cup", "no cup of this name"),
         (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES), "touches", "lie on one line"),
     ],
 )

@@ -197,14 +197,14 @@ def test_inverse_kinematics_of_poses_as_the_pendant_shows_them_reach_them(tmp_pa
 
 def test_a_robot_shows_the_pose_that_the_pendant_shows() -> None:
     shown = readings(1, 4)[0]
-    said = truearm.show(ROBOT, joints=np.radians(shown)).summary()["at"]
+    said = truearm.show(ROBOT, joint_positions=np.radians(shown)).summary()["at"]
     assert said["joints"]["controller"] == pytest.approx(shown)
     assert said["joints"]["model"] == pytest.approx(as_model(shown[None])[0])
     there = faceplate(shown)
     assert said["flange"]["controller"]["position_mm"] == pytest.approx(1e3 * there[:3, 3])
     w, p, r = np.radians(said["flange"]["controller"]["angles about x y z, fixed axes"])
     assert (turn(2, r) @ turn(1, p) @ turn(0, w))[:3, :3] == pytest.approx(there[:3, :3])
-    zero = truearm.show(ROBOT, joints=np.zeros(6)).lines()
+    zero = truearm.show(ROBOT, joint_positions=np.zeros(6)).lines()
     assert "  x 475.000  y 0.000  z 375.000 mm" in zero
 
 
@@ -234,6 +234,6 @@ def test_a_ur_shows_its_pose_in_base_and_not_in_base_link(tmp_path: Path) -> Non
     (tmp_path / "ur5.urdf").write_text(text + "</robot>")
     for robot, own in (("ur5", -817.25), (str(tmp_path / "ur5.urdf"), 817.25)):
         assert 1e3 * load_robot(robot).forward(np.zeros(6))[0][0, 0] == pytest.approx(own)
-        pose = truearm.show(robot, joints=np.zeros(6)).summary()["at"]["flange"]["controller"]
+        pose = truearm.show(robot, joint_positions=np.zeros(6)).summary()["at"]["flange"]["controller"]
         assert pose["position_mm"] == pytest.approx([-817.25, -191.45, -5.491], abs=1e-6)
         assert pose["rotation vector"] == pytest.approx([np.pi / 2, 0.0, 0.0], abs=1e-9)

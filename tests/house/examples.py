@@ -62,7 +62,7 @@ def _poses(_: Path) -> Arguments:
         "robot": "irb120",
         "poses": at.position.T,
         "rotations": at.matrix(),
-        "seed": q,
+        "seed_joints": q,
         "branch": "front-up-noflip",
         "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
         "wrench_frame": "tool",
@@ -91,7 +91,7 @@ def _matrices(folder: Path) -> Arguments:
     joints = _written(folder / "joints.txt", "0 10 20 30 40 50\n5 10 25 30 45 50\n")
     points = _written(folder / "points.txt", "100 200 300\n0 0 0\n")
     names = {"targets": {"1": points}, "references": {"base": points}}
-    return {"joints": joints, **names, "angle_unit": "deg", "length_unit": "mm"}
+    return {"joints_file": joints, **names, "angle_unit": "deg", "length_unit": "mm"}
 
 
 def table(folder: Path) -> Arguments:
@@ -193,7 +193,7 @@ def _touches() -> Arguments:
     robot, _ = with_cups(load_robot("irb120"))
     cups = triangle([0.3003, 0.3, 0.2996], "B") + np.array([0.25, -0.1, 0.1])
     found = inverse(robot, cups, np.broadcast_to(np.diag([1.0, -1.0, -1.0]), (3, 3, 3)), target="1")
-    return {"robot": "irb120", "touches": found.joints, "base": (0.3003, 0.3, 0.2996), "target": "1"}
+    return {"robot": "irb120", "touches": found.joints, "base_sides": (0.3003, 0.3, 0.2996), "cup": "1"}
 
 
 def program(folder: Path) -> Path:
@@ -263,7 +263,11 @@ MEASURED_PLAN += "".join(f"P{k},{10 * k},10,{5 * k},20,{30 - k},40\n" for k in r
 
 EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "load_robot": lambda _: {"robot": "irb120"},
-    "show": lambda _: {"robot": "lrmate200ic", "joints": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "joints_are": "model"},
+    "show": lambda _: {
+        "robot": "lrmate200ic",
+        "joint_positions": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+        "joints_are": "model",
+    },
     "load_data": lambda folder: {"data": data_file(folder), "robot": "irb120"},
     "check": lambda folder: {"robot": load_robot("irb120"), "data": data_file(folder), "device": "tracker"},
     "calibrate": lambda folder: {
@@ -331,14 +335,14 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "side": 0.2,
         "count": 5,
         "tip": (0.0, 0.0, 0.05),
-        "orientation": (0.0, 1.0, 0.0, 0.0),
+        "tip_orientation": (0.0, 1.0, 0.0, 0.0),
         "seed": 1,
     },
     "path": lambda folder: {
         "robot": calibrated(folder),
         "file": _written(folder / "path.yaml", PATH),
-        "seed": (0.0, 0.2, 0.4, 0.0, 0.9, 0.0),
-        "programs": ["rapid", "krl"],
+        "seed_joints": (0.0, 0.2, 0.4, 0.0, 0.9, 0.0),
+        "languages": ["rapid", "krl"],
         "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
         "wrench_frame": "base",
         "spacing": 0.3,
@@ -377,7 +381,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "inverse": _poses,
     "robots": lambda _: {"text": "irb1200", "maker": "ABB", "axes": 6},
     "devices": lambda _: {},
-    "axes": lambda folder: {"robot": "kr5", "data": _axis_runs(folder), "frame": "robot"},
+    "axes": lambda folder: {"robot": "kr5", "data": _axis_runs(folder), "measurement_frame": "robot"},
     "tolerance": lambda folder: {"robot": joint_errors(folder), "depth": 0.05, "lean": (1e-5,) * 6, "position": 1e-4},
     "lines": lambda folder: {
         "robot": "kr5",
@@ -394,7 +398,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "model": "offsets",
         "train": 14,
         "target": "2",
-        "frames": "placed",
+        "placement": "placed",
         "combination": "mean",
     },
     "hexapod_enumerate": lambda _: {},
@@ -406,7 +410,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "distinct": True,
         "branches": ["front-up"],
     },
-    "hexapod_solve": lambda _: {"pose": 7, "legs": (0.3,) * 6, "base": (0.3,) * 3, "tool": (0.15,) * 3},
+    "hexapod_solve": lambda _: {"pose": 7, "legs": (0.3,) * 6, "base_sides": (0.3,) * 3, "tool_sides": (0.15,) * 3},
     "hexapod_world_frame": lambda _: _touches(),
     "iso9283_plan": lambda folder: {
         "robot": "irb120",
@@ -445,7 +449,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "revert": lambda folder: {"programs": [corrected(folder)], "out": folder / "reverted"},
     "convert": lambda folder: {"robot": "irb120", "convention": "hayati", "out": _new(folder, "hayati.yaml")},
     "export": lambda folder: {"robot": "irb120", "format": "hayati", "out": _new(folder, "hayati.csv")},
-    "study": lambda folder: {"name": "irb120-simulation", "seeds": 1, "out": folder / "study"},
+    "study": lambda folder: {"study": "irb120-simulation", "seeds": 1, "out": folder / "study"},
     "fleet": lambda folder: {
         "manifest": _written(folder / "fleet.yaml", _SERIES),
         "out": folder / "fleet",

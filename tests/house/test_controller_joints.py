@@ -238,7 +238,7 @@ def test_what_is_to_be_commanded_is_written_as_asked(tmp_path: Path, whose: Any,
     robot = load_robot(FANUC)
     q = np.radians([[10.0, 20.0, -40.0, 30.0, 50.0, 60.0]])
     p, R = robot.forward(q)
-    found = truearm.inverse(FANUC, p, R, seed=q[0], joints=whose, out=tmp_path / "ik.csv")
+    found = truearm.inverse(FANUC, p, R, seed_joints=q[0], joints=whose, out=tmp_path / "ik.csv")
     assert found.joints == pytest.approx(q, abs=1e-7)
     line = truearm.lines(FANUC, (0.45, 0.0, 0.3), size=(0.1, 0.1, 0.1), joints=whose, out=tmp_path / "lines.csv")
     for file, joints in (("ik.csv", found.joints), ("lines.csv", line.joints)):
@@ -291,12 +291,14 @@ def test_poses_in_the_controllers_frame_are_of_its_flange() -> None:
 def test_poses_in_the_models_frame_are_said_to_be() -> None:
     robot, q = turned(), np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0]])
     p, R = robot.forward(q)
-    (said,) = truearm.inverse(robot, p, R, seed=q[0]).warnings
+    (said,) = truearm.inverse(robot, p, R, seed_joints=q[0]).warnings
     assert (said.code, said.level) == ("model-frame", "note")
     assert "for poses that the pendant shows use `frame=controller`" in said.message
-    assert not truearm.inverse(robot, *robot.forward(q, frame="controller"), seed=q[0], frame="controller").warnings
-    assert not truearm.inverse(robot, p, R, seed=q[0], frame="world").warnings
-    assert not truearm.inverse("irb120", p, R, seed=q[0]).warnings
+    assert not truearm.inverse(
+        robot, *robot.forward(q, frame="controller"), seed_joints=q[0], frame="controller"
+    ).warnings
+    assert not truearm.inverse(robot, p, R, seed_joints=q[0], frame="world").warnings
+    assert not truearm.inverse("irb120", p, R, seed_joints=q[0]).warnings
 
 
 def test_a_target_is_where_it_is_in_the_controllers_base() -> None:
@@ -340,7 +342,7 @@ def test_a_calibrated_robot_file_keeps_its_controller(tmp_path: Path) -> None:
 
 
 def test_a_robot_without_a_controller_shows_its_models_flange() -> None:
-    said = truearm.show(UNKNOWN, joints=np.zeros(5))
+    said = truearm.show(UNKNOWN, joint_positions=np.zeros(5))
     assert any("does not say where its controller has its frames" in line for line in said.lines())
     assert said.summary()["at"]["joints"] == {"model": [0.0] * 5}
     assert truearm.show(UNKNOWN).summary()["at"] is None
@@ -348,7 +350,7 @@ def test_a_robot_without_a_controller_shows_its_models_flange() -> None:
 
 def test_joints_of_the_model_are_shown_when_they_are_said_to_be() -> None:
     q = np.radians([10.0, 20.0, -50.0, -40.0, -50.0, -60.0])
-    said = truearm.show(FANUC, joints=q, joints_are="model").summary()["at"]["joints"]
+    said = truearm.show(FANUC, joint_positions=q, joints_are="model").summary()["at"]["joints"]
     assert said["controller"] == pytest.approx([10, 20, 30, 40, 50, 60])
 
 
@@ -392,10 +394,10 @@ REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
         "joints: it is not known how the controller of katana450 counts",
     ),
     "show": (
-        lambda _: truearm.show(UNKNOWN, joints=np.zeros(5), joints_are="controller"),
+        lambda _: truearm.show(UNKNOWN, joint_positions=np.zeros(5), joints_are="controller"),
         "joints_are: it is not known how the controller of katana450 counts",
     ),
-    "show short": (lambda _: truearm.show(FANUC, joints=[0.0, 1.0]), r"joints: .*"),
+    "show short": (lambda _: truearm.show(FANUC, joint_positions=[0.0, 1.0]), r"joint_positions: .*"),
     "frame": (
         lambda _: load_robot(UNKNOWN).forward(np.zeros(5), frame="controller"),
         "frame: it is not known where the controller of katana450 has its frames.*Say under controller",

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from tests.house.test_options import TWICE, declared_apart
 
 from truearm.commands import main
 from truearm.engine.base.limits import LIMITS
@@ -327,3 +328,8 @@ def test_every_limit_stands_in_the_guide() -> None:
     text = (ROOT / "docs" / "guide" / "data.md").read_text().replace(" ", "")
     for name, limit in LIMITS.items():
         assert f"|`{name}`|{limit.most}|" in text, f"{name} is {limit.most}"
+
+
+def test_no_option_is_excused_that_is_declared_once() -> None:
+    names, words = declared_apart()
+    assert [name for name in TWICE if len({**names, **words}[name]) < 2] == []

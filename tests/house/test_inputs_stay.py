@@ -119,7 +119,7 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "frames": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
     },
     "poses": lambda folder: {"robot": _robot(folder)},
-    "path": lambda folder: {"robot": _robot(folder), "programs": (), "payload": None},
+    "path": lambda folder: {"robot": _robot(folder), "languages": (), "payload": None},
     "sphere": lambda folder: {"robot": _robot(folder)},
     "simulate": lambda folder: {
         "robot": _robot(folder),
@@ -153,7 +153,7 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "robot": _robot(folder),
         "poses": _written(folder / "p.csv", "pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\n1,300,0,500,0,0,1,0\n"),
         "rotations": None,
-        "seed": None,
+        "seed_joints": None,
     },
     "lines": lambda folder: {
         "robot": _written(folder / "k.yaml", robot_text(truearm.load_robot("kr5"))),
@@ -169,7 +169,7 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "tools": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
     },
     "import_table": lambda folder: {
-        "joints": _written(folder / "joints.csv", "configuration,joint_1 [deg],joint_2 [deg]\n1,10,20\n2,15,25\n"),
+        "joints_file": _written(folder / "joints.csv", "configuration,joint_1 [deg],joint_2 [deg]\n1,10,20\n2,15,25\n"),
         "mapping": _written(folder / "beside.yaml", BESIDE_MAPPING),
     },
     "import_ur_kinematics": lambda folder: {

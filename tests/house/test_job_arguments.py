@@ -78,8 +78,10 @@ def _inverse(**given: Any) -> Any:
 
 
 def test_a_seed_is_an_array_or_rows() -> None:
-    seed = EXAMPLES["inverse"](Path())["seed"]
-    assert np.array_equal(_inverse(seed=seed.tolist()).solutions.joints, _inverse(seed=seed).solutions.joints)
+    seed = EXAMPLES["inverse"](Path())["seed_joints"]
+    assert np.array_equal(
+        _inverse(seed_joints=seed.tolist()).solutions.joints, _inverse(seed_joints=seed).solutions.joints
+    )
 
 
 @pytest.mark.parametrize("job", ["check", "calibrate", "validate", "distances", "axes"])

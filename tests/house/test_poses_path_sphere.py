@@ -42,7 +42,7 @@ def test_a_set_is_written_as_other_commands_read_it(truearm: Truearm, tmp_path: 
     assert read.position == pytest.approx(position, abs=1e-9)
     assert read.quaternion is not None
     assert rotation_from_quaternion(read.quaternion) == pytest.approx(rotation, abs=1e-9)
-    again = package.inverse("irb120", tmp_path / "set-poses.csv", seed=data.joints)
+    again = package.inverse("irb120", tmp_path / "set-poses.csv", seed_joints=data.joints)
     assert again.joints == pytest.approx(data.joints, abs=1e-6)
     measured = tmp_path / "measured.csv"
     run = truearm("simulate", "irb120", "--truth", "random", "--poses", out, "--noise", 0.05, "--out", measured)
@@ -67,7 +67,7 @@ def test_a_target_of_the_robot_goes_to_the_poses(tmp_path: Path) -> None:
 
 
 def test_unreachable_poses_end_with_exit_code_3_and_their_names(truearm: Truearm, tmp_path: Path) -> None:
-    words = ("--centre", "350,0,350", "--side", 300, "--orientation", "down", "--out", tmp_path / "s.csv", "--json")
+    words = ("--centre", "350,0,350", "--side", 300, "--tip-orientation", "down", "--out", tmp_path / "s.csv", "--json")
     run = truearm("poses", "irb120", "--set", "iso-cube", *words)
     assert run.code == 3
     summary = json.loads(run.out)
@@ -97,11 +97,11 @@ def test_the_controllers_joint_positions_can_be_asked_for(tmp_path: Path) -> Non
         ({"set": "p1-p5", "centre": (0.3, 0, 0.3), "side": 0.2, "count": 5}, "has a number of poses of its own"),
         ({"set": "p1-p5", "plane": "C1"}, "no plane of this name"),
         ({"set": "p1-p5", "ahead": "up"}, "no ahead of this name"),
-        ({"set": "p1-p5", "orientation": (1.0, 1.0, 0.0, 0.0)}, "has length 1"),
-        ({"set": "p1-p5", "orientation": "up"}, "no orientation of this name"),
+        ({"set": "p1-p5", "tip_orientation": (1.0, 1.0, 0.0, 0.0)}, "has length 1"),
+        ({"set": "p1-p5", "tip_orientation": "up"}, "no orientation of this name"),
         ({"set": "p1-p5", "target": "a", "tip": (0, 0, 0.1)}, "only one of them can go to the poses"),
         ({"set": "p1-p5", "target": "a"}, "there is no target"),
-        ({"set": "p1-p5", "floor": 5.0}, "reaches no cube"),
+        ({"set": "p1-p5", "lowest": 5.0}, "reaches no cube"),
     ],
 )
 def test_what_no_set_can_be_is_refused(given: dict[str, object], said: str) -> None:
@@ -145,7 +145,7 @@ def test_a_path_is_written_with_its_correction_and_programs(truearm: Truearm, ca
         *("tip_x [mm]", "tip_y [mm]", "tip_z [mm]", "error_before [mm]", "error_after [mm]"),
     ]
     table = np.array(rows, float)
-    found = package.path(calibrated, tmp_path / "path.yaml", seed=np.radians([0, 11, 23, 0, 52, 0]))
+    found = package.path(calibrated, tmp_path / "path.yaml", seed_joints=np.radians([0, 11, 23, 0, 52, 0]))
     assert np.radians(table[:, 2:8]) == pytest.approx(found.joints, abs=1e-12)
     assert table[:, 8:11] == pytest.approx(1e3 * found.path.planned.trajectory.position, abs=1e-5)
     assert table[:, 12].max() < 1e-5 < table[:, 11].mean()
@@ -154,11 +154,11 @@ def test_a_path_is_written_with_its_correction_and_programs(truearm: Truearm, ca
     assert len(loads) == len(rows) + 1
     codes = {
         notice.code: notice.level
-        for notice in package.path(calibrated, tmp_path / "path.yaml", programs=["krl"]).warnings
+        for notice in package.path(calibrated, tmp_path / "path.yaml", languages=["krl"]).warnings
     }
     assert codes["maker"] == "warning"
     assert codes["untimed-moves"] == "note"
-    poses = partial(package.path, calibrated, tmp_path / "path.yaml", programs=["rapid"], targets="poses", spacing=0.5)
+    poses = partial(package.path, calibrated, tmp_path / "path.yaml", languages=["rapid"], move_to="poses", spacing=0.5)
     with pytest.raises(InputError, match="Absolute Accuracy"):
         poses()
     far = poses(controller_kinematics="nominal")
@@ -167,7 +167,9 @@ def test_a_path_is_written_with_its_correction_and_programs(truearm: Truearm, ca
 
 def test_a_nominal_robot_follows_the_path_and_is_not_corrected(tmp_path: Path) -> None:
     (tmp_path / "path.yaml").write_text(PATH)
-    found = package.path("irb120", tmp_path / "path.yaml", programs=["urscript"], targets="poses", out=tmp_path / "out")
+    found = package.path(
+        "irb120", tmp_path / "path.yaml", languages=["urscript"], move_to="poses", out=tmp_path / "out"
+    )
     assert not (tmp_path / "out" / "corrected.csv").exists()
     assert "nothing to correct" in found.lines()[1]
     assert "corrected by truearm" not in found.programs["truearm_path.script"]
@@ -178,24 +180,24 @@ def test_poses_for_a_controller_with_kinematics_of_its_own_are_refused(tmp_path:
     robot = package.load_robot("ur5")
     robot = robot.with_values({"a_2": robot.values["a_2"] + 1e-3})
     (tmp_path / "path.yaml").write_text(PATH.replace("joint_speeds: [250, 250, 250, 320, 320, 420]\n", ""))
-    given = {"programs": ["urscript"], "seed": np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])}
+    given = {"languages": ["urscript"], "seed_joints": np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])}
     assert package.path(robot, tmp_path / "path.yaml", **given).programs  # type: ignore[arg-type]
     with pytest.raises(InputError, match="what the factory measured") as refusal:
-        package.path(robot, tmp_path / "path.yaml", targets="poses", **given)  # type: ignore[arg-type]
+        package.path(robot, tmp_path / "path.yaml", move_to="poses", **given)  # type: ignore[arg-type]
     assert refusal.value.parameter == "controller_kinematics"
-    said = package.path(robot, tmp_path / "path.yaml", targets="poses", controller_kinematics="nominal", **given)  # type: ignore[arg-type]
+    said = package.path(robot, tmp_path / "path.yaml", move_to="poses", controller_kinematics="nominal", **given)  # type: ignore[arg-type]
     assert "controller-nominal" in {notice.code for notice in said.warnings}
 
 
 @pytest.mark.parametrize(
     ("given", "said", "parameter"),
     [
-        ({"programs": ["basic"]}, "no language of this name", "programs"),
-        ({"programs": ["rapid"], "name": "2nd"}, "cannot be called so in every language", "name"),
-        ({"programs": ["rapid"], "targets": "pulses"}, "no targets of this name", "targets"),
-        ({"seed": (0.0, 0.0)}, "seed", "seed"),
+        ({"languages": ["basic"]}, "no language of this name", "languages"),
+        ({"languages": ["rapid"], "name": "2nd"}, "cannot be called so in every language", "name"),
+        ({"languages": ["rapid"], "move_to": "pulses"}, "no kind of targets of this name", "move_to"),
+        ({"seed_joints": (0.0, 0.0)}, "seed_joints", "seed_joints"),
         ({"accept": ["anything"]}, "anything", "accept"),
-        ({"seed": (0.0, 0.2, 0.4, 0.0, 0.0, 0.0), "file": "way.yaml"}, "no such file", "file"),
+        ({"seed_joints": (0.0, 0.2, 0.4, 0.0, 0.0, 0.0), "file": "way.yaml"}, "no such file", "file"),
     ],
 )
 def test_what_cannot_be_followed_is_refused(
@@ -265,7 +267,7 @@ def test_a_sphere_is_judged_before_and_after_calibration(true: Robot) -> None:
     assert one.before is not None
     assert one.before.deviation > 0.2e-3
     assert found.summary()["spheres"][0]["nominal_mm"]["deviation"] > 0.2
-    taught = package.sphere(true, data, taught="taught")
+    taught = package.sphere(true, data, taught_at="taught")
     assert taught.spheres[0].after.centre == pytest.approx([0.3, 0.1, 0.2], abs=1e-8)
     assert taught.spheres[0].after.largest < 4e-6
     assert taught.spheres[0].before is not None
@@ -289,8 +291,8 @@ def test_the_command_says_mean_deviation_and_largest(truearm: Truearm, true: Rob
 def test_what_no_sphere_test_is_made_of_is_refused(true: Robot, tmp_path: Path) -> None:
     data = _bar(true, 30, 1e-6)
     with pytest.raises(InputError, match="no configuration of this name") as refusal:
-        package.sphere(true, data, taught="x")
-    assert refusal.value.parameter == "taught"
+        package.sphere(true, data, taught_at="x")
+    assert refusal.value.parameter == "taught_at"
     assert data.distance is not None
     with pytest.raises(InputError, match="no distances of a ballbar"):
         package.sphere(true, replace(data, distance=np.full(31, np.nan)))

@@ -320,7 +320,16 @@ def test_an_output_that_is_an_input(truearm: Truearm, small: Path, tmp_path: Pat
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     (tmp_path / "link").symlink_to("joints.txt")
-    matrices = ["import", "matrices", "--angle-unit", "deg", "--length-unit", "mm", "--joints", tmp_path / "joints.txt"]
+    matrices = [
+        "import",
+        "matrices",
+        "--angle-unit",
+        "deg",
+        "--length-unit",
+        "mm",
+        "--joints-file",
+        tmp_path / "joints.txt",
+    ]
     matrices += ["--target", f"a={tmp_path / 'a.txt'}", "--reference", f"b={tmp_path / 'b.txt'}", "--out"]
     table = ["import", "table", tmp_path / "table.csv", "--map", tmp_path / "map.yaml", "--out"]
     for words, names in ((matrices, ("joints.txt", "a.txt", "b.txt", "link")), (table, [*files][3:])):
@@ -358,8 +367,8 @@ def test_a_truth_of_another_robot(truearm: Truearm, tmp_path: Path) -> None:
 @pytest.mark.parametrize("entry", ["1", "1=", "=file.txt"])
 def test_import_names_its_targets(truearm: Truearm, tmp_path: Path, entry: str) -> None:
     message = refused(
-        truearm, "import", "matrices", "--joints", "j.txt", "--target", entry, "--angle-unit", "deg", "--length-unit",
-        "mm", "--out", tmp_path / "x.csv",
+        truearm, "import", "matrices", "--joints-file", "j.txt", "--target", entry, "--angle-unit", "deg",
+        "--length-unit", "mm", "--out", tmp_path / "x.csv",
     )  # fmt: skip
     assert f"--target: a name and a file belong here; got '{entry}'; allowed: NAME=FILE" in message
 

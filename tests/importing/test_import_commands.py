@@ -84,7 +84,7 @@ def test_presets_and_another_file_of_joints(truearm: Truearm, tmp_path: Path) ->
     points.write_text("A, P1, ball, 1, 2, 3, 0.1, 0.1, 0.1, 01/31/2026 10:00:00\n")
     joints.write_text("configuration,joint_1 [deg]\nP1,10\n")
     words = ("import", "table", points, "--map", "spatial-analyzer", "--out", out)
-    made = truearm(*words, "--joints", joints)
+    made = truearm(*words, "--joints-file", joints)
     assert (made.code, made.out) == (0, f"1 configuration, targets ball: {out}\n")
     missing = truearm(*words)
     assert (missing.code, "joints.csv: there is no such file" in missing.err) == (2, True)

@@ -21,7 +21,7 @@ def test_matrices_and_what_is_missing(tmp_path: Path) -> None:
     ]
     assert truearm.load_data(tmp_path / "data.csv").configurations == 2
     with pytest.raises(InputError, match="would be overwritten") as refusal:
-        truearm.import_matrices(**arguments, out=arguments["joints"])
+        truearm.import_matrices(**arguments, out=arguments["joints_file"])
     assert refusal.value.parameter == "out"
 
 

@@ -81,7 +81,7 @@ def test_another_file_of_joints_and_a_file_of_the_preset_s_name(cell: Path) -> N
     (cell / "joints.csv").rename(cell / "driven.csv")
     with pytest.raises(InputError, match=r"joints.csv: there is no such file"):
         truearm.import_table(cell / "points.txt", "spatial-analyzer")
-    read = truearm.import_table(cell / "points.txt", "spatial-analyzer", joints=cell / "driven.csv")
+    read = truearm.import_table(cell / "points.txt", "spatial-analyzer", joints_file=cell / "driven.csv")
     assert read.data.joints_are == "controller"
     with pytest.raises(InputError, match=r"no such preset.*presets spatial-analyzer, t-mac\. Did you mean t-mac"):
         truearm.import_table(cell / "points.txt", "tmac")

@@ -265,7 +265,7 @@ def test_joints_come_from_a_file_with_the_columns_of_the_canonical_csv(tmp_path:
     (tmp_path / "map.yaml").write_text(MAP)
     with pytest.raises(InputError, match="takes the joint positions from the table itself") as refusal:
         read_table(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)
-    assert refusal.value.parameter == "joints"
+    assert refusal.value.parameter == "joints_file"
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_a_port_in_use_ends_with_two_and_a_free_one(truearm: Truearm, plan: Path
 
 def test_the_token_that_is_given_stands_in_no_file_and_no_line(truearm: Truearm, plan: Path, tmp_path: Path) -> None:
     token = "this-is-the-secret-of-the-test"
-    given = ("--listen", 0, "--token", token, "--target", "a", "--wait", 0)
+    given = ("--listen", 0, "--token", token, "--target", "a", "--timeout", 0)
     run = truearm("measure", plan, "irb120", *given, "--out", tmp_path / "out")
     assert run.code == 0
     assert "Listening on 127.0.0.1 port" in run.out

@@ -191,12 +191,12 @@ def test_a_folder_into_which_nothing_comes_is_left_after_a_while(plan: Path, tmp
     (tmp_path / "in").mkdir()
     (tmp_path / "map.yaml").write_text(MAPPING)
     given: dict[str, Any] = {"watch": tmp_path / "in", "mapping": tmp_path / "map.yaml", "targets": ["a"]}
-    found = truearm.measure(plan, "irb120", out=tmp_path / "out", wait=0.0, **given)
+    found = truearm.measure(plan, "irb120", out=tmp_path / "out", timeout=0.0, **given)
     assert found.files == ()
     assert found.data is None
     assert "unfinished" in {notice.code for notice in found.warnings}
     (tmp_path / "in" / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\n")
-    assert truearm.measure(plan, "irb120", out=tmp_path / "out", wait=0.0, **given).files == (DATA, PAGE)
+    assert truearm.measure(plan, "irb120", out=tmp_path / "out", timeout=0.0, **given).files == (DATA, PAGE)
 
 
 def test_ctrl_c_ends_with_what_is_there(plan: Path, tmp_path: Path) -> None:
@@ -240,7 +240,7 @@ def test_a_program_sends_readings_to_a_port(plan: Path, tmp_path: Path) -> None:
 
         threading.Thread(target=send, daemon=True).start()
 
-    found = truearm.measure(plan, "irb120", out=tmp_path / "out", listen=0, targets=["a"], wait=10.0, tell=talk)
+    found = truearm.measure(plan, "irb120", out=tmp_path / "out", listen=0, targets=["a"], timeout=10.0, tell=talk)
     assert found.finished
     assert len(found.session.kept) == 3
     assert "token" not in found.command

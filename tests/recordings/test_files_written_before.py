@@ -122,7 +122,7 @@ def test_a_measuring_goes_on_where_it_stopped(written: Path) -> None:
         watch=place / "seen",
         mapping=place / "rows.yaml",
         targets=["smr"],
-        wait=0,
+        timeout=0,
         out=place / "out",
     )
     assert "unfinished" not in {warning["code"] for warning in measured.summary()["warnings"]}

@@ -26,11 +26,11 @@ def test_arrays_and_a_file_give_the_same_joints(tmp_path: Path) -> None:
     file = tmp_path / "poses.csv"
     lines = [f"{n},{','.join(map(repr, row))}" for n, row in enumerate(rows, 1)]
     file.write_text("\n".join(["pose,x [mm],y [mm],z [mm],qw,qx,qy,qz", *lines]) + "\n")
-    found = truearm.inverse("irb120", p, R, seed=Q)
+    found = truearm.inverse("irb120", p, R, seed_joints=Q)
     assert found.joints == pytest.approx(Q, abs=1e-9)
     assert found.complete
     assert found.lines() == ["2 of 2 poses reached. Rows: 2 reached"]
-    read = truearm.inverse("irb120", file, seed=Q[0], branch="front-up-noflip", out=tmp_path / "joints.csv")
+    read = truearm.inverse("irb120", file, seed_joints=Q[0], branch="front-up-noflip", out=tmp_path / "joints.csv")
     assert read.joints == pytest.approx(Q, abs=1e-9)
     assert (tmp_path / "joints.csv").read_text().count("\n") == 3
 

@@ -43,27 +43,27 @@ def test_show_says_what_the_controller_does_its_own_way(truearm: Truearm, tmp_pa
 
 
 def test_show_says_where_a_robot_stands(truearm: Truearm) -> None:
-    shown = truearm("show", "lrmate200ic", "--joints", "0,0,0,0,0,0").out
+    shown = truearm("show", "lrmate200ic", "--joint-positions", "0,0,0,0,0,0").out
     assert "\n  x 475.000  y 0.000  z 375.000 mm\n" in shown
     assert "\n  W P R  180.0000  -90.0000  0.0000 deg  (FANUC, as Rx Ry Rz Yaskawa)\n" in shown
-    down = truearm("show", "lrmate200ic", "--joints", "0,0,0,0,-90,0").out
+    down = truearm("show", "lrmate200ic", "--joint-positions", "0,0,0,0,-90,0").out
     assert "\n  q1 q2 q3 q4  0.000000  1.000000  0.000000  0.000000  (ABB)\n" in down
     assert "\n  rx ry rz  3.1416  0.0000  0.0000 rad  (Universal Robots)\n" in down
-    at = json.loads(truearm("show", "lrmate200ic", "--joints", "0,10,0,0,0,0", "--json").out)["at"]
+    at = json.loads(truearm("show", "lrmate200ic", "--joint-positions", "0,10,0,0,0,0", "--json").out)["at"]
     assert at["joints"]["model"] == pytest.approx([0, 10, -10, 0, 0, 0])
-    words = ("show", "lrmate200ic", "--joints-are", "model", "--joints", "0,10,-10,0,0,0", "--json")
+    words = ("show", "lrmate200ic", "--joints-are", "model", "--joint-positions", "0,10,-10,0,0,0", "--json")
     assert json.loads(truearm(*words).out)["at"]["joints"]["controller"] == pytest.approx([0, 10, 0, 0, 0, 0])
 
 
 @pytest.mark.parametrize(
     ("joints", "words"),
     [
-        ("1,2", "--joints: there are not as many numbers as joints; got '2 numbers'; allowed: 6, one for each joint"),
-        ("1,2,3,4,5,x", "--joints: numbers separated by commas belong here"),
-        ("1,2,3,4,5,nan", "--joints: "),
+        ("1,2", "--joint-positions: there are not as many numbers as joints; got '2 numbers'; allowed: 6, one for"),
+        ("1,2,3,4,5,x", "--joint-positions: numbers separated by commas belong here"),
+        ("1,2,3,4,5,nan", "--joint-positions: "),
     ],
 )
 def test_show_refuses_joints_that_are_none(truearm: Truearm, joints: str, words: str) -> None:
-    run = truearm("show", "irb120", "--joints", joints)
+    run = truearm("show", "irb120", "--joint-positions", joints)
     assert run.code == 2
     assert words in run.err

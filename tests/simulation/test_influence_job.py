@@ -117,14 +117,14 @@ def test_frames_of_the_file_are_held_where_the_readings_are_in_them() -> None:
     own = KATANA.with_frames(KATANA.base, {"tip": (0.0, 0.0, 0.0)})
     truth = own.with_values(KATANA.truths["standard"].values)
     data = truearm.simulate(own, truth=truth, poses=30, noise=1e-5).data
-    result = truearm.influence(own, data, frames="robot", combination="scaled-mean")
+    result = truearm.influence(own, data, placement="robot", combination="scaled-mean")
     assert result.identified is not None
     assert result.identified.frames == "robot"
     errors = {way: one.position.mean for way, one in result.identified.errors.items() if one.position is not None}
     assert errors["least squares"] < 0.05e-3 < errors["influence"]
     with pytest.raises(InputError, match="does not say where this target is") as refusal:
-        truearm.influence(KATANA, data, frames="robot")
-    assert refusal.value.parameter == "frames"
+        truearm.influence(KATANA, data, placement="robot")
+    assert refusal.value.parameter == "placement"
 
 
 def test_poses_that_cannot_be_met_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

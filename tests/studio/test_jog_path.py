@@ -72,7 +72,7 @@ def test_a_path_is_made_where_the_tip_is_drawn_and_played(studio: Studio, page: 
     act(made._do, "play")
     assert window.wait(60.0)
     assert eventually(lambda: page._playing is not None), said(studio)
-    followed = job("irb120", file, seed=seed)
+    followed = job("irb120", file, seed_joints=seed)
     assert followed.lines()[0] in said(studio)
     playing = page._playing
     assert playing is not None

@@ -150,7 +150,7 @@ def test_the_singular_value_is_that_of_inverse_kinematics(name: str) -> None:
         arm = Jogging(robot, joints)
         p, R = arm.pose()
         turned = None if arm.orientation == "free" else R[None]
-        found = inverse(robot, p[None], turned, seed=joints, orientation=arm.orientation).solutions
+        found = inverse(robot, p[None], turned, seed_joints=joints, orientation=arm.orientation).solutions
         assert arm.singular_value() == pytest.approx(float(found.singular_value[0]), abs=1e-9)
 
 

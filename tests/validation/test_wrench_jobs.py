@@ -56,12 +56,12 @@ def test_the_target_goes_to_the_pose_under_the_force(campaign: tuple[Twin, Robot
     _, robot = campaign
     q = np.random.default_rng(1).uniform(0.2, 0.8, (3, 6))
     wanted = robot.forward(q, target="1")
-    found = truearm.inverse(robot, *wanted, seed=q, target="1", wrench=TEXT, wrench_frame=frame)
+    found = truearm.inverse(robot, *wanted, seed_joints=q, target="1", wrench=TEXT, wrench_frame=frame)
     assert "force-taken" in codes(found)
     pushed = robot.with_wrench(Wrench.of(TEXT, frame), "1")
     np.testing.assert_allclose(pushed.forward(found.joints, target="1")[0], wanted[0], atol=2e-9)
     assert np.abs(found.joints - q).max() > 1e-5
-    same = truearm.inverse(robot, *wanted, seed=q, target="1", wrench=Wrench.of(TEXT, frame))
+    same = truearm.inverse(robot, *wanted, seed_joints=q, target="1", wrench=Wrench.of(TEXT, frame))
     np.testing.assert_array_equal(same.joints, found.joints)
 
 
@@ -73,7 +73,7 @@ def test_the_force_acts_on_the_controllers_flange_where_poses_are_the_controller
     robot = replace(robot, controller=replace(robot.controller, flange=flange))
     q = np.full((1, 6), 0.4)
     wanted = robot.forward(q, frame="controller")
-    found = truearm.inverse(robot, *wanted, seed=q, frame="controller", wrench=TEXT, wrench_frame="tool")
+    found = truearm.inverse(robot, *wanted, seed_joints=q, frame="controller", wrench=TEXT, wrench_frame="tool")
     pushed = robot.with_wrench(Wrench.of(TEXT, "tool"), flange)
     np.testing.assert_allclose(pushed.forward(found.joints, frame="controller")[0], wanted[0], atol=2e-9)
 
@@ -219,7 +219,7 @@ def test_a_file_says_what_acts_where(cell: Path) -> None:
     file = cell / "cell.yaml"
     file.write_text(text)
     words = ["compensate", str(cell / "calibrated.yaml"), str(cell / "plate.mod"), "--out", str(cell / "out"), *ANSWERS]
-    run = CliRunner().invoke(program(), [*words, "--tool", str(file), "--wrench", str(file), "--json"])
+    run = CliRunner().invoke(program(), [*words, "--tools", str(file), "--wrench", str(file), "--json"])
     assert "force-taken" in {notice["code"] for notice in json.loads(run.output)["warnings"]}
     said: tuple[tuple[list[str], str], ...] = (
         ([], str(file) + ": the file has wrenches, and nothing takes them. Give the file as --wrench"),
@@ -228,7 +228,7 @@ def test_a_file_says_what_acts_where(cell: Path) -> None:
         (["--wrench", "1,2,3,4,5"], "--wrench: three forces and three moments belong here"),
     )
     for more, message in said:
-        run = CliRunner().invoke(program(), [*words, "--tool", str(file), *more])
+        run = CliRunner().invoke(program(), [*words, "--tools", str(file), *more])
         assert message in str(run.exception)
 
 

@@ -21,10 +21,11 @@ class Axes(OfData, IntoFolder, Long):
 
     job = "axes"
     refuses = "If the robot or the data cannot be used, a joint has no run, or its axis cannot be found."
-    frame: Literal["instrument", "robot"] = option(
-        Choice(known=("instrument", "robot")),
+    measurement_frame: Literal["instrument", "robot"] = option(
+        Choice(known=("instrument", "robot"), what="frame"),
         "What the data are given in: the instrument's frame, or the robot's base frame, set up before.",
         default="instrument",
+        formerly="frame",
     )
 
     def run(self) -> AxisCalibration:

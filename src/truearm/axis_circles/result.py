@@ -220,7 +220,8 @@ def found_axes(asked: Axes) -> AxisCalibration:
     asked.progress("fitting circles and axes")
     with refusals_of("data"):
         found = AxisCalibration(
-            analyse(nominal, readings, in_robot_frame=asked.frame == "robot"), files_of(asked.robot, asked.data)
+            analyse(nominal, readings, in_robot_frame=asked.measurement_frame == "robot"),
+            files_of(asked.robot, asked.data),
         )
     if folder is not None:
         asked.progress("writing the files")

@@ -71,7 +71,7 @@ class ImportRos(JointsGiven, IntoFile, Repeatable, Long):
         _JointNames("NAME,NAME,...", "names of joints", repeated=False),
         "The robot's joints from base to flange, as the messages call them.",
         default=None,
-        word="joints",
+        formerly="joints",
         shown="by the numbers at their ends",
     )
     prismatic: Sequence[str] = option(
@@ -85,7 +85,9 @@ class ImportRos(JointsGiven, IntoFile, Repeatable, Long):
         "How far a joint may move in a standstill; one that slides 1 m per rad.",
         default=math.radians(0.02),
     )
-    hold: float = option(Number("s", low=0.05, high=3600.0), "The shortest standstill.", default=1.0)
+    shortest_dwell: float = option(
+        Number("s", low=0.05, high=3600.0), "The shortest standstill.", default=1.0, formerly="hold"
+    )
     settle: float = option(
         Number("s", low=0.0), "What is left out at the beginning and end of a standstill.", default=0.3
     )
@@ -99,13 +101,13 @@ class ImportRos(JointsGiven, IntoFile, Repeatable, Long):
             )
         if references and not targets:
             raise InputError("a point beside the robot is given, and no target", parameter="targets")
-        if 2.0 * self.settle >= self.hold:
+        if 2.0 * self.settle >= self.shortest_dwell:
             raise InputError(
                 "nothing is left of the shortest standstill",
                 parameter="settle",
-                came=f"{self.settle:g} s at either end of {self.hold:g} s",
-                allowed=f"less than {self.hold / 2:g} s",
-                cure="Leave out less, or ask for longer standstills with `hold`.",
+                came=f"{self.settle:g} s at either end of {self.shortest_dwell:g} s",
+                allowed=f"less than {self.shortest_dwell / 2:g} s",
+                cure="Leave out less, or ask for longer standstills with `shortest_dwell`.",
             )
 
     def run(self) -> ImportedBag:

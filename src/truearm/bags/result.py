@@ -173,6 +173,6 @@ def _found(bag: Path, asked: ImportRos) -> Recording:
         prismatic=tuple(asked.prismatic),
         joints_are=asked.joints_are or "model",
         still=asked.still,
-        hold=asked.hold,
+        hold=asked.shortest_dwell,
         settle=asked.settle,
     )

@@ -118,8 +118,8 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
             if whole.any()
             else f"no {hold:g} s without a gap",
             allowed=f"{math.degrees(still):g} deg at most for {hold:g} s",
-            cure="Let the robot wait at each configuration, or allow more with `still` or a shorter time with `hold` "
-            "if that was a standstill.",
+            cure="Let the robot wait at each configuration, or allow more with `still` or a shorter time with "
+            "`shortest_dwell` if that was a standstill.",
         )
     found = []
     for i, j in _joined(positions, gaps, zip(begin.tolist(), (last[end - 1] + 1).tolist(), strict=True), still):
@@ -393,12 +393,12 @@ def found_in(
     if len(missed) > len(stills):
         raise InputError(
             "most pauses of the robot are no standstills",
-            parameter="hold",
+            parameter="shortest_dwell",
             where=f"{bag}, topic {joints.topic}",
             came=f"{counted(len(stills), 'standstill')} and {counted(len(missed), 'other pause')}, at "
             f"{listed([f'{at:.1f} s' for at in missed])}",
-            cure="They are shorter than `hold`, a joint moves more than `still` in them, or the joints were not "
-            "recorded. Allow more if these were the stops, or wait longer.",
+            cure="They are shorter than `shortest_dwell`, a joint moves more than `still` in them, or the joints were "
+            "not recorded. Allow more if these were the stops, or wait longer.",
         )
     sightings = tuple(seen_at(stills, target, settle) for target in targets)
     rows = [

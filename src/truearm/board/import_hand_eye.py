@@ -64,20 +64,21 @@ class ImportHandEye(IntoFile):
         shown="taken as exact",
         more="Of how much longer than named the lengths on the board are, or of the poses' own scale.",
     )
-    ahead: float | None = option(
+    working_distance: float | None = option(
         Number("mm", low=0.0),
         "How far before the camera the target is; that of the first session for every later one.",
         default=None,
         shown="where the board was on average",
+        formerly="ahead",
     )
 
     def check(self) -> None:
         """Refuse a point ahead of a camera that is not on the flange."""
-        if self.ahead is not None and self.on_flange != "camera":
+        if self.working_distance is not None and self.on_flange != "camera":
             raise InputError(
                 "only a camera on the flange has a point ahead of it",
-                parameter="ahead",
-                came=f"{self.ahead * 1e3:g} mm",
+                parameter="working_distance",
+                came=f"{self.working_distance * 1e3:g} mm",
                 cure="Leave it out.",
             )
 

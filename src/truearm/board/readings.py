@@ -237,7 +237,7 @@ def of_views(asked: ImportHandEye) -> ImportedHandEye:
     refuse_wrong_place(pictures, asked.board)
     out = None if asked.out is None else file_for(asked.out, table, *pictures)
     with refusals_of("file"):
-        read = read_hand_eye(table, asked.on_flange, board, asked.ahead)
+        read = read_hand_eye(table, asked.on_flange, board, asked.working_distance)
     data = replace(read.data, scale_sigma=asked.scale_sigma)
     if out is not None:
         write_text(out, csv_text(data))

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.command.groups import Excluding, IntoFolder, Loaded, Long, Noted, OfData, Repeatable, Split
-from truearm.engine.command.kinds import Choice, File, Flag, Given, Names, NumberOr, Whole
-from truearm.engine.command.request import job, option
+from truearm.engine.command.groups import Excluding, IntoFolder, Loaded, Long, Noted, OfCell, OfData, Repeatable, Split
+from truearm.engine.command.kinds import Choice, Flag, Given, Names, NumberOr, Whole
+from truearm.engine.command.request import as_in, job, option
 
 if TYPE_CHECKING:
     from truearm.calibration.result import Calibration
@@ -65,16 +65,17 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
     bounds: Bounds | str | Path | None = option(Given("FILE"), "Limits of parameter values.", default=None, shown=False)
     hold: Sequence[str] = option(
         Names("WHAT,...", "base, targets, fixtures, or names of these"),
-        "What is known and not found: base, targets, fixtures, or names.",
+        "What is known and not found: base, targets, fixtures, or names; `frames` says where.",
         default=(),
         more="The calibration is an absolute one then.",
     )
-    frames: str | Path | None = option(
-        File("FILE"),
-        "Where what is held stands.",
+    frames: str | Path | None = as_in(
+        OfCell,
+        "frames",
         default=None,
         shown=False,
-        more="Of the schema ``truearm-cell/1``: targets are its tools, base and fixtures its frames.",
+        more="Of the schema ``truearm-cell/1``: what is held stands there, targets as its tools, base and fixtures as "
+        "its frames.",
     )
     bootstrap: int = option(
         Whole(low=20, counts=True, or_zero=True),

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from truearm.engine.command.groups import Excluding, Long, SeenBy
-from truearm.engine.command.kinds import Given
-from truearm.engine.command.request import job, option
+from truearm.engine.command.groups import Excluding, Long, Measured, OfRobot, SeenBy
+from truearm.engine.command.request import as_in, job
 
 if TYPE_CHECKING:
     from truearm.checking.checking import DataCheck
@@ -23,17 +22,15 @@ class Check(SeenBy, Excluding, Long):
 
     job = "check"
     refuses = "If the robot or the data cannot be used, or their joints do not belong together."
-    robot: Robot | Dataset | str | Path | None = option(
-        Given("[ROBOT]"),
-        "A library id, a robot file or a URDF.",
+    robot: Robot | Dataset | str | Path | None = as_in(
+        OfRobot,
+        "robot",
         default=None,
-        shown=False,
         kw_only=False,
+        metavar="[ROBOT]",
         more="It may be left out: ``check(data)``, or None.",
     )
-    data: Dataset | str | Path | None = option(
-        Given("DATA.csv"), "Measurements in the canonical CSV.", default=None, shown=False, kw_only=False
-    )
+    data: Dataset | str | Path | None = as_in(Measured, "data", default=None, kw_only=False)
 
     def run(self) -> DataCheck:
         """Check."""

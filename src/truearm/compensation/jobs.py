@@ -20,6 +20,7 @@ from truearm.engine.command.groups import (
     Long,
     Near,
     Noted,
+    OfCell,
     OfController,
     OfRobot,
     Repeatable,
@@ -95,6 +96,7 @@ class Revert(OfPrograms, IntoFolder):
 class Compensate(
     OfPrograms,
     OfRobot,
+    OfCell,
     Carrying,
     ForceFrame,
     OfController,
@@ -120,22 +122,6 @@ class Compensate(
         "badly or is another maker's, a tool or frame is not defined, a target cannot be corrected and that is not "
         "accepted, or would be moved or turned farther than the robot's errors explain, or nothing says what was "
         "taught, or with what a controller computes whose maker offers a calibration."
-    )
-    tools: str | Path | None = option(
-        File("FILE"),
-        "Where the tools really are on the flange.",
-        default=None,
-        word="tool",
-        shown="best with nominal",
-        more="See :mod:`truearm.engine.programs.cell`.",
-    )
-    frames: str | Path | None = option(
-        File("FILE"),
-        "Where the program's frames really are.",
-        default=None,
-        word="frame",
-        shown="no shift on average",
-        more="See :mod:`truearm.engine.programs.cell`.",
     )
     wrench: Wrench | Sequence[float] | str | Path | None = option(
         WrenchKind("FX,FY,FZ,MX,MY,MZ|FILE"),
@@ -215,17 +201,18 @@ class FollowPath(OfRobot, Near, Loaded, Forced, OfController, Accepting, JointsW
         kw_only=False,
         more="See :mod:`truearm.engine.motion.path_file`.",
     )
-    programs: Sequence[str] = option(
+    languages: Sequence[str] = option(
         Names("LANGUAGE", known=_languages, what="language", commas=False),
         "A language to write the corrected path in: rapid, krl, fanuc-ls, urscript, inform, val3 or all.",
         default=(),
         word="program",
+        formerly="programs",
     )
-    targets: TargetKind = option(
-        Choice(known=("joints", "poses")),
-        "Of the programs.",
+    move_to: TargetKind = option(
+        Choice(known=("joints", "poses"), what="kind of targets"),
+        "What programs move to: joint positions, or straight to poses.",
         default="joints",
-        more="Joint positions, or straight moves to poses.",
+        formerly="targets",
     )
     spacing: float = option(
         Number("s", low=0.0, above=True),

@@ -221,7 +221,7 @@ _FAR = 0.02e-3
 
 def follow(asked: FollowPath) -> FollowedPath:
     """Follow a path, correct it, and write what was asked for."""
-    chosen = [BY_NAME[one] for one in (BY_NAME if "all" in asked.programs else asked.programs)]
+    chosen = [BY_NAME[one] for one in (BY_NAME if "all" in asked.languages else asked.languages)]
     inputs = (asked.robot, asked.file, *kinematics_file(asked.controller_kinematics))
     folder = None
     if asked.out is not None:
@@ -263,9 +263,9 @@ def follow(asked: FollowPath) -> FollowedPath:
 def _followed(asked: FollowPath, arm: Robot, joints_are: JointsOf) -> CorrectedPath:
     """Follow the path, and correct it."""
     near = None
-    if asked.seed is not None:
-        seed = positions_of(asked.seed, arm, joints_are, "seed")
-        near = array_argument(seed, "seed", (len(arm.joints),), f"{len(arm.joints)} numbers, one for each joint")
+    if asked.seed_joints is not None:
+        seed = positions_of(asked.seed_joints, arm, joints_are, "seed_joints")
+        near = array_argument(seed, "seed_joints", (len(arm.joints),), f"{len(arm.joints)} numbers, one for each joint")
     with refusals_of("file"):
         return correct_path(arm, read_path(path_argument(asked.file, "file")), near)
 
@@ -276,8 +276,8 @@ def _texts(
     """Return the texts of the programs, and add what is to be said of them."""
     if not chosen:
         return {}
-    with refusals_of("name" if asked.targets == "joints" else "targets"):
-        content = path_program(followed, arm, asked.name, targets=asked.targets, spacing=asked.spacing)
+    with refusals_of("name" if asked.move_to == "joints" else "move_to"):
+        content = path_program(followed, arm, asked.name, targets=asked.move_to, spacing=asked.spacing)
         return _programs(arm, content, chosen, notices)
 
 
@@ -345,7 +345,7 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
             Notice(
                 "untimed-moves",
                 f"{listed(untimed)} cannot say how long a joint motion takes: the robot goes as fast as it is set to, "
-                "and what motion adds to the loads is another than was corrected. Write `targets=poses`, or run the "
+                "and what motion adds to the loads is another than was corrected. Write `move_to=poses`, or run the "
                 "program slowly.",
                 "note",
             )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.command.groups import IntoFile
+from truearm.engine.command.groups import Declared, IntoFile
 from truearm.engine.command.kinds import Given, NamedFiles, Number
 from truearm.engine.command.request import job, option, required
 
@@ -40,7 +40,7 @@ class _Dots(Given):
         return [",".join(Number().typed_again(one)[0] for one in (value if isinstance(value, tuple) else (value,)))]
 
 
-class ImportCircle(IntoFile):
+class ImportCircle(Declared, IntoFile):
     """Circles that the robot drew with a pencil: scanned pages and the potentiometer's readings."""
 
     job = "import_circle"
@@ -58,12 +58,6 @@ class ImportCircle(IntoFile):
     )
     dpi: float | Sequence[float] | None = option(
         _Dots("N|X,Y"), "Dots per inch of the scans.", default=None, shown="as the files say"
-    )
-    sigma: float | None = option(
-        Number("mm", low=0.0, above=True, deviation=True),
-        "Deviation of radius and height.",
-        default=None,
-        shown="not declared",
     )
 
     def check(self) -> None:

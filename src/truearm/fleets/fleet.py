@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import InParts, Long, Repeatable
-from truearm.engine.command.kinds import File, Flag, Text, Whole
+from truearm.engine.command.kinds import File, Flag, Text
 from truearm.engine.command.request import job, option, required
 
 if TYPE_CHECKING:
@@ -36,13 +36,6 @@ class CalibrateFleet(InParts, Repeatable, Long):
         word="out",
         more="It gets record.json, fleet.json, robots.csv and report.html.",
         repeated=False,
-    )
-    workers: int | None = option(
-        Whole(low=1, counts=True),
-        "Processes of this machine.",
-        default=None,
-        shown="one a processor",
-        more="One is this process itself.",
     )
     scheduler: str | None = option(
         Text("ADDRESS"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import AlsoIntoFile, Drawn, IntoFile, JointsWritten, OfRobot
 from truearm.engine.command.kinds import File, Flag, Given, GivenFiles, Names, Number, Numbers, Text, Whole
-from truearm.engine.command.request import Request, job, option, required
+from truearm.engine.command.request import Request, as_in, job, option, required
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -168,8 +168,12 @@ class SolveCups(_Ranged, AlsoIntoFile):
     legs: Sequence[float] | None = option(
         Numbers("MM,..", "mm", 6), "Without a sheet: six lengths in the order of the pose's legs.", default=None
     )
-    base: Sequence[float] = option(_THREE, "B1-B2, B2-B3, B3-B1.", default=(0.3,) * 3, more="With `pose`.")
-    tool: Sequence[float] = option(_THREE, "T1-T2, T2-T3, T3-T1.", default=(0.15,) * 3, more="With `pose`.")
+    base_sides: Sequence[float] = option(
+        _THREE, "B1-B2, B2-B3, B3-B1.", default=(0.3,) * 3, more="With `pose`.", formerly="base"
+    )
+    tool_sides: Sequence[float] = option(
+        _THREE, "T1-T2, T2-T3, T3-T1.", default=(0.15,) * 3, more="With `pose`.", formerly="tool"
+    )
 
     def check(self) -> None:
         """Refuse a sheet and a pose at once, or neither, and a file for what is no data."""
@@ -205,8 +209,10 @@ class FindFixture(OfRobot, _WithTool, _Ranged):
         kw_only=False,
         more="Or joint positions at B1, B2 and B3 [rad or m], ``(3, joints)``.",
     )
-    base: Sequence[float] = required(_THREE, "Measured distances B1-B2, B2-B3, B3-B1.", kw_only=False, word="base")
-    target: str | None = option(Text("NAME"), "Cup of the tool that touched.", default=None, shown="first")
+    base_sides: Sequence[float] = as_in(
+        SolveCups, "base_sides", kw_only=False, word="base_sides", shown=False, more="They were measured."
+    )
+    cup: str | None = option(Text("NAME"), "Of the tool, that touched.", default=None, shown="first", formerly="target")
 
     def run(self) -> HexapodFrame:
         """Find it."""

@@ -12,7 +12,7 @@ import numpy as np
 from truearm.engine.base.errors import InputError, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.writing import same_place
-from truearm.engine.command.arguments import array_argument, file_for, files_of, robot_argument
+from truearm.engine.command.arguments import array_argument, choice_argument, file_for, files_of, robot_argument
 from truearm.engine.data.hexapod import (
     DEVICE,
     Device,
@@ -107,31 +107,32 @@ def _one_pose(asked: SolveCups, device: Device) -> SolvedPose:
     lengths = np.array(asked.legs)
     for names, values, nominal, parameter in (
         (chosen.design.leg_names, lengths.tolist(), device.leg, "legs"),
-        (side_names("B"), asked.base, device.base, "base"),
-        (side_names("T"), asked.tool, device.tool, "tool"),
+        (side_names("B"), asked.base_sides, device.base, "base_sides"),
+        (side_names("T"), asked.tool_sides, device.tool, "tool_sides"),
     ):
         with refusals_of(parameter):
             for name, value in zip(names, values, strict=True):
                 device.check(nominal, value, name, None)
-    with refusals_of("base"):
-        triangle(asked.base, "B")
+    with refusals_of("base_sides"):
+        triangle(asked.base_sides, "B")
     with refusals_of("legs"):
-        cups = tool_cups(chosen.design, chosen.solution, asked.base, asked.tool, lengths)
+        cups = tool_cups(chosen.design, chosen.solution, asked.base_sides, asked.tool_sides, lengths)
     return SolvedPose("", chosen.design, chosen.solution, cups)
 
 
 def fixture_found(asked: FindFixture) -> HexapodFrame:
     """Find the base fixture from the joint positions at its cups and the distances between them."""
-    device, sides = replace(DEVICE, reach=asked.reach), np.array(asked.base)
-    with refusals_of("base"):
+    device, sides = replace(DEVICE, reach=asked.reach), np.array(asked.base_sides)
+    with refusals_of("base_sides"):
         for name, side in zip(side_names("B"), sides.tolist(), strict=True):
             device.check(device.base, side, name, None)
     loaded = robot_argument(asked.robot)
     with refusals_of("tool"):
         arm, _ = with_cups(loaded, asked.tool)
     joints = _touches_argument(asked.touches, arm)
-    with refusals_of("target"):
-        position, _ = arm.world_poses(joints, arm.targets[0].name if asked.target is None else asked.target)
+    cups = {one.name: one.name for one in arm.targets}
+    cup = arm.targets[0].name if asked.cup is None else choice_argument(asked.cup, "cup", cups)
+    position, _ = arm.world_poses(joints, cup)
     stand = arm.base
     points = (position - np.array(stand.translation)) @ stand.rotation
     with refusals_of("touches"):

@@ -162,10 +162,10 @@ def _number(cell: str, unit: str, where: str, *, missing: bool) -> float:
 
 def of_matrices(asked: ImportMatrices) -> Imported:
     """Read the matrices that are asked for, and write them as canonical CSV."""
-    table, seen = path_argument(asked.joints, "joints"), _paths(asked.targets)
+    table, seen = path_argument(asked.joints_file, "joints_file"), _paths(asked.targets)
     beside = _paths(asked.references or {})
     file = None if asked.out is None else file_for(asked.out, table, *seen.values(), *beside.values())
-    with refusals_of("joints, targets"):
+    with refusals_of("joints_file, targets"):
         data, missing = read_matrices(
             table, seen, beside, asked.angle_unit, asked.length_unit, asked.joints_are or "model"
         )
@@ -321,7 +321,7 @@ def of_sockets(asked: ImportSockets) -> Imported:
 def of_table(asked: ImportTable) -> Imported:
     """Read a table by its mapping, and write it as canonical CSV."""
     table, columns = path_argument(asked.file, "file"), path_argument(asked.mapping, "mapping")
-    beside = None if asked.joints is None else path_argument(asked.joints, "joints")
+    beside = None if asked.joints_file is None else path_argument(asked.joints_file, "joints_file")
     with refusals_of("mapping"):
         read = files_read(table, columns, beside)
     out = None if asked.out is None else file_for(asked.out, *read)

@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.command.groups import IntoFile, JointsGiven
+from truearm.engine.command.groups import ByMapping, Declared, IntoFile, JointsGiven
 from truearm.engine.command.kinds import Choice, File, Given, NamedFiles, Number
-from truearm.engine.command.request import Request, job, option, required
+from truearm.engine.command.request import Request, as_in, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.data.readers.robodk import AngleUnit, Decimal, Delimiter
     from truearm.engine.document.records import Imported, ImportedRoboDK
     from truearm.importing.guess import GuessedMapping
 
-_ANGLE_UNIT = Choice(known=("deg", "rad"), what="unit of angles")
 _LENGTHS = ("mm", "m", "um", "in")
 
 
@@ -62,7 +61,7 @@ class _OfTable(Request):
     file: str | Path = required(File("FILE"), "A CSV, another delimited text, or an Excel workbook.", kw_only=False)
 
 
-class ImportTable(_OfTable, JointsGiven, IntoFile):
+class ImportTable(ByMapping, _OfTable, JointsGiven, IntoFile):
     """Any table of points or poses, by a mapping that says which column is what ('truearm import guess' writes one).
 
     The mapping says whose joint positions they are, unless an option does.
@@ -71,15 +70,12 @@ class ImportTable(_OfTable, JointsGiven, IntoFile):
     job = "import_table"
     words = "import table"
     refuses = "If a file cannot be used; the message names the line and the column."
-    mapping: str | Path = required(
-        File("MAPPING.yaml|PRESET"),
-        "Which column is what: a file, or one of spatial-analyzer and t-mac.",
-        kw_only=False,
-        word="map",
-        more="The schema of a file is ``truearm-mapping/1``.",
-    )
-    joints: str | Path | None = option(
-        File("FILE"), "Second file with the joint positions.", default=None, shown="as the mapping says"
+    joints_file: str | Path | None = option(
+        File("FILE"),
+        "File with the joint positions, one configuration a row.",
+        default=None,
+        shown="as the mapping says",
+        formerly="joints",
     )
 
     def run(self) -> Imported:
@@ -113,11 +109,12 @@ class ImportMatrices(JointsGiven, IntoFile):
     job = "import_matrices"
     words = "import matrices"
     refuses = "If a file cannot be used; the message names the line and the column."
-    joints: str | Path = required(
-        File("FILE"),
-        "Joint positions, one configuration a row.",
+    joints_file: str | Path = as_in(
+        ImportTable,
+        "joints_file",
         kw_only=False,
-        word="joints",
+        word="joints_file",
+        shown=False,
         more="One column a joint; all joints are revolute.",
     )
     targets: Mapping[str, str | Path] = required(
@@ -135,7 +132,9 @@ class ImportMatrices(JointsGiven, IntoFile):
         word="reference",
         shown=False,
     )
-    angle_unit: str = required(_ANGLE_UNIT, "Unit of the joint positions.", kw_only=True, word="angle_unit")
+    angle_unit: str = required(
+        Choice(known=("deg", "rad"), what="unit of angles"), "Unit of angles.", kw_only=True, word="angle_unit"
+    )
     length_unit: str = required(
         Choice(known=_LENGTHS, what="unit of lengths"), "Unit of the positions.", kw_only=True, word="length_unit"
     )
@@ -157,9 +156,7 @@ class ImportRoboDK(JointsGiven, IntoFile):
     words = "import robodk"
     refuses = "If the file cannot be used; the message names the line and the column."
     file: str | Path = required(File("FILE"), "Calibration or validation measurements, as exported.", kw_only=False)
-    angle_unit: AngleUnit | None = option(
-        _ANGLE_UNIT, "Unit of the angles of measured poses.", default=None, shown=False
-    )
+    angle_unit: AngleUnit | None = as_in(ImportMatrices, "angle_unit", default=None, more="Of measured poses.")
     delimiter: Delimiter = option(
         Choice(known=("comma", "semicolon", "tab")), "What stands between columns.", default="comma"
     )
@@ -182,7 +179,7 @@ class ImportRoboDK(JointsGiven, IntoFile):
         return of_robodk(self)
 
 
-class ImportSockets(IntoFile):
+class ImportSockets(Declared, IntoFile):
     """Joint positions of a ball on the flange that was put into two sockets, without any instrument."""
 
     job = "import_sockets"
@@ -203,13 +200,6 @@ class ImportSockets(IntoFile):
     )
     ball: str | float = required(
         _Diameter("DIAMETER"), "Of the ball, with its unit: 25mm.", kw_only=True, word="ball", more="Or a number [m]."
-    )
-    sigma: float | None = option(
-        Number("mm", low=0.0, above=True, deviation=True),
-        "How well the ball comes to rest in a socket, a deviation.",
-        default=None,
-        shown="not declared",
-        more="Of each coordinate.",
     )
 
     def run(self) -> Imported:

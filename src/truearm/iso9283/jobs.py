@@ -17,11 +17,12 @@ from truearm.engine.command.groups import (
     IntoFolder,
     Long,
     OfRobot,
+    OfTruth,
     Programmed,
     Repeatable,
 )
-from truearm.engine.command.kinds import File, Given, Names, Number, Numbers, TruthKind
-from truearm.engine.command.request import job, option, required
+from truearm.engine.command.kinds import File, Given, Names, Number, Numbers
+from truearm.engine.command.request import as_in, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.robot.robot import Robot
@@ -154,12 +155,13 @@ class SimulateTests(OfRobot, Instrument, Drawn, IntoFolder, Repeatable, Long):
         "for the correction that is not calibrated or stands elsewhere."
     )
     plan: PerformancePlan | str | Path = required(
-        Given("PLAN.yaml"), "Of 'truearm iso9283 plan'.", kw_only=False, word="plan"
+        Given("PLAN.yaml"), "Of 'truearm iso9283 plan', with robot.yaml beside it.", kw_only=False, word="plan"
     )
-    truth: Robot | str | Path = option(
-        TruthKind("NAME|FILE"),
-        "What the robot truly is, as in 'truearm simulate'.",
+    truth: Robot | str | Path = as_in(
+        OfTruth,
+        "truth",
         default="random",
+        shown=True,
         more="Robots that are exchanged are drawn in the same way; where the truth is not drawn, by the priors of "
         "geometry and joint zeros about it.",
     )

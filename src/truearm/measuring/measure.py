@@ -7,11 +7,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from truearm.engine.base.errors import InputError, is_one_line
-from truearm.engine.command.groups import Carrying, Long, OfPlan, OfRobot, Repeatable
-from truearm.engine.command.kinds import File, Names, Number, Text, Told, TruthKind, Whole
-from truearm.engine.command.request import job, option, required
+from truearm.engine.command.groups import (
+    ByMapping,
+    Carrying,
+    Constrained,
+    Drawn,
+    Instrument,
+    Long,
+    OfPlan,
+    OfRobot,
+    OfTruth,
+    Repeatable,
+    SeenBy,
+)
+from truearm.engine.command.kinds import File, Names, Number, Text, Told, Whole
+from truearm.engine.command.request import as_in, job, option, required
 
 if TYPE_CHECKING:
+    from truearm.engine.motion.constraints import Constraints
     from truearm.engine.robot.robot import Robot
     from truearm.measuring.open_campaign import OpenCampaign
     from truearm.measuring.result import Measured
@@ -97,29 +110,12 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
         "If anything cannot be used, the folder holds the measuring of another plan, or the log cannot be written."
     )
     out: str | Path = required(File("DIR"), "Folder for log, measurements and report.", kw_only=True, word="out")
-    device: str | None = option(
-        Text("NAME"),
-        "Readings of a virtual instrument ('truearm devices').",
-        default=None,
-        panel=_VIRTUAL,
-        shown=False,
-        more="It reads where targets are. A plan of which it can read nothing is refused.",
+    device: str | None = as_in(
+        SeenBy, "device", default=None, panel=_VIRTUAL, shown=False, more="A plan that shows it nothing is refused."
     )
-    truth: Robot | str | Path | None = option(
-        TruthKind("NAME|FILE"),
-        "The twin that it measures, as for 'truearm simulate'.",
-        default=None,
-        shown="random",
-        panel=_VIRTUAL,
-    )
-    noise: float | None = option(
-        Number("mm", low=0.0, deviation=True),
-        "Of a coordinate: its standard deviation.",
-        default=None,
-        shown="the deviation of the device",
-        panel=_VIRTUAL,
-    )
-    seed: int | None = option(Whole("S"), "Of all draws.", default=None, shown="0", panel=_VIRTUAL)
+    truth: Robot | str | Path | None = as_in(OfTruth, "truth", default=None, shown="random", panel=_VIRTUAL)
+    noise: float | None = as_in(Instrument, "noise", default=None, shown="the deviation of the device", panel=_VIRTUAL)
+    seed: int | None = as_in(Drawn, "seed", default=None, shown="0", panel=_VIRTUAL)
     disturbed: float | None = option(
         Number(metavar="SHARE", low=0.0, high=0.9),
         "Of readings that go wrong, up to 0.9.",
@@ -131,9 +127,7 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
     drift: float | None = option(
         Number("mm", low=0.0), "How far the instrument moves till the end.", default=None, shown="0", panel=_VIRTUAL
     )
-    constraints: str | Path | None = option(
-        File("FILE"), "Its boxes hide nests, as the arm does.", default=None, shown=False, panel=_VIRTUAL
-    )
+    constraints: Constraints | str | Path | None = as_in(Constrained, "constraints", default=None, panel=_VIRTUAL)
     watch: str | Path | None = option(
         _Folder("DIR"),
         "Readings from a folder into which software writes.",
@@ -142,12 +136,10 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
         panel=_REAL,
         more="It writes files, or rows at the end of files.",
     )
-    mapping: str | Path | None = option(
-        File("MAPPING.yaml"),
-        "What the columns mean.",
+    mapping: str | Path | None = as_in(
+        ByMapping,
+        "mapping",
         default=None,
-        word="map",
-        shown=False,
         panel=_REAL,
         more="As for :func:`truearm.import_table`; the joint positions are the plan's, so that the entry ``joints`` "
         "may be left out.",
@@ -216,11 +208,12 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
         shown=False,
         more="Of the schema ``truearm-about/1``.",
     )
-    wait: float | None = option(
+    timeout: float | None = option(
         Number("s", metavar="SECONDS", low=0.0),
         "End after so long without a reading.",
         default=None,
         shown="never",
+        formerly="wait",
         more="None waits until all is measured, or Ctrl-C.",
     )
     tell: Callable[[str], None] = option(
@@ -270,4 +263,4 @@ def open_campaign(plan: str | Path, robot: Robot | str | Path, out: str | Path, 
     """Open the measuring of a plan; keywords as for :func:`truearm.measure`, and refusals."""
     from truearm.measuring.open_campaign import opened
 
-    return opened(Measure(plan, robot, out=out, **asked))
+    return opened(Measure(plan, robot, out=out, **Measure.renamed(asked)))

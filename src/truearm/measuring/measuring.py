@@ -31,7 +31,7 @@ def measured(asked: Measure) -> Measured:
                 if step is not None:
                     words = f"{step.number} of {step.of}: {step.label} {step.names[0]}, {campaign.source.waiting}"
                     asked.progress(words)
-                left = _TURN if asked.wait is None else asked.wait - (time.monotonic() - last)
+                left = _TURN if asked.timeout is None else asked.timeout - (time.monotonic() - last)
                 entries = campaign.step(max(0.0, min(_TURN, left)))
                 for line in campaign.source.told():
                     asked.tell(line)
@@ -39,7 +39,7 @@ def measured(asked: Measure) -> Measured:
                     asked.tell(entry.line())
                 if entries:
                     last = time.monotonic()
-                elif asked.wait is not None and time.monotonic() - last >= asked.wait:
+                elif asked.timeout is not None and time.monotonic() - last >= asked.timeout:
                     break
         asked.progress("writing the measurements")
         return campaign.finish()

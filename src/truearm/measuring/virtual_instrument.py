@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice, did_you_mean
+from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.postures import approach_from
 from truearm.engine.robot.robot import Robot
@@ -183,17 +183,14 @@ def virtual_device(name: str) -> Device:
     """Return a device that can measure a plan virtually.
 
     Raises:
-        InputError: If there is none of this name, or it does not go through a plan: then the postures are its own.
+        InputError: If it does not go through a plan: then the postures are its own.
     """
     if name in VIRTUAL:
         return VIRTUAL[name]
-    why = next((device.no_plan for device in DEVICES if device.name == name), "")
     raise InputError(
-        why or "there is no device of this name",
+        next(device.no_plan for device in DEVICES if device.name == name),
         parameter="device",
         came=name,
         allowed=", ".join(VIRTUAL),
-        cure=f"'truearm simulate' finds the postures of {name}, and measures a twin with it."
-        if why
-        else did_you_mean(name, VIRTUAL),
+        cure=f"'truearm simulate' finds the postures of {name}, and measures a twin with it.",
     )

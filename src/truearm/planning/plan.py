@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,13 +15,16 @@ from truearm.engine.command.groups import (
     JointsWritten,
     Loaded,
     Long,
+    OfCell,
+    OfModel,
     OfRobot,
     OnFloor,
     Programmed,
     Repeatable,
+    SeenBy,
 )
 from truearm.engine.command.kinds import Choice, File, Flag, Given, Kind, Text
-from truearm.engine.command.request import job, option, required
+from truearm.engine.command.request import as_in, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
@@ -88,20 +91,10 @@ class _Speed(Given):
         return [",".join(f"{one:g}" for one in (written(speed, "mm"), *(share * 100.0 for share in shares)))]
 
 
-def _models() -> Collection[str]:
-    from truearm.engine.fit.models import MODELS
-
-    return [model.name for model in MODELS]
-
-
-def _devices() -> Collection[str]:
-    from truearm.engine.twin.devices import DEVICES
-
-    return [device.name for device in DEVICES]
-
-
 class PlanPoses(
     OfRobot,
+    OfModel,
+    SeenBy,
     AmongCandidates,
     Drawn,
     Loaded,
@@ -117,7 +110,8 @@ class PlanPoses(
 
     Without a device every target on the robot's tool is measured at each of them. Writes a CSV file, its page, the
     ways between and a sheet for the operator; with `program` a folder with these and a program that drives the plan.
-    The robot may be calibrated: derivatives are taken at its parameter values.
+    The robot may be calibrated: derivatives are taken at its parameter values. A device finds configurations itself.
+    Inclinometers are a device of the command alone; in Python there is truearm.plan_inclinometers.
     """
 
     job = "plan"
@@ -165,30 +159,8 @@ class PlanPoses(
         shown="everywhere",
         more="In Python lowest and highest x, y and z, ``(3, 2)``.",
     )
-    tools: str | Path | None = option(
-        File("FILE"),
-        "Where the tools of the program are.",
-        default=None,
-        shown=False,
-        more="As for :func:`truearm.compensate`.",
-    )
-    frames: str | Path | None = option(
-        File("FILE"),
-        "Where the frames of the program are.",
-        default=None,
-        shown=False,
-        more="As for :func:`truearm.compensate`.",
-    )
-    model: str = option(
-        Choice("MODEL", _models), "What will be identified, as in truearm calibrate, without auto.", default="geometric"
-    )
-    device: str | None = option(
-        Choice("NAME", _devices),
-        "An instrument of 'truearm devices', or inclinometers; not with `candidates_from`.",
-        default=None,
-        shown="one that reads every target everywhere",
-        more="It finds configurations itself. For inclinometers there is :func:`truearm.plan_inclinometers`.",
-    )
+    tools: str | Path | None = as_in(OfCell, "tools", default=None, shown=False)
+    frames: str | Path | None = as_in(OfCell, "frames", default=None, shown=False)
     approach: bool = option(
         Flag(), "Every joint comes to each configuration from one side, by a stop before it.", default=False
     )

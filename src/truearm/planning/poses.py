@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.command.groups import AtTip, Drawn, InCube, JointsWritten, OfRobot, Repeatable
-from truearm.engine.command.kinds import Choice, File, Given, Number, Numbers, Whole
+from truearm.engine.command.groups import AtTip, Drawn, InBox, InCube, JointsWritten, OfRobot, Repeatable
+from truearm.engine.command.kinds import Choice, File, Given, Number, Whole
 from truearm.engine.command.request import job, option, required
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class _Orientation(Given):
         from truearm.engine.data.readers.rows import QUATERNION_TOLERANCE
 
         if isinstance(value, str):
-            return choice_argument(value, name, {"free": "free", "down": "down"})
+            return choice_argument(value, name, {"free": "free", "down": "down"}, "orientation")
         quaternion = numbers_argument(value, name, 4, self._allowed)
         size = math.hypot(*quaternion)
         if abs(size - 1.0) > QUATERNION_TOLERANCE:
@@ -57,7 +57,7 @@ def _sets() -> Collection[str]:
     return POSE_SETS
 
 
-class PosesOfSet(OfRobot, InCube, AtTip, Drawn, JointsWritten, Repeatable):
+class PosesOfSet(OfRobot, InBox, InCube, AtTip, Drawn, JointsWritten, Repeatable):
     """Write a set of poses: those of ISO 9283 in a cube, or those of a ballbar on a sphere.
 
     SET.csv has their joint positions, and room for readings; SET-poses.csv has the poses, for truearm ik.
@@ -76,22 +76,16 @@ class PosesOfSet(OfRobot, InCube, AtTip, Drawn, JointsWritten, Repeatable):
         repeated=False,
         more="None writes nothing.",
     )
-    centre: Sequence[float] | None = option(
-        Numbers("X,Y,Z", "mm", 3),
-        "Of the cube in the base frame, or of the sphere.",
-        default=None,
-        shown="the largest cube",
-        more="The sphere needs its centre and its size.",
-    )
     side: float | None = option(
         Number("mm"), "Of the cube; the diameter of the sphere.", default=None, shown="the largest cube"
     )
     count: int | None = option(Whole(low=1), "Poses of diagonal, 118 and sphere.", default=None, shown="25, 118 and 50")
-    orientation: Literal["free", "down"] | Sequence[float] = option(
+    tip_orientation: Literal["free", "down"] | Sequence[float] = option(
         _Orientation("free|down|QW,QX,QY,QZ"),
         "Of the tip in the base frame.",
         default="free",
         more="``down``: its z axis against that of the base, its x axis along the base's.",
+        formerly="orientation",
     )
 
     def check(self) -> None:

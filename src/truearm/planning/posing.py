@@ -198,7 +198,7 @@ def posed(asked: PosesOfSet) -> PlannedPoses:
         arm = arm.with_frames(arm.base, {"flange": (0.0, 0.0, 0.0)})
     joints_are = joints_argument(asked.joints, arm)
     cube = _cube_poses(asked, arm, target)
-    rotation = _rotation(asked.orientation)
+    rotation = _rotation(asked.tip_orientation)
     with refusals_of("set" if count is None else "count"):
         made = pose_set(
             arm, asked.set, cube, plane=asked.plane, count=count, target=target, rotation=rotation, seed=asked.seed
@@ -212,7 +212,7 @@ def posed(asked: PosesOfSet) -> PlannedPoses:
 def _cube_poses(asked: PosesOfSet, arm: Robot, target: str | None) -> Cube:
     if asked.centre is None or asked.side is None:
         with refusals_of("ahead"):
-            return largest_cube(arm, target=target, ahead=asked.ahead, nearest=asked.nearest, floor=asked.floor)
+            return largest_cube(arm, target=target, ahead=asked.ahead, nearest=asked.nearest, floor=asked.lowest)
     with refusals_of("side"):
         return Cube(np.array(asked.centre), asked.side)
 

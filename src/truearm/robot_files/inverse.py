@@ -206,11 +206,11 @@ def _arm(asked: FindJoints) -> Robot:
 
 def _near(asked: FindJoints, arm: Robot, joints_are: JointsOf, poses: int) -> Array | None:
     """Return the joint positions near which the answer shall lie; None for zeros."""
-    if asked.seed is None:
+    if asked.seed_joints is None:
         return None
-    seed = positions_of(asked.seed, arm, joints_are, "seed")
+    seed = positions_of(asked.seed_joints, arm, joints_are, "seed_joints")
     shape = (len(arm.joints),) if axes(seed) != 2 else (poses, len(arm.joints))
-    return array_argument(seed, "seed", shape, f"{len(arm.joints)} numbers, one for each joint of {arm.name}")
+    return array_argument(seed, "seed_joints", shape, f"{len(arm.joints)} numbers, one for each joint of {arm.name}")
 
 
 def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]:

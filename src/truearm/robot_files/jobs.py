@@ -11,6 +11,7 @@ from truearm.engine.command.groups import (
     Forced,
     IntoFile,
     IntoNewFile,
+    JointsGiven,
     JointsWritten,
     Loaded,
     Near,
@@ -18,7 +19,7 @@ from truearm.engine.command.groups import (
     OfRobot,
 )
 from truearm.engine.command.kinds import ByFlags, Choice, File, Given, Positions, Text, Whole
-from truearm.engine.command.request import Request, job, option, required
+from truearm.engine.command.request import Request, as_in, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.robot.chain import Array
@@ -106,18 +107,16 @@ class ShowRobot(OfRobot):
     """
 
     job = "show"
-    joints: Array | Sequence[float] | str | None = option(
+    joint_positions: Array | Sequence[float] | str | None = option(
         Positions("DEG,DEG,.."),
         "Where the robot stands (mm if sliding): print the pose, too.",
         default=None,
         shown=False,
         more="That is a text; numbers, ``(joints,)``, are in rad, and in m for prismatic joints.",
+        formerly="joints",
     )
-    joints_are: JointsOf | None = option(
-        Choice(known=("controller", "model")),
-        "Whose joint positions they are: as the controller shows them, or the model's.",
-        default=None,
-        shown="the controller's where the robot file says that they differ",
+    joints_are: JointsOf | None = as_in(
+        JointsGiven, "joints_are", default=None, shown="the controller's where the robot file says that they differ"
     )
 
     def run(self) -> RobotDescription:
@@ -234,8 +233,8 @@ class ImportUrKinematics(IntoNewFile):
     file: str | Path = required(
         File("FILE"), "calibration.conf of the controller, or the ROS driver's file.", kw_only=False
     )
-    robot: Robot | str | Path = required(
-        Given("ROBOT"), "The arm's type: a library id such as ur5e, or a file.", kw_only=False, word="robot"
+    robot: Robot | str | Path = as_in(
+        OfRobot, "robot", kw_only=False, word="robot", more="It is the arm's type, such as ur5e."
     )
 
     def run(self) -> ImportedKinematics:

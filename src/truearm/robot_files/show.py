@@ -363,11 +363,11 @@ def described(asked: ShowRobot) -> RobotDescription:
     """Say what is known about a robot, and where it stands at joint positions."""
     arm = robot_argument(asked.robot)
     whose = joints_argument(asked.joints_are, arm, "joints_are")
-    if asked.joints is None:
+    if asked.joint_positions is None:
         return RobotDescription(arm)
     count = len(arm.joints)
-    joints = positions_of(asked.joints, arm, whose, "joints")
-    given = array_argument(joints, "joints", (count,), f"{count} numbers, one for each joint of {arm.name}")
-    if whose == "controller" and not isinstance(asked.joints, str):
+    joints = positions_of(asked.joint_positions, arm, whose, "joint_positions")
+    given = array_argument(joints, "joint_positions", (count,), f"{count} numbers, one for each joint of {arm.name}")
+    if whose == "controller" and not isinstance(asked.joint_positions, str):
         given = arm.controller.to_model(given[None])[0]
     return RobotDescription(arm, ShownPose(arm, np.array(given)))

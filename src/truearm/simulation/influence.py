@@ -354,14 +354,14 @@ def _parts(asked: FindInfluence, given: _Given, data: Dataset) -> _Parts:
             "the training part has no position of the tip", where=data.source, came=tip, cure="Change `seed`."
         )
     others = None if second is None else positions_of(second, tip)
-    if asked.frames == "robot":
+    if asked.placement == "robot":
         if tip not in [target.name for target in nominal.targets]:
             raise InputError(
                 "the robot file does not say where this target is",
-                parameter="frames",
+                parameter="placement",
                 came=tip,
                 allowed=listed([target.name for target in nominal.targets]) or "placed",
-                cure="Use `frames=placed`.",
+                cure="Use `placement=placed`.",
             )
         return _Parts(nominal, alone, others)
     return _Parts(place(nominal, alone), alone, others)
@@ -386,7 +386,7 @@ def _identified(asked: FindInfluence, given: _Given, parts: _Parts) -> Identifie
     judges = first if parts.second is None else parts.second
     errors = {way: errors_of(one, judges) for way, one in robots.items()}
     held_out = parts.second is not None
-    return Identified(robots, errors, held_out, first.configurations, by_influence, by_norm, asked.frames)
+    return Identified(robots, errors, held_out, first.configurations, by_influence, by_norm, asked.placement)
 
 
 def _compared(found: Identified) -> list[Notice]:

@@ -3,38 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import (
     AlsoIntoFolder,
+    AtTarget,
     Drawn,
     ForcedAt,
+    Instrument,
     IntoFile,
     Loaded,
     Long,
+    Measured,
+    OfModel,
     OfRobot,
     OfTruth,
     Repeatable,
     SeenBy,
     Split,
 )
-from truearm.engine.command.kinds import Choice, CountOr, Given, Number, Text, Whole
-from truearm.engine.command.request import Request, job, option, required
+from truearm.engine.command.kinds import Choice, CountOr, Number, Whole
+from truearm.engine.command.request import Request, as_in, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
     from truearm.simulation.influence import Frames, InfluenceResult
     from truearm.simulation.influences import Combination
     from truearm.simulation.simulate import DeviceList, Simulation
-
-
-def _models() -> Collection[str]:
-    from truearm.engine.fit.models import MODELS
-
-    return [model.name for model in MODELS]
 
 
 class Simulate(OfTruth, OfRobot, SeenBy, Drawn, Loaded, ForcedAt, IntoFile, Long):
@@ -55,12 +52,7 @@ class Simulate(OfTruth, OfRobot, SeenBy, Drawn, Loaded, ForcedAt, IntoFile, Long
         word="poses",
         more="Such as :func:`truearm.poses` or :func:`truearm.plan` writes.",
     )
-    noise: float | None = option(
-        Number("mm", low=0.0, deviation=True),
-        "Standard deviation of a reading.",
-        default=None,
-        shown="the deviation of the device",
-    )
+    noise: float | None = as_in(Instrument, "noise", default=None, shown="the deviation of the device")
 
     def check(self) -> None:
         """Refuse readings without noise, and a device for given configurations."""
@@ -94,7 +86,7 @@ class ListDevices(Request):
         return DeviceList(DEVICES)
 
 
-class FindInfluence(OfRobot, Split, Loaded, AlsoIntoFolder, Repeatable, Long):
+class FindInfluence(OfRobot, OfModel, Split, Loaded, AlsoIntoFolder, Repeatable, Long):
     """Change one parameter after the other and see what the tip does; with `data`, identify by that.
 
     With readings the configurations are theirs, and the parameters are identified pose by pose by minimum norm and by
@@ -103,16 +95,9 @@ class FindInfluence(OfRobot, Split, Loaded, AlsoIntoFolder, Repeatable, Long):
     """
 
     job = "influence"
-    data: Dataset | str | Path | None = option(
-        Given("[DATA.csv]"), "Measurements in the canonical CSV.", default=None, shown=False, kw_only=False
-    )
-    model: str = option(
-        Choice("MODEL", _models),
-        "Whose parameters are changed, as in 'truearm calibrate', without auto.",
-        default="geometric",
-    )
-    target: str | None = option(
-        Text("NAME"), "The tip.", default=None, shown="the first of the data or the robot, or the flange"
+    data: Dataset | str | Path | None = as_in(Measured, "data", default=None, kw_only=False, metavar="[DATA.csv]")
+    target: str | None = as_in(
+        AtTarget, "target", default=None, shown="the first of the data or the robot, or the flange"
     )
     angle: float = option(
         Number("deg", low=0.0, high=10.0, above=True),
@@ -130,10 +115,11 @@ class FindInfluence(OfRobot, Split, Loaded, AlsoIntoFolder, Repeatable, Long):
         shown="118",
         more="Drawn evenly within the limits.",
     )
-    frames: Frames = option(
+    placement: Frames = option(
         Choice(known=("placed", "robot")),
         "Where base and targets are: fitted with the nominal robot, or as its file says.",
         default="placed",
+        formerly="frames",
         more="Where they were fitted they are held, except that the whole calibration finds them anew.",
     )
     combination: Combination = option(

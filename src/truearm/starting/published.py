@@ -19,7 +19,7 @@ def find_papers() -> None:
     if not (root / "papers" / "__init__.py").is_file():
         raise InputError(
             "the published experiments are no part of an installation",
-            parameter="name",
+            parameter="study",
             cure="Get the source of truearm, where they are in papers/, and run the command there.",
         )
     if str(root) not in sys.path:

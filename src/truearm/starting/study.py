@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import InParts, IntoFolder, Long, Repeatable
 from truearm.engine.command.kinds import File, Text, Whole
-from truearm.engine.command.request import job, option, required
+from truearm.engine.command.request import as_in, job, option, required
 from truearm.starting.published import find_papers
 
 if TYPE_CHECKING:
@@ -23,8 +23,12 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
 
     job = "study"
     refuses = "If there is no such study, or its data are missing, or it needs none."
-    name: str = required(
-        Text("NAME"), "Which study; see above.", kw_only=False, more="One of :data:`papers.STUDIES` by name."
+    study: str = required(
+        Text("NAME"),
+        "Which study; see above.",
+        kw_only=False,
+        more="One of :data:`papers.STUDIES` by name.",
+        formerly="name",
     )
     data: str | Path | None = option(
         File("DIR"), "Folder of measured data, for a study that needs them.", default=None, shown=False
@@ -32,11 +36,8 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
     seeds: int = option(
         Whole(low=1, counts=True), "How often to do it anew.", default=10, more="With seeds 0, 1, 2 and so on."
     )
-    workers: int = option(
-        Whole(low=1, counts=True),
-        "Processes that do the seeds.",
-        default=1,
-        more="One is this process itself. The figures do not depend on it.",
+    workers: int = as_in(
+        InParts, "workers", default=1, shown=True, more="One is this process itself. The figures do not depend on it."
     )
 
     @classmethod

@@ -27,7 +27,7 @@ def made_again(asked: MakeStudy) -> Record:
     several = processes(min(asked.workers, asked.seeds)) if asked.executor is None else Given(asked.executor)
     doing = None if isinstance(several, ThisProcess) else several
     with with_workers(several), seeds_done_by(doing), refusals_of("data"):
-        finished = replace(run_study(asked.name, asked.seeds, source, asked.progress), command=asked.again)
+        finished = replace(run_study(asked.study, asked.seeds, source, asked.progress), command=asked.again)
     if folder is not None:
         asked.progress("writing the report")
         with refusals_of("out"):

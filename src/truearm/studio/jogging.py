@@ -199,7 +199,7 @@ class Jogging:
             None if self.orientation == "free" else rotation[None],
             target=self.tip,
             frame=frame,
-            seed=self.joints,
+            seed_joints=self.joints,
             orientation=self.orientation,
         ).solutions
         if not found.usable[0]:
@@ -241,7 +241,9 @@ class Jogging:
         """
         p, R = self.pose()
         if self.orientation == "full" and branch_rule(self.robot) is not None:
-            found = inverse(self.robot, p[None], R[None], target=self.tip, branch="all", seed=self.joints).solutions
+            found = inverse(
+                self.robot, p[None], R[None], target=self.tip, branch="all", seed_joints=self.joints
+            ).solutions
             return [
                 Branch(name, joints, status)
                 for name, joints, status in zip(found.branch, found.joints, found.status, strict=True)
@@ -253,7 +255,7 @@ class Jogging:
             np.repeat(p[None], count, axis=0),
             None if self.orientation == "free" else np.repeat(R[None], count, axis=0),
             target=self.tip,
-            seed=seeds,
+            seed_joints=seeds,
             orientation=self.orientation,
         ).solutions
         far = np.abs(found.joints - self.joints).max(axis=1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -24,8 +23,6 @@ SOURCES: Final[dict[Source, tuple[str, ...]]] = {
     "port of this machine": ("listen",),
 }
 _LENGTHS: Final = ("noise", "drift", "most_deviation", "most_settling")
-#: Options that have other names than the parameters.
-_OPTIONS: Final = {"mapping": "map", "targets": "target", "nests": "nest"}
 
 
 class MeasureFields(BaseModel):
@@ -125,8 +122,4 @@ def measure_arguments(said: dict[str, Any]) -> dict[str, Any]:
 
 def measure_command(plan: str, robot: str, said: dict[str, Any]) -> str:
     """Return the command that does the same in the project's folder, as the report shows it."""
-    text = ["truearm", "measure", plan, robot]
-    for name, value in said.items():
-        for one in value if isinstance(value, tuple) else (value,):
-            text += [f"--{_OPTIONS.get(name, name).replace('_', '-')}", str(one)]
-    return shlex.join([*text, "--out", "DIR"])
+    return Measure(plan, robot, out="DIR", **measure_arguments(said)).as_command()

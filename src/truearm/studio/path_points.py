@@ -139,7 +139,7 @@ def played_path(folder: Path, robot: Robot, file: str, seed: Array, progress: Pr
     os.chdir(folder)
     progress("following the path")
     with confined_reads(folder):
-        made = job(robot, file, seed=seed)
+        made = job(robot, file, seed_joints=seed)
     followed = made.path
     motion = Motion(followed.joints[followed.best], np.asarray(followed.motion.time - followed.motion.time[0]))
     return PlayedPath(Outcome(tuple(made.lines()), made.warnings), motion)

@@ -11,17 +11,22 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import (
     AlsoIntoFile,
     AlsoIntoFolder,
+    AtPlace,
     Drawn,
     ForcedAt,
+    InBox,
+    Instrument,
     JointsWritten,
     Loaded,
+    Measured,
     Noted,
     OfData,
     OfRobot,
+    OfTruth,
     Repeatable,
 )
-from truearm.engine.command.kinds import Choice, File, Given, Number, Numbers, Text, Whole
-from truearm.engine.command.request import job, option, required
+from truearm.engine.command.kinds import Choice, Given, Numbers, Text, Whole
+from truearm.engine.command.request import as_in, job, option, required
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
@@ -105,20 +110,16 @@ class JudgeSphere(OfData, Loaded, AlsoIntoFile, Repeatable):
 
     job = "sphere"
     refuses = "If there are no distances, too few of them, or the robot does not know where the bar is attached."
-    taught: str | None = option(
+    taught_at: str | None = option(
         Text("NAME"),
         "Configuration at which the target was brought to the ball.",
         default=None,
         shown="the centre that fits best",
+        formerly="taught",
         more="The centre is where a model says that it was then, so that errors in teaching count; this configuration "
         "is not judged itself.",
     )
-    tip: Sequence[float] | None = option(
-        Numbers("X,Y,Z", "mm", 3),
-        "Where the bar is attached, in the flange frame.",
-        default=None,
-        shown="where the robot has the target",
-    )
+    tip: Sequence[float] | None = as_in(AtPlace, "tip", default=None, shown="where the robot has the target")
 
     def run(self) -> SphereTests:
         """Judge."""
@@ -137,31 +138,21 @@ class TestLines(OfRobot, Drawn, JointsWritten, AlsoIntoFile):
     refuses = (
         "If the robot cannot go to a pose, joint errors or data are of another robot, or both truth and data are given."
     )
-    centre: Sequence[float] = required(
-        Numbers("X,Y,Z", "mm", 3), "Middle of the box in the base frame.", kw_only=False, word="centre"
-    )
+    centre: Sequence[float] = as_in(InBox, "centre", kw_only=False, word="centre", shown=False)
     size: Sequence[float] = option(Numbers("X,Y,Z", "mm", 3), "Of the box.", default=(0.6, 0.8, 0.4))
     joint_errors: Robot | str | Path | None = option(
         Given("FILE"),
         "joint-errors.yaml to compensate with.",
         default=None,
-        word="model",
+        formerly="model",
         shown=False,
         more="The same robot with joint errors, or its file, as :func:`truearm.axes` writes it.",
     )
-    truth: str | Path | None = option(
-        File("NAME|FILE"),
-        "Try it on this twin, as in 'truearm simulate'.",
-        default=None,
-        shown=False,
-        more="``nominal``, ``random``, a truth of the robot file, or a file.",
+    truth: Robot | str | Path | None = as_in(OfTruth, "truth", default=None, more="A twin of it is compensated.")
+    data: Dataset | str | Path | None = as_in(
+        Measured, "data", default=None, help="Measured, configurations named x-1 to xyz-11."
     )
-    data: Dataset | str | Path | None = option(
-        Given("DATA.csv"), "Measured, configurations named x-1 to xyz-11.", default=None, shown=False
-    )
-    noise: float = option(
-        Number("mm", low=0.0, deviation=True), "Standard deviation of a coordinate of a repetition.", default=0.0
-    )
+    noise: float = as_in(Instrument, "noise", default=0.0)
     repeats: int = option(Whole(low=1, counts=True), "Repetitions on the twin.", default=30)
 
     def check(self) -> None:

@@ -286,7 +286,7 @@ def tested(asked: TestLines) -> LineTest:
     if asked.truth is not None:
         rng = np.random.default_rng(asked.seed)
         with refusals_of("truth"):
-            twin = truth_twin(nominal, str(asked.truth), rng)
+            twin = truth_twin(nominal, asked.truth, rng)
         before = on_twin(poses, twin, at_poses, asked.noise, asked.repeats, rng)
         after = None if errors is None else on_twin(poses, twin, commanded, asked.noise, asked.repeats, rng)
     elif asked.data is not None:

@@ -225,12 +225,12 @@ def judged(asked: JudgeSphere) -> SphereTests:
     with refusals_of("data"):
         for name in measured.targets:
             arm.target(name)
-    at_ball = None if asked.taught is None else _taught(measured, asked.taught)
+    at_ball = None if asked.taught_at is None else _taught(measured, asked.taught_at)
     found = SphereTests(
         arm,
         measured.source,
         _spheres(arm, measured, at_ball),
-        asked.taught,
+        asked.taught_at,
         asked.again,
         (*changed_since(asked.robot), *told_of(arm)),
         files_of(asked.robot, asked.data),
@@ -287,7 +287,7 @@ def _taught(data: Dataset, name: str) -> int:
     if name not in data.labels:
         raise InputError(
             "the measurements have no configuration of this name",
-            parameter="taught",
+            parameter="taught_at",
             where=data.source,
             came=name,
             cure="Name the configuration at which the target was brought to the ball.",
@@ -297,7 +297,7 @@ def _taught(data: Dataset, name: str) -> int:
     if len(targets) > 1:
         raise InputError(
             "it is not clear which target was brought to the ball",
-            parameter="taught",
+            parameter="taught_at",
             where=f"{data.source}, configuration {name}",
             came=", ".join(data.targets[k] for k in targets),
             cure="Leave the row of that target alone in this configuration.",

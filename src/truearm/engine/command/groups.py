@@ -29,7 +29,7 @@ from truearm.engine.command.kinds import (
     Whole,
     WrenchKind,
 )
-from truearm.engine.command.request import Request, option, required
+from truearm.engine.command.request import Request, as_in, option, required
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -62,6 +62,20 @@ def _languages() -> list[str]:
     return [*PROGRAM_LANGUAGES]
 
 
+def _models() -> list[str]:
+    from truearm.engine.fit.models import MODELS
+
+    return [model.name for model in MODELS]
+
+
+class OfModel(Request):
+    """Which parameters."""
+
+    model: str = option(
+        Choice("MODEL", _models), "Whose parameters count, as in 'truearm calibrate'; no auto.", default="geometric"
+    )
+
+
 class OfRobot(Request):
     """Which robot."""
 
@@ -76,6 +90,18 @@ class OfPlan(Request):
         "Configurations, as 'truearm plan' writes them.",
         kw_only=False,
         more="In the order of measuring: ``configuration`` and ``joint_1 [deg]`` .. or ``axis_1 [deg]`` ..",
+    )
+
+
+class ByMapping(Request):
+    """Which column is what."""
+
+    mapping: str | Path = required(
+        File("MAPPING.yaml|PRESET"),
+        "Which column is what: a file, or one of spatial-analyzer and t-mac.",
+        kw_only=False,
+        word="map",
+        more="The schema of a file is ``truearm-mapping/1``.",
     )
 
 
@@ -142,14 +168,14 @@ class Loaded(Carrying, Mounted):
 class AtTarget(Request):
     """Which target goes to poses."""
 
-    target: str | None = option(Text("NAME"), "What goes to the poses.", default=None, shown="the flange")
+    target: str | None = option(Text("NAME"), "Which target is the tip.", default=None, shown="the flange")
 
 
 class AtPlace(Request):
     """Which place on the flange goes to poses."""
 
     tip: Sequence[float] | None = option(
-        Numbers("X,Y,Z", "mm", 3), "What goes to the poses, in the flange frame.", default=None, shown="the flange"
+        Numbers("X,Y,Z", "mm", 3), "Where the tip is in the flange frame.", default=None, shown="the flange"
     )
 
 
@@ -160,11 +186,11 @@ class AtTip(AtTarget, AtPlace):
 class Near(Request):
     """Where the joints begin."""
 
-    seed: Array | Sequence[float] | str | None = option(
+    seed_joints: Array | Sequence[float] | str | None = option(
         Positions("DEG,DEG,.."),
         "Joint positions to stay near to (mm if sliding), of the kind that is written.",
         default=None,
-        word="seed_joints",
+        formerly="seed",
         shown="zeros",
         more="That is a text; numbers are positions of the model, ``(joints,)`` or one row a pose [rad; m for "
         "prismatic joints].",
@@ -183,19 +209,30 @@ class InCube(Request):
         Choice(known=("+x", "-x", "+y", "-y")), "Where the largest cube is searched.", default="+x"
     )
     nearest: float = option(Number("mm"), "How far ahead the largest cube begins.", default=0.0)
-    floor: float = option(Number("mm"), "How high the largest cube begins.", default=0.0)
+    lowest: float = option(Number("mm"), "How high the largest cube begins.", default=0.0, formerly="floor")
 
 
 class Instrument(Request):
     """How well an instrument reads poses."""
 
     noise: float = option(
-        Number("mm", low=0.0, deviation=True), "Of the instrument: standard deviation of a coordinate.", default=1e-5
+        Number("mm", low=0.0, deviation=True), "Standard deviation of a coordinate that is read.", default=1e-5
     )
     noise_rot: float = option(
         Number("deg", low=0.0, deviation=True),
         "Of the instrument: standard deviation of an angle.",
         default=math.radians(0.005),
+    )
+
+
+class Declared(Request):
+    """How well is known what was touched or drawn."""
+
+    sigma: float | None = option(
+        Number("mm", low=0.0, above=True, deviation=True),
+        "Standard deviation of what was touched or drawn.",
+        default=None,
+        shown="not declared",
     )
 
 
@@ -268,6 +305,14 @@ class Long(Request):
 class InParts(Request):
     """What is done in parts, by whoever can do them."""
 
+    workers: int | None = option(
+        Whole(low=1, counts=True),
+        "Processes of this machine that share the work.",
+        default=None,
+        shown="one a processor",
+        more="One is this process itself.",
+    )
+
     executor: Executor | None = option(
         Doing(), "An executor that does the parts, which stays open", default=None, word="", repeated=False
     )
@@ -322,7 +367,7 @@ class JointsGiven(Request):
 
     joints_are: JointsOf | None = option(
         Choice(known=("controller", "model")),
-        "Whose joint positions they are: as the robot's controller shows them, or its model's.",
+        "Whose joint positions they are: as the controller shows them, or the model's.",
         default=None,
         shown="the model's",
     )
@@ -395,7 +440,10 @@ class Constrained(Request):
     """What configurations must keep."""
 
     constraints: Constraints | str | Path | None = option(
-        Given("FILE"), "What a configuration must keep: boxes, limits of joints, a floor.", default=None, shown=False
+        Given("FILE"),
+        "What a configuration must keep: boxes, which also hide targets, limits of joints, a floor.",
+        default=None,
+        shown=False,
     )
 
 
@@ -412,6 +460,38 @@ class Clearing(Request):
 
 class InCell(Constrained, Clearing):
     """What stands in the cell."""
+
+
+class InBox(Request):
+    """Where poses are."""
+
+    centre: Sequence[float] | None = option(
+        Numbers("X,Y,Z", "mm", 3),
+        "Of the cube, the box or the sphere, in the base frame.",
+        default=None,
+        shown="the largest cube",
+    )
+
+
+class OfCell(Request):
+    """Where tools and frames are."""
+
+    tools: str | Path | None = option(
+        File("FILE"),
+        "A cell file: where the tools really are on the flange.",
+        default=None,
+        shown="best with nominal",
+        more="See :mod:`truearm.engine.programs.cell`.",
+        formerly="tool",
+    )
+    frames: str | Path | None = option(
+        File("FILE"),
+        "A cell file: where frames really are.",
+        default=None,
+        shown="no shift on average",
+        more="See :mod:`truearm.engine.programs.cell`.",
+        formerly="frame",
+    )
 
 
 class OnFloor(Request):
@@ -453,11 +533,7 @@ class OfTruth(Request):
         "same with errors of encoders and gears. A file, or a robot, has its own base, and its own targets if it has "
         "some.",
     )
-    joints: JointsOf = option(
-        Choice(known=("controller", "model")),
-        "Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
-        default="model",
-    )
+    joints: JointsOf = as_in(JointsWritten, "joints", default="model", shown=True)
 
 
 class AmongCandidates(Request):
@@ -482,21 +558,14 @@ class IntoFile(Request):
 class AlsoIntoFile(Request):
     """What writes a file where one is asked for."""
 
-    out: str | Path | None = option(
-        File("FILE"), "File to write.", default=None, shown="none is written", repeated=False
-    )
+    out: str | Path | None = as_in(IntoFile, "out", default=None)
 
 
 class IntoNewFile(Request):
     """What writes a file that does not exist yet."""
 
-    out: str | Path | None = option(
-        File("FILE"),
-        "File to write; nothing is overwritten.",
-        default=None,
-        shown="none is written",
-        needed=True,
-        repeated=False,
+    out: str | Path | None = as_in(
+        IntoFile, "out", default=None, needed=True, help="File to write; nothing is overwritten."
     )
 
 
@@ -511,6 +580,4 @@ class IntoFolder(Request):
 class AlsoIntoFolder(Request):
     """What writes files into a folder where one is asked for."""
 
-    out: str | Path | None = option(
-        File("DIR"), "Folder for the results.", default=None, shown="none are written", repeated=False
-    )
+    out: str | Path | None = as_in(IntoFolder, "out", default=None)

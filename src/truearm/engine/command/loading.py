@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from truearm.engine.command.groups import Measured, OfRobot
-from truearm.engine.command.kinds import Given
-from truearm.engine.command.request import job, option
+from truearm.engine.command.request import as_in, job
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
@@ -36,12 +35,12 @@ class LoadData(Measured):
 
     job = "load_data"
     refuses = "If the file cannot be used; the message names the line and the column."
-    robot: Robot | str | Path | None = option(
-        Given("ROBOT"),
-        "The robot that was measured, or what :func:`truearm.load_robot` takes.",
+    robot: Robot | str | Path | None = as_in(
+        OfRobot,
+        "robot",
         default=None,
         shown="leaves joint positions as they are",
-        more="Joint positions that its controller shows become its model's.",
+        more="The one that was measured: joint positions that its controller shows become its model's.",
         kw_only=False,
         word="",
     )

@@ -49,6 +49,10 @@ class Command(TyperCommand):
         """Return what is left of the words; a value that is no number is told as jobs tell it."""
         if "--out=" in args or ("--out", "") in pairwise(args):  # a variable of the shell that is not set
             raise CommandError("--out: no file or folder is given; got ''.")
+        today: Mapping[str, str] = getattr(self.callback, "today", {})
+        for old in dict.fromkeys(word for arg in args if (word := arg.partition("=")[0]) in today):
+            print_line(f"{old} is {today[old]} now; the old word will go.", err=True)
+        args = [today.get(word, word) + sign + value for word, sign, value in (arg.partition("=") for arg in args)]
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as error:
@@ -200,6 +204,8 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
     run.__annotations__ = {one.name: one.annotation for one in every}
     run.__doc__ = spelled_by(request.help_text(), declared)
     run.__name__ = request.job
+    words = {f"--{one.formerly}": flag_of(name, one) for name, one in declared.items() if one.formerly}
+    run.today = words  # type: ignore[attr-defined]
     return run
 
 

@@ -11,9 +11,10 @@ import inspect
 import shlex
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from typing import Any, ClassVar, Final, ParamSpec, Protocol, TypeVar, dataclass_transform
 
 from truearm.engine.command.kinds import ByFlags, Kind
@@ -39,6 +40,7 @@ class Option:
     is_argument: bool  #: Whether it is an argument of the command, and no option.
     repeated: bool  #: Whether it belongs to how a result was made, so that it is said again with the command.
     panel: str | None = None  #: Heading under which the help shows it.
+    formerly: str = ""  #: An older name, which still works in Python and as a word of the command.
 
     @property
     def in_command(self) -> bool:
@@ -60,6 +62,7 @@ def option(
     kw_only: bool = True,
     is_argument: bool = False,
     panel: str | None = None,
+    formerly: str = "",
 ) -> Any:
     """Declare an option with a default; arguments as in :class:`Option`.
 
@@ -67,7 +70,7 @@ def option(
         kw_only: Whether Python takes it by its name alone; the command has another as an argument if it has no word.
     """
     argument = is_argument or (not kw_only and word is None)
-    made = Option(kind, help, metavar, word, shown, more, needed, argument, repeated, panel)
+    made = Option(kind, help, metavar, word, shown, more, needed, argument, repeated, panel, formerly)
     return field(default=default, kw_only=kw_only, metadata={"option": made})
 
 
@@ -80,17 +83,25 @@ def required(
     word: str | None = None,
     more: str = "",
     repeated: bool = True,
+    formerly: str = "",
 ) -> Any:
     """Declare what a job needs: the command has it as an argument, or as an option if it has a word.
 
     Args:
         kw_only: Whether Python takes it by its name alone.
     """
-    made = Option(kind, help, metavar, word, False, more, needed=True, is_argument=not word, repeated=repeated)
+    made = Option(kind, help, metavar, word, False, more, True, not word, repeated, formerly=formerly)
     return field(kw_only=kw_only, metadata={"option": made})
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option, required))
+def as_in(group: type[Request], name: str, *, default: Any = MISSING, kw_only: bool = True, **other: Any) -> Any:
+    """Declare an option as a group does, but with another default or none, or otherwise shown."""
+    made: Option = replace(group.__dataclass_fields__[name].metadata["option"], needed=default is MISSING)
+    made = replace(made, is_argument=not kw_only and other.get("word", made.word) is None)
+    return field(default=default, kw_only=kw_only, metadata={"option": replace(made, **other)})
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option, required, as_in))
 class Request:
     """What a job is asked for; the method ``run`` of a subclass does it, and its docstring is that of the job."""
 
@@ -159,6 +170,16 @@ class Request:
     def help_text(cls) -> str:
         """Return what the help of the command begins with."""
         return inspect.cleandoc(cls.__doc__ or "")
+
+    @classmethod
+    def renamed(cls, named: Mapping[str, Any]) -> dict[str, Any]:
+        """Return arguments of the job by the names of today, and warn of older ones."""
+        today = {one.formerly: name for name, one in cls.options() if one.formerly}
+        for old in [name for name in named if name in today]:
+            warnings.warn(f"`{old}` of {cls.job} is `{today[old]}` now.", DeprecationWarning, stacklevel=3)
+            if today[old] in named:
+                raise TypeError(f"{cls.job}() got both {today[old]} and {old}, its older name")
+        return {today.get(name, name): value for name, value in named.items()}
 
     @classmethod
     def command_words(cls) -> str:
@@ -232,7 +253,7 @@ def job(request: Callable[P, Runs[R]]) -> Callable[P, R]:
     made: Any = request
 
     def run(*given: P.args, **named: P.kwargs) -> R:
-        result: R = made(*given, **named).result()
+        result: R = made(*given, **made.renamed(named)).result()
         return result
 
     frame = sys._getframe(1)

@@ -210,7 +210,7 @@ class _Follower:
                     + (", or, with joints to spare, to the end of the postures near the first" if self._spare else ""),
                     where=self._place(k),
                     came=f"orientation '{self._orientation}'",
-                    cure=self._cure("Move the path towards the arm", "start elsewhere (`seed`)"),
+                    cure=self._cure("Move the path towards the arm", "start elsewhere (`seed_joints`)"),
                 )
             scaled[k], A = found
             self._check_limits(k, scaled[k] * self._scale)
@@ -259,7 +259,7 @@ class _Follower:
             where=self._place(k),
             came=f"{joint.name} at {from_si(float(joints[beyond[0]]), unit):.5g} {unit}",
             allowed=f"{low:g} to {high:g} {unit}",
-            cure="Start on another branch (`seed`), or move the path.",
+            cure="Start on another branch (`seed_joints`), or move the path.",
         )
 
     def _check_regular(self, k: int, A: Array, side: float) -> float:
@@ -273,7 +273,7 @@ class _Follower:
             "the path passes a singular posture",
             where=self._place(k),
             came=f"{self._names[fastest]} would have to move fastest",
-            cure=self._cure("Move the path", "start on another branch (`seed`)"),
+            cure=self._cure("Move the path", "start on another branch (`seed_joints`)"),
         )
 
     def _cure(self, *ways: str) -> str:

@@ -71,7 +71,7 @@ def planned(asked: PlanTests) -> Iso9283Plan:
             hours=asked.hours,
             ahead=asked.ahead,
             nearest=asked.nearest,
-            floor=asked.floor,
+            floor=asked.lowest,
             unclear=None if cell is None else cell.unclear,
             unsuited=None if cell is None else cell.unsuited,
         )

@@ -86,7 +86,7 @@ def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
     if joints is not None and named is None:
         raise InputError(
             "the mapping takes the joint positions from the table itself",
-            parameter="joints",
+            parameter="joints_file",
             where=f"{path}, joints",
             came=str(joints),
             cure="Leave it out, or name a file under joints.file in the mapping.",

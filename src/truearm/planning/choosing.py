@@ -330,7 +330,7 @@ def plan_measurements(
         kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
-    _refuse_too_few(FIRST if poses is None else poses, len(usable), len(candidates), rejected, labels, drawn)
+    _refuse_too_few(poses, len(usable), len(candidates), rejected, labels is not None, drawn)
     search = _Search(seen, model, candidates, usable, readings, finder, rng, noise, poses, objective, accurate_at)
     stops = before(seen, candidates.joints, None if finder is None else finder.low)
     reachable = None if finder is None else Reachable(finder, candidates.joints, stops)
@@ -515,13 +515,9 @@ def _elsewhere(robot: Robot, finder: WayFinder | None, rng: np.random.Generator)
 
 
 def _refuse_too_few(
-    needed: int,
-    usable: int,
-    candidates: int,
-    rejected: Mapping[str, int],
-    labels: tuple[str, ...] | None,
-    drawn: Drawn | None,
+    poses: int | None, usable: int, candidates: int, rejected: Mapping[str, int], named: bool, drawn: Drawn | None
 ) -> None:
+    needed = FIRST if poses is None else poses
     if needed < 1:
         raise InputError("at least one pose is needed", parameter="poses", came=needed, allowed="1 or more, or auto")
     if usable < needed:
@@ -533,7 +529,7 @@ def _refuse_too_few(
             cure = "Make room where most was lost: smaller boxes, wider limits, a lower `floor`, less `clearance`."
         raise InputError(
             "too few configurations are left to choose from",
-            parameter="candidates" if labels is None else "candidates_from",
+            parameter="candidates_from" if named else "candidates",
             came=came,
             allowed=f"{needed} or more",
             cure=cure,

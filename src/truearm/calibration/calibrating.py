@@ -405,15 +405,9 @@ def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Cal
     zones = None
     if given.zones is not None and second is not None:
         asked.progress("identifying zones")
-        how = given.how
+        bounds = given.how["bounds"]
         zones = choose_zones(
-            given.zones,
-            found.robot,
-            fit,
-            (first, second),
-            loss=asked.loss,
-            redundancy=asked.redundancy,
-            bounds=how["bounds"],
+            given.zones, found.robot, fit, (first, second), loss=asked.loss, redundancy=asked.redundancy, bounds=bounds
         )
     return Calibration(
         fit=fit,

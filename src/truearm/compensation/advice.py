@@ -42,13 +42,7 @@ def check_correction(
         splits: How their moves are split, one a program; empty if they are not.
     """
     corrections = result.corrections
-    count = sum(int(one.corrected.sum()) for one in corrections)
-    if any(one.program.targets for one in corrections):
-        alone = sum(why == ALONE for one in corrections for why in one.kept.values())
-        made = _assumed(result) if count else _nothing(alone)
-        made += _by_joints(corrections)
-    else:
-        made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
+    made = _corrected(result)
     skipped = sum(len(one.skipped) for one in corrections)
     if skipped:
         made.append(
@@ -112,6 +106,16 @@ def check_correction(
             )
         )
     return tuple(made)
+
+
+def _corrected(result: CorrectedPrograms) -> list[Notice]:
+    """Say what the correction rests on, or that there is none."""
+    corrections = result.corrections
+    if not any(one.program.targets for one in corrections):
+        return [Notice("no-targets", "There is no target in the programs that could be corrected.")]
+    alone = sum(why == ALONE for one in corrections for why in one.kept.values())
+    made = _assumed(result) if any(one.corrected.any() for one in corrections) else _nothing(alone)
+    return made + _by_joints(corrections)
 
 
 def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:

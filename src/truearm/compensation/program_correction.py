@@ -131,12 +131,10 @@ def corrected_programs(
         frames = "held"
     if tools == "assumed" and flange_is_held(robot) and not choice.was_taught("tools"):
         tools = "held"
-    flange = np.eye(4)
     start, agreed = best_agreement(robot)
-    if "assumed" in (tools, frames):
-        flange = agreed
-    else:
-        start = np.eye(4)
+    flange = agreed
+    if "assumed" not in (tools, frames):
+        start, flange = np.eye(4), np.eye(4)
     progress("resolving the configurations")
     arms = arms_of_tools(robot, loads)
     acting = wrenches_of_targets(programs, wrenches)
@@ -146,31 +144,14 @@ def corrected_programs(
     ]
     refuse_beyond("wrenches", sum(one.forces for one in resolved), parameter="wrench")
     names = tuple(dict.fromkeys(name for one in resolved for name in one.frames))
-    if frames == "identified":
-        # What is given by joints stays where it is to the first frame that was measured.
-        measured = next(one.measured_base for one in resolved if one.measured_base is not None)
-        bases = dict.fromkeys(names, measured)
-    elif frames == "held":
-        bases = dict.fromkeys(names, np.eye(4))
-    else:
-        progress("finding where the base is")
-        together = [(name,) for name in names] if choice.was_taught("frames") else [names]
-        bases = {}
-        for group in together:
-            bases |= dict.fromkeys(group, _base_of(resolved, group, start, flange))
-            found = [(one, one.some(_MORE_THAN_ONE, group)) for one in resolved]
-            if sum(len(rows) for _, rows in found) == 1:
-                # The frame takes up all that a correction could do to it.
-                for one, rows in found:
-                    one.keep(rows, ALONE)
+    bases = _bases(resolved, names, frames, choice, start, flange, progress)
     progress("finding fake targets")
     corrections = [one.correction(bases, flange) for one in resolved]
     if robot.proof is not None and arm_is_known(robot):
         progress("judging the targets")
         shared = names if choice.was_taught("frames") else ()
         reached = [one.reached(made, flange, shared) for one, made in zip(resolved, corrections, strict=True)]
-        taught = choice.was_taught("tools")
-        expected = expected_errors(robot, robot.proof, reached, frames, taught_tools=taught)
+        expected = expected_errors(robot, robot.proof, reached, frames, taught_tools=choice.was_taught("tools"))
         corrections = [
             one.judged(made, of_targets, every=choice.every)
             for one, made, of_targets in zip(resolved, corrections, expected, strict=True)
@@ -204,6 +185,33 @@ def commanded_tips(nominal: Robot, program: Program) -> tuple[Array, Array]:
     """
     resolved = ResolvedProgram(nominal, nominal, program, EMPTY_CELL)
     return resolved.joints, resolved.tips
+
+
+def _bases(
+    programs: Sequence[ResolvedProgram],
+    names: tuple[str, ...],
+    frames: Provenance,
+    choice: Choice,
+    start: Array,
+    flange: Array,
+    progress: Callable[[str], None],
+) -> dict[str, Array]:
+    """Return the base by the name of the frame for whose targets it is."""
+    if frames == "identified":
+        # What is given by joints stays where it is to the first frame that was measured.
+        return dict.fromkeys(names, next(one.measured_base for one in programs if one.measured_base is not None))
+    if frames == "held":
+        return dict.fromkeys(names, np.eye(4))
+    progress("finding where the base is")
+    bases: dict[str, Array] = {}
+    for group in [(name,) for name in names] if choice.was_taught("frames") else [names]:
+        bases |= dict.fromkeys(group, _base_of(programs, group, start, flange))
+        found = [(one, one.some(_MORE_THAN_ONE, group)) for one in programs]
+        if sum(len(rows) for _, rows in found) == 1:
+            # The frame takes up all that a correction could do to it.
+            for one, rows in found:
+                one.keep(rows, ALONE)
+    return bases
 
 
 def _base_of(programs: Sequence[ResolvedProgram], frames: Sequence[str], start: Array, flange: Array) -> Array:

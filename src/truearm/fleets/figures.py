@@ -166,18 +166,7 @@ def parameters_figure(found: KindFound) -> Figure:
                 }
             )
     else:
-        ends = np.nanpercentile(values, [2.5, 25.0, 50.0, 75.0, 97.5], axis=0)
-        keys = ("lowerfence", "q1", "median", "q3", "upperfence")
-        traces.append(
-            {
-                "type": "box",
-                "x": names,
-                **{key: rounded(end, 4) for key, end in zip(keys, ends, strict=True)},
-                "fillcolor": _SHADE,
-                "line": {"color": AFTER, "width": 1.5},
-                "showlegend": False,
-            }
-        )
+        traces.append(_boxes(names, values))
     row_of = {kind.names[row]: place for place, row in enumerate(rows.tolist())}
     column_of = {kind.parameters[column]: place for place, column in enumerate(chosen.tolist())}
     marks = [(one, (row_of[one.robot], column_of[one.parameter])) for one in found.differences[:_MOST_MARKS]]
@@ -225,6 +214,19 @@ def parameters_figure(found: KindFound) -> Figure:
         yaxis=axis(title),
         showlegend=bool(marks),
     )
+
+
+def _boxes(names: list[str], values: NDArray[np.float64]) -> Figure:
+    ends = np.nanpercentile(values, [2.5, 25.0, 50.0, 75.0, 97.5], axis=0)
+    keys = ("lowerfence", "q1", "median", "q3", "upperfence")
+    return {
+        "type": "box",
+        "x": names,
+        **{key: rounded(end, 4) for key, end in zip(keys, ends, strict=True)},
+        "fillcolor": _SHADE,
+        "line": {"color": AFTER, "width": 1.5},
+        "showlegend": False,
+    }
 
 
 def _edge(values: NDArray[np.float64]) -> float:

@@ -300,8 +300,7 @@ def plan_measurements(
     """Choose configurations to measure.
 
     Args:
-        robot: Nominal or calibrated, with targets, see :func:`with_targets`; derivatives are taken at its parameter
-            values.
+        robot: Nominal or calibrated, with targets, see :func:`with_targets`; derivatives are taken at its values.
         candidates: To choose from.
         model: What will be identified.
         poses: How many; None lets O1 decide.
@@ -310,8 +309,7 @@ def plan_measurements(
         accurate_at: Where that is; None for everywhere.
         noise: Standard deviation of a coordinate about a well identified model [m].
         labels: Names of the candidates; numbers in the order of measurement if None.
-        constraints, where: What a configuration must keep besides the robot's limits, and the file that says so, for
-            messages.
+        constraints, where: What a configuration must keep besides the robot's limits, and the file that says so.
         seen_from_the_origin: Whether the instrument stands at the origin of the robot's world, as after a calibration.
         readings: What a device would read at the candidates, see :func:`device_candidates`; None for the positions of
             all targets at each.
@@ -321,9 +319,8 @@ def plan_measurements(
         progress: Called with a few words at each step.
 
     Raises:
-        InputError: If the objective is not known or does not decide on a number, too few candidates keep the
-            constraints, or there are fewer rows than parameters, candidates that were drawn are all alike, or there are
-            ways to fewer candidates than are chosen.
+        InputError: If the objective is not known or does not decide on a number, there are fewer rows than parameters,
+            too few candidates keep the constraints or have a way, or those that were drawn are all alike.
     """
     _check_objective(objective, poses, accurate_at)
     seen = model.prepared(robot)
@@ -332,105 +329,126 @@ def plan_measurements(
     if finder is not None:
         kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
-    total = len(candidates)
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
-    given = "candidates" if labels is None else "candidates_from"
-    count = FIRST if poses is None else poses
-    _refuse_too_few(count, len(usable), total, rejected, given, drawn)
-    if readings is None:
-        free = model.free(seen)
-        gauge: tuple[str, ...] = ()
-        derivatives = sensitivity(seen, candidates.at(usable), free, noise)
-    else:
-        seen = with_fixtures_of(seen, readings)
-        free, gauge = unanchored(model.free(seen), readings), gauge_freedoms(readings)
-        derivatives = sensitivity_of_readings(seen, readings.of_configurations(usable), free, noise)
-    among = derivatives.identifiable(count)
-    known = derivatives.known[np.ix_(among, among)]
-    if not len(among):
-        raise InputError(
-            "with so much noise nothing can be identified",
-            parameter="noise",
-            came=f"{noise:g} m",
-            cure="Lower `noise`.",
-        )
-    elsewhere = _elsewhere(seen, finder, rng)
-    predicted = sensitivity(seen, elsewhere, free, noise, gauge)
-    needed = len(among)
-    if readings is None:  # few candidates show less than there is to identify
-        needed = max(needed, len(predicted.identifiable(count)))
-    if poses is not None and poses * derivatives.rows.shape[1] < needed:
-        raise InputError(
-            "there are fewer equations than parameters",
-            parameter="poses",
-            came=poses,
-            allowed=f"{-(-needed // derivatives.rows.shape[1])} or more for the model {model.name}, or auto",
-        )
-    wanted = None if accurate_at is None else sensitivity(seen, accurate_at, free, noise, gauge)
-    goal = INDICES["O1"] if wanted is None else OfPredictions.of(wanted.rows[..., among])
-    goal = INDICES.get(objective, goal)
-    of_candidate = np.zeros(len(candidates), dtype=np.intp)
-    of_candidate[usable] = np.arange(len(usable))
-    seconds = 0.0
-
-    def rows_of(these: NDArray[np.intp]) -> Array:
-        return np.ascontiguousarray(derivatives.rows[of_candidate[these]][..., among])
-
-    def choose(these: NDArray[np.intp]) -> NDArray[np.intp]:
-        nonlocal seconds
-        rows, started = rows_of(these), time.process_time()
-        found = most_informative_number(rows, known) if poses is None else most_informative(rows, poses, known, goal)
-        seconds += time.process_time() - started
-        return these[np.array(found, dtype=np.intp)]
-
+    _refuse_too_few(poses, len(usable), len(candidates), rejected, labels is not None, drawn)
+    search = _Search(seen, model, candidates, usable, readings, finder, rng, noise, poses, objective, accurate_at)
     stops = before(seen, candidates.joints, None if finder is None else finder.low)
     reachable = None if finder is None else Reachable(finder, candidates.joints, stops)
-    chosen, cost = chosen_with_ways(choose, usable, reachable, count, progress)
-    rejected |= cost
+    chosen, cost = chosen_with_ways(search.choose, usable, reachable, search.count, progress)
     chosen = chosen[short_order(candidates.joints[chosen])]
-    order = of_candidate[chosen]
-    joints = candidates.joints[chosen]
-    if drawn is not None and len(np.unique(joints, axis=0)) < len(joints):
-        raise InputError(
-            "configurations that were chosen coincide, as the joints have hardly any range",
-            parameter="constraints",
-            came=f"{len(np.unique(joints, axis=0))} different ones of {len(joints)}",
-            cure="Widen the limits of the joints; check their unit.",
-        )
-    chosen_rows = rows_of(chosen).reshape(-1, len(among))
-    left = len(usable) - sum(cost.values())
+    _refuse_coinciding(candidates.joints[chosen], drawn)
     progress("predicting the accuracy")
-    there = None
-    if wanted is not None and accurate_at is not None:
-        alike = None
-        if objective != "O1":
-            by_o1 = np.array(most_informative(rows_of(usable), len(order), known, INDICES["O1"]), dtype=np.intp)
-            alike = model_error(derivatives, by_o1, wanted, noise)
-        there = There(seen.world_poses(accurate_at)[0], model_error(derivatives, order, wanted, noise), alike)
-    at_fixtures = {}
-    for fixture in seen.fixtures if readings is not None else ():
-        place = seen.fixture_kinematics(fixture.name).position[:, 0]
-        at_fixtures[fixture.name] = (place - np.array(seen.base.translation)) @ seen.base.rotation
     return MeasurementPlan(
         drawn=drawn,
         reads=() if readings is None else _in_words(readings.of_configurations(chosen)),
-        fixtures=at_fixtures,
+        fixtures={} if readings is None else _fixtures_in_base(search.robot),
         among=candidates.joints[usable],
-        robot=seen,
+        robot=search.robot,
         model=model,
         objective=objective,
         labels=tuple(str(k + 1) for k in range(len(chosen))) if labels is None else tuple(labels[k] for k in chosen),
         chosen=chosen,
-        joints=joints,
+        joints=candidates.joints[chosen],
         before=stops[chosen],
-        indices=observability(known + chosen_rows.T @ chosen_rows, len(chosen)),
-        candidates=total,
-        rejected=rejected,
-        usable=left,
-        left_out=tuple(name for k, name in enumerate(derivatives.free.names) if k not in among),
-        seconds=seconds,
-        prediction=replace(predict(seen, derivatives, order, predicted, elsewhere.joints, noise, rng), there=there),
+        indices=search.indices(chosen),
+        candidates=len(candidates),
+        rejected=rejected | cost,
+        usable=len(usable) - sum(cost.values()),
+        left_out=tuple(name for k, name in enumerate(search.free.names) if k not in search.among),
+        seconds=search.seconds,
+        prediction=search.prediction(chosen),
     )
+
+
+class _Search:
+    """The search among usable candidates, by what readings there tell of the parameters."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        model: Model,
+        candidates: Postures,
+        usable: Indices,
+        readings: Dataset | None,
+        finder: WayFinder | None,
+        rng: np.random.Generator,
+        noise: float,
+        poses: int | None,
+        objective: str,
+        accurate_at: Postures | None,
+    ) -> None:
+        gauge: tuple[str, ...] = ()
+        if readings is None:
+            free = model.free(robot)
+            self.derivatives = sensitivity(robot, candidates.at(usable), free, noise)
+        else:
+            robot = with_fixtures_of(robot, readings)
+            free, gauge = unanchored(model.free(robot), readings), gauge_freedoms(readings)
+            self.derivatives = sensitivity_of_readings(robot, readings.of_configurations(usable), free, noise)
+        self.robot, self.free, self.noise, self.rng = robot, free, noise, rng
+        self.poses, self.objective, self.accurate_at = poses, objective, accurate_at
+        self.count, self.seconds = FIRST if poses is None else poses, 0.0
+        self.among = self.derivatives.identifiable(self.count)
+        self.known = self.derivatives.known[np.ix_(self.among, self.among)]
+        if not len(self.among):
+            raise InputError(
+                "with so much noise nothing can be identified",
+                parameter="noise",
+                came=f"{noise:g} m",
+                cure="Lower `noise`.",
+            )
+        self.elsewhere = _elsewhere(robot, finder, rng)
+        self.predicted = sensitivity(robot, self.elsewhere, free, noise, gauge)
+        needed, each = len(self.among), self.derivatives.rows.shape[1]
+        if readings is None:  # few candidates show less than there is to identify
+            needed = max(needed, len(self.predicted.identifiable(self.count)))
+        if poses is not None and poses * each < needed:
+            raise InputError(
+                "there are fewer equations than parameters",
+                parameter="poses",
+                came=poses,
+                allowed=f"{-(-needed // each)} or more for the model {model.name}, or auto",
+            )
+        self.wanted = None if accurate_at is None else sensitivity(robot, accurate_at, free, noise, gauge)
+        goal = INDICES["O1"] if self.wanted is None else OfPredictions.of(self.wanted.rows[..., self.among])
+        self.goal = INDICES.get(objective, goal)
+        self.place = np.zeros(len(candidates), dtype=np.intp)
+        self.place[usable] = np.arange(len(usable))
+
+    def rows(self, these: Indices) -> Array:
+        return np.ascontiguousarray(self.derivatives.rows[self.place[these]][..., self.among])
+
+    def choose(self, these: Indices) -> Indices:
+        rows, known, started = self.rows(these), self.known, time.process_time()
+        if self.poses is None:
+            found = most_informative_number(rows, known)
+        else:
+            found = most_informative(rows, self.poses, known, self.goal)
+        self.seconds += time.process_time() - started
+        return these[np.array(found, dtype=np.intp)]
+
+    def indices(self, chosen: Indices) -> dict[str, float]:
+        rows = self.rows(chosen).reshape(-1, len(self.among))
+        return observability(self.known + rows.T @ rows, len(chosen))
+
+    def prediction(self, chosen: Indices) -> Prediction:
+        there, order = None, self.place[chosen]
+        if self.wanted is not None and self.accurate_at is not None:
+            alike = None
+            if self.objective != "O1":
+                rows = np.ascontiguousarray(self.derivatives.rows[..., self.among])
+                by_o1 = np.array(most_informative(rows, len(order), self.known, INDICES["O1"]), dtype=np.intp)
+                alike = model_error(self.derivatives, by_o1, self.wanted, self.noise)
+            error = model_error(self.derivatives, order, self.wanted, self.noise)
+            there = There(self.robot.world_poses(self.accurate_at)[0], error, alike)
+        elsewhere = self.elsewhere.joints
+        found = predict(self.robot, self.derivatives, order, self.predicted, elsewhere, self.noise, self.rng)
+        return replace(found, there=there)
+
+
+def _fixtures_in_base(robot: Robot) -> dict[str, Array]:
+    places = {one.name: robot.fixture_kinematics(one.name).position[:, 0] for one in robot.fixtures}
+    return {name: (place - np.array(robot.base.translation)) @ robot.base.rotation for name, place in places.items()}
 
 
 #: What is made small where the robot shall be accurate.
@@ -497,8 +515,9 @@ def _elsewhere(robot: Robot, finder: WayFinder | None, rng: np.random.Generator)
 
 
 def _refuse_too_few(
-    needed: int, usable: int, candidates: int, rejected: Mapping[str, int], given: str, drawn: Drawn | None
+    poses: int | None, usable: int, candidates: int, rejected: Mapping[str, int], named: bool, drawn: Drawn | None
 ) -> None:
+    needed = FIRST if poses is None else poses
     if needed < 1:
         raise InputError("at least one pose is needed", parameter="poses", came=needed, allowed="1 or more, or auto")
     if usable < needed:
@@ -510,10 +529,21 @@ def _refuse_too_few(
             cure = "Make room where most was lost: smaller boxes, wider limits, a lower `floor`, less `clearance`."
         raise InputError(
             "too few configurations are left to choose from",
-            parameter=given,
+            parameter="candidates_from" if named else "candidates",
             came=came,
             allowed=f"{needed} or more",
             cure=cure,
+        )
+
+
+def _refuse_coinciding(joints: Array, drawn: Drawn | None) -> None:
+    different = len(np.unique(joints, axis=0))
+    if drawn is not None and different < len(joints):
+        raise InputError(
+            "configurations that were chosen coincide, as the joints have hardly any range",
+            parameter="constraints",
+            came=f"{different} different ones of {len(joints)}",
+            cure="Widen the limits of the joints; check their unit.",
         )
 
 

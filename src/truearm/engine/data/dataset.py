@@ -12,14 +12,16 @@ from truearm.engine.base.arrays import axes, finite_number, number_array
 from truearm.engine.base.errors import InputError, as_html, counted, listed, short_text
 from truearm.engine.base.units import Marked, said_of
 from truearm.engine.data.dataset_fields import (
+    checked_joints,
     checked_kinds,
     checked_labels,
     checked_order,
+    checked_positions,
+    checked_quaternions,
     checked_selection,
     checked_sigma,
     checked_visits,
     distinct_labels,
-    refuse_other_lengths,
     refuse_unsound,
 )
 from truearm.engine.robot.chain import Array
@@ -189,22 +191,10 @@ class Dataset:
             If shapes do not fit together, joints are not finite, a deviation is not above zero or a quaternion not of
             length 1, or names are there twice.
         """
-        q = np.array(number_array(joints, "joints", ("n", "joints")))
-        n = len(q)
-        if not n:
-            raise InputError("there is no configuration", parameter="joints", allowed="one row or more")
-        one = axes(positions) == 2
-        p = number_array(positions, "positions", (n, 3) if one else (n, "targets", 3), missing=True)
-        k = 1 if one else p.shape[1]
-        if not k:
-            raise InputError("there is no target", parameter="positions", allowed="one target or more")
-        p = p.reshape(n, k, 3)
-        each = (n,) if one else (n, k)
-        whole = np.isfinite(p).all(axis=2, keepdims=True)
-        turned = None
-        if quaternions is not None:
-            turned = np.array(number_array(quaternions, "quaternions", (*each, 4), missing=True)).reshape(n * k, 4)
-            refuse_other_lengths(turned, "quaternions")
+        q = checked_joints(joints)
+        p, each = checked_positions(positions, len(q))
+        n, k, _ = p.shape
+        turned = None if quaternions is None else checked_quaternions(quaternions, each)
         names = checked_labels(targets, "targets", k)
         made = None if order is None else checked_order(order, n)
         return cls(
@@ -216,7 +206,7 @@ class Dataset:
             targets=names,
             configuration=np.repeat(np.arange(n), k),
             target=np.tile(np.arange(k), n),
-            position=np.where(whole, p, np.nan).reshape(n * k, 3),
+            position=p.reshape(n * k, 3),
             quaternion=turned,
             sigma=None if sigma is None else checked_sigma(sigma, "sigma", each),
             sigma_rot=None if sigma_rot is None else checked_sigma(sigma_rot, "sigma_rot", each),

@@ -141,6 +141,32 @@ def checked_selection(chosen: object, count: int, parameter: str, things: str) -
     return np.asarray(values, dtype=np.intp)
 
 
+def checked_joints(joints: ArrayLike) -> Array:
+    """Return joint positions, ``(n, joints)``."""
+    found = np.array(number_array(joints, "joints", ("n", "joints")))
+    if not len(found):
+        raise InputError("there is no configuration", parameter="joints", allowed="one row or more")
+    return found
+
+
+def checked_positions(positions: ArrayLike, count: int) -> tuple[Array, tuple[int, ...]]:
+    """Return positions ``(count, targets, 3)``, NaN where a coordinate is missing, and the shape of the readings."""
+    one = axes(positions) == 2
+    found = number_array(positions, "positions", (count, 3) if one else (count, "targets", 3), missing=True)
+    found = found.reshape(count, 1 if one else found.shape[1], 3)
+    if not found.shape[1]:
+        raise InputError("there is no target", parameter="positions", allowed="one target or more")
+    whole = np.isfinite(found).all(axis=2, keepdims=True)
+    return np.where(whole, found, np.nan), (count,) if one else found.shape[:2]
+
+
+def checked_quaternions(quaternions: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return the orientation of each reading, ``(readings, 4)``."""
+    found = np.array(number_array(quaternions, "quaternions", (*shape, 4), missing=True)).reshape(-1, 4)
+    refuse_other_lengths(found, "quaternions")
+    return found
+
+
 def checked_labels(names: Sequence[str | int] | None, parameter: str, count: int) -> tuple[str, ...]:
     """Return names of `count` things, ``1``, ``2`` and so on if None."""
     if names is None:

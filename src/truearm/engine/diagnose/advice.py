@@ -33,27 +33,7 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
         doubted: Whether the data, or the robot, are known to be wrong: nothing is said of where its parameters went
             then.
     """
-    found = []
-    robot = fit.robot
-    if "joint zero" in fit.model.groups and "geometry" in fit.model.groups:
-        pairs = parallel_joints_without_beta(robot.convention, [dict(j.row) for j in robot.joints])
-        if pairs:
-            names = ", ".join(f"{a} and {b}" for a, b in pairs)
-            better = {"standard-dh": "hayati", "modified-dh": "modified-hayati"}.get(
-                robot.convention_name, robot.convention_name
-            )
-            cure = (
-                "Convert the robot to the convention hayati with 'truearm convert'."
-                if robot.convention_name == "s-model"
-                else f"Write 'convention: {better}' in the robot file and 'beta: 0' at the link between them."
-            )
-            found.append(
-                Notice(
-                    "parallel-axes",
-                    f"Joints {names} are parallel. The model has no beta that lets them tilt against each other, so it "
-                    f"cannot follow the real robot. {cure}",
-                )
-            )
+    found = _parallel_axes(fit)
     if fit.status is Status.NOT_CONVERGED:
         found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}", "error"))
     if fit.unobservable:
@@ -86,16 +66,14 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
         found.append(Notice("at-bound", f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
     if fit.redundancies:
         combinations = "; ".join(f"{r.dropped} ({r.combination})" for r in fit.redundancies)
+        alike = (
+            "" if fit.unobservable else " At configurations like the measured ones predictions hardly depend on them."
+        )
         found.append(
             Notice(
                 "redundant",
                 f"Redundant parameters are held at their nominal values: {combinations}. The readings hardly observe "
-                "the combinations in brackets."
-                + (
-                    ""
-                    if fit.unobservable
-                    else " At configurations like the measured ones predictions hardly depend on them."
-                ),
+                f"the combinations in brackets.{alike}",
                 "note",
             )
         )
@@ -114,7 +92,7 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
     found += _check_effects(fit)
     if fit.robot.effect_names:
         effects = ", ".join(fit.robot.effect_names)
-        own = [p.name for effect in robot.effects for p in effect.parameters]
+        own = [p.name for effect in fit.robot.effects for p in effect.parameters]
         found.append(
             Notice(
                 "urdf-partial",
@@ -125,6 +103,30 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
             )
         )
     return found
+
+
+def _parallel_axes(fit: Fit) -> list[Notice]:
+    """Say which joints are parallel that the model does not let tilt against each other."""
+    robot = fit.robot
+    pairs = parallel_joints_without_beta(robot.convention, [dict(j.row) for j in robot.joints])
+    if not pairs or not {"joint zero", "geometry"}.issubset(fit.model.groups):
+        return []
+    names = ", ".join(f"{a} and {b}" for a, b in pairs)
+    better = {"standard-dh": "hayati", "modified-dh": "modified-hayati"}.get(
+        robot.convention_name, robot.convention_name
+    )
+    cure = (
+        "Convert the robot to the convention hayati with 'truearm convert'."
+        if robot.convention_name == "s-model"
+        else f"Write 'convention: {better}' in the robot file and 'beta: 0' at the link between them."
+    )
+    return [
+        Notice(
+            "parallel-axes",
+            f"Joints {names} are parallel. The model has no beta that lets them tilt against each other, so it "
+            f"cannot follow the real robot. {cure}",
+        )
+    ]
 
 
 def _far_from_nominal(fit: Fit) -> list[Notice]:

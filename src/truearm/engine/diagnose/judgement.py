@@ -171,21 +171,9 @@ def judge(
         *([] if doubted else check_curves_of_loads(left_over)),
         *_in_part(left_over),
     )
-    steps = steps_after_fit(
-        Judged(
-            left_over,
-            Status.IMPLAUSIBLE if unlike else fit.status,
-            warnings,
-            off,
-            moved_then,
-            errors,
-            held_out,
-            expected,
-            training,
-            bent,
-        )
-    )
-    return Judgement(expected, warnings, steps)
+    status = Status.IMPLAUSIBLE if unlike else fit.status
+    judged = Judged(left_over, status, warnings, off, moved_then, errors, held_out, expected, training, bent)
+    return Judgement(expected, warnings, steps_after_fit(judged))
 
 
 def _in_part(left: LeftOver) -> list[Notice]:

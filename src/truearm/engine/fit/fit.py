@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
@@ -299,39 +300,8 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         joint_freedom = components.likeliest.freedom
     open_ = _left_open(problem, x, limits) if not problem.priors and not solved.redundancies else []
     scattered = components is None or not components.holds
-    if components is not None and not scattered and draws is None:
-        covariance, parts = components.covariance, components.parts
-    else:
-        covariance, parts = cluster_covariance(
-            lambda: _pulled(problem, solution, loss, solved.curves.design_effect),
-            Arrivals(problem.arrivals),
-            ~at_bound,
-            _beforehand(problem, limits, open_),
-        )
-    if draws is not None:
-        covariance, parts = _of_draws(draws / free.prior, parts)
-    covariance = covariance * np.outer(free.prior, free.prior)
+    covariance, parts, informed, unfitted = _worth(solved, loss, draws, at_bound, open_, scattered)
     deviation = np.sqrt(np.diag(covariance))
-    share = (deviation / free.prior) ** 2
-    informed = np.clip(1.0 - share, 0.0, 1.0) if problem.priors else 1.0 / (1.0 + share)
-    if limits is not None and not problem.priors:  # what a bound knows, no reading told
-        evenly = np.abs(limits[1] - limits[0]) / np.sqrt(12.0)
-        bounded = np.isfinite(evenly) & (evenly > 0.0)
-        of_bounds = np.clip(1.0 - (deviation / np.where(bounded, evenly, 1.0)) ** 2, 0.0, 1.0)
-        informed = np.where(bounded, np.minimum(informed, of_bounds), informed)
-    parts, unfitted = tuple(part.scaled(free.prior) for part in parts), tuple[str, ...]()
-    if solved.curves.variances:
-        known = dict(zip(free.names, x.tolist(), strict=True))
-        there = replace(
-            problem,
-            robot=problem.robot.with_values(known),
-            free=FreeParameters(tuple(replace(p, value=known[p.name]) for p in free.parameters)),
-        )
-        joints = np.zeros(count) if components is None or scattered else components.weighing.joints
-        alone = parts[0] if scattered or draws is not None else None
-        unfitted, parts = parts_with_curves(there, solved.curves, joints, solution.weight, at_bound, alone)
-        covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
-        deviation = np.sqrt(np.diag(covariance))
     identified = [
         replace(start.parameters[n], value=float(v))
         if bound
@@ -345,14 +315,6 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     unobservable = unobservable_parameters(robot, problem.data, looked_at, held=solved.held)
     unobservable = tuple(dict.fromkeys((*unobservable, *open_)))
     gauge = gauge_freedoms(problem.data, solved.held)
-    used = solution.weight / np.median(solution.weight) if loss in ABSOLUTE else solution.weight
-    weight = np.full(len(problem.data.target), np.nan)
-    first = 0
-    for block in problem.blocks:
-        part = used[first : first + len(block.readings)]
-        if block.data is problem.data:
-            weight[block.readings] = np.fmin(weight[block.readings], part)
-        first += len(block.readings)
     if open_:  # along them the solver has no reason to stop
         status = Status.RANK_LOSS
     elif not solution.converged:
@@ -392,7 +354,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         joint_error=joint_error,
         joint_freedom=joint_freedom,
         scattered=scattered,
-        weight=weight,
+        weight=_weights(problem, solution, loss),
         numbers=problem.rows,
         spent=spent,
         assumed=assumed_noise(problem, components, spent),
@@ -402,6 +364,60 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         bootstrap=0 if draws is None else len(draws),
         unfitted=unfitted,
     )
+
+
+def _worth(
+    solved: Solved, loss: Loss, draws: Array | None, at_bound: NDArray[np.bool_], open_: Sequence[str], scattered: bool
+) -> tuple[Array, tuple[CovariancePart, ...], Array, tuple[str, ...]]:
+    """Return the covariance of the values that were found, its parts, what the data told of each, and `unfitted`."""
+    problem, solution, limits, components = solved.problem, solved.solution, solved.limits, solved.components
+    free, x = problem.free, solution.vector
+    if components is not None and not scattered and draws is None:
+        covariance, parts = components.covariance, components.parts
+    else:
+        covariance, parts = cluster_covariance(
+            lambda: _pulled(problem, solution, loss, solved.curves.design_effect),
+            Arrivals(problem.arrivals),
+            ~at_bound,
+            _beforehand(problem, limits, open_),
+        )
+    if draws is not None:
+        covariance, parts = _of_draws(draws / free.prior, parts)
+    covariance = covariance * np.outer(free.prior, free.prior)
+    deviation = np.sqrt(np.diag(covariance))
+    share = (deviation / free.prior) ** 2
+    informed = np.clip(1.0 - share, 0.0, 1.0) if problem.priors else 1.0 / (1.0 + share)
+    if limits is not None and not problem.priors:  # what a bound knows, no reading told
+        evenly = np.abs(limits[1] - limits[0]) / np.sqrt(12.0)
+        bounded = np.isfinite(evenly) & (evenly > 0.0)
+        of_bounds = np.clip(1.0 - (deviation / np.where(bounded, evenly, 1.0)) ** 2, 0.0, 1.0)
+        informed = np.where(bounded, np.minimum(informed, of_bounds), informed)
+    parts, unfitted = tuple(part.scaled(free.prior) for part in parts), tuple[str, ...]()
+    if solved.curves.variances:
+        known = dict(zip(free.names, x.tolist(), strict=True))
+        there = replace(
+            problem,
+            robot=problem.robot.with_values(known),
+            free=FreeParameters(tuple(replace(p, value=known[p.name]) for p in free.parameters)),
+        )
+        joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
+        alone = parts[0] if scattered or draws is not None else None
+        unfitted, parts = parts_with_curves(there, solved.curves, joints, solution.weight, at_bound, alone)
+        covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
+    return covariance, parts, informed, unfitted
+
+
+def _weights(problem: Problem, solution: Solution, loss: Loss) -> Array:
+    """Return what the loss left of each reading, ``(readings,)``; NaN where none was used."""
+    used = solution.weight / np.median(solution.weight) if loss in ABSOLUTE else solution.weight
+    weight = np.full(len(problem.data.target), np.nan)
+    first = 0
+    for block in problem.blocks:
+        part = used[first : first + len(block.readings)]
+        if block.data is problem.data:
+            weight[block.readings] = np.fmin(weight[block.readings], part)
+        first += len(block.readings)
+    return weight
 
 
 def _pulled(

@@ -114,43 +114,7 @@ def find_parameters(
     free = held.free_of(unanchored(model.free(start), data), start)
     if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
         free = free.without([SCALE])
-    check_bounds = None
-    if redundancy != "prior" and JointCurve.name in model.effects:
-        raise InputError(
-            "curves of joints are found with priors, whose size the data tell",
-            parameter="redundancy",
-            where=f"model {model.name}",
-            came=redundancy,
-            allowed="prior",
-            cure=f"Leave out `redundancy`, or the joint effect {JointCurve.name}.",
-        )
-    if not free.names:
-        raise InputError(
-            "everything that this model frees is held, so there is nothing to find",
-            parameter="hold",
-            where=data.source,
-            came=f"model {model.name}",
-            cure="Hold less, or name a model that frees the robot's own parameters.",
-        )
-    if bounds is not None:
-        for name in (*bounds.within, *bounds.between):
-            if name in held.names(start):
-                raise InputError(
-                    "the parameter has bounds, and it is held",
-                    parameter="bounds",
-                    where=bounds_file,
-                    came=name,
-                    cure="Remove its bounds, or do not hold it.",
-                )
-        tried = start.with_effects(model.tried).parameters.values()
-        check_bounds = bound_vectors(bounds, free, bounds_file, tried)
-    if redundancy == "none" and bounds is None and not held:
-        raise InputError(
-            "without priors, bounds and places that are held nothing tells base and joints apart",
-            parameter="redundancy",
-            came="none",
-            cure="Give `bounds`, `hold` what is known, or use `redundancy=drop`, which holds what is redundant.",
-        )
+    check_bounds = _checked(model, start, free, data.source, redundancy, held, bounds, bounds_file)
     problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
     joints = None
     if near is not None:
@@ -189,6 +153,57 @@ def find_parameters(
         solution = _not_shrunk(reduced, solution, limits)
     start = start.with_parameters(curves.priors_of(start))
     return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held, curves)
+
+
+def _checked(
+    model: Model,
+    start: Robot,
+    free: FreeParameters,
+    source: str,
+    redundancy: Redundant,
+    held: Held,
+    bounds: Bounds | None,
+    bounds_file: str,
+) -> tuple[Array, Array] | None:
+    """Refuse what cannot be found; return the lowest and highest value of every free parameter, if there are bounds."""
+    if redundancy != "prior" and JointCurve.name in model.effects:
+        raise InputError(
+            "curves of joints are found with priors, whose size the data tell",
+            parameter="redundancy",
+            where=f"model {model.name}",
+            came=redundancy,
+            allowed="prior",
+            cure=f"Leave out `redundancy`, or the joint effect {JointCurve.name}.",
+        )
+    if not free.names:
+        raise InputError(
+            "everything that this model frees is held, so there is nothing to find",
+            parameter="hold",
+            where=source,
+            came=f"model {model.name}",
+            cure="Hold less, or name a model that frees the robot's own parameters.",
+        )
+    limits = None
+    if bounds is not None:
+        for name in (*bounds.within, *bounds.between):
+            if name in held.names(start):
+                raise InputError(
+                    "the parameter has bounds, and it is held",
+                    parameter="bounds",
+                    where=bounds_file,
+                    came=name,
+                    cure="Remove its bounds, or do not hold it.",
+                )
+        tried = start.with_effects(model.tried).parameters.values()
+        limits = bound_vectors(bounds, free, bounds_file, tried)
+    if redundancy == "none" and bounds is None and not held:
+        raise InputError(
+            "without priors, bounds and places that are held nothing tells base and joints apart",
+            parameter="redundancy",
+            came="none",
+            cure="Give `bounds`, `hold` what is known, or use `redundancy=drop`, which holds what is redundant.",
+        )
+    return limits
 
 
 def _not_shrunk(problem: Problem, solution: Solution, limits: tuple[Array, Array] | None) -> Solution:

@@ -81,18 +81,7 @@ def joint_loads(
         InputError: If an array has another shape.
     """
     count, size = len(robot.joints), np.shape(variables)[-1]
-    for name, given, rows in (
-        ("velocity", velocity, count),
-        ("acceleration", acceleration, count),
-        ("wrench", wrench, 6),
-    ):
-        if given is not None and np.shape(given) != (rows, size):
-            raise InputError(
-                f"the {name} has another shape than it should",
-                where=robot.name,
-                came=f"an array of shape {np.shape(given)}",
-                allowed=f"({rows}, {size}): one column for each configuration",
-            )
+    _refuse_other_shapes(robot, size, velocity, acceleration, wrench)
     elements = robot.arm.elements
     arm = robot.arm.forward_kinematics(variables, robot.values)
     moves = arm.moves
@@ -100,12 +89,7 @@ def joint_loads(
         at_tool = wrench_on_flange(robot, robot.wrench, arm)
         wrench = at_tool if wrench is None else wrench + at_tool
     ends = [0, *accumulate(len(link) for link in robot.moved_links)]
-    stayed = robot.axial_slides.stayed
-    bodies = [
-        (ends[link.joint], link.mass, stayed(link.joint, link.cog, robot.values), link.inertia) for link in robot.masses
-    ]
-    bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
-    bodies = [(end, mass, cog, inertia) for end, mass, cog, inertia in bodies if mass or any(inertia)]
+    bodies = _bodies(robot, ends)
     moving = velocity is not None or acceleration is not None
     rest = np.zeros((count, 1))
     qd = rest if velocity is None else velocity
@@ -147,6 +131,34 @@ def joint_loads(
         for place, (pull, turn) in balancer_wrenches(robot, balancer, elements, moves, ends, robot.values):
             applied.setdefault(place, []).append((_scaled(pull, factor), _scaled(turn, factor)))
     return _carried(robot, elements, moves, applied, (force, moment), size)
+
+
+def _refuse_other_shapes(
+    robot: Robot, size: int, velocity: Array | None, acceleration: Array | None, wrench: Array | None
+) -> None:
+    count = len(robot.joints)
+    for name, given, rows in (
+        ("velocity", velocity, count),
+        ("acceleration", acceleration, count),
+        ("wrench", wrench, 6),
+    ):
+        if given is not None and np.shape(given) != (rows, size):
+            raise InputError(
+                f"the {name} has another shape than it should",
+                where=robot.name,
+                came=f"an array of shape {np.shape(given)}",
+                allowed=f"({rows}, {size}): one column for each configuration",
+            )
+
+
+def _bodies(robot: Robot, ends: Sequence[int]) -> list[tuple[int, float, Coordinates, Inertia]]:
+    """Return what loads an arm: behind which element it is, its mass, centre of gravity and moments of inertia."""
+    stayed = robot.axial_slides.stayed
+    bodies: list[tuple[int, float, Coordinates, Inertia]] = [
+        (ends[link.joint], link.mass, stayed(link.joint, link.cog, robot.values), link.inertia) for link in robot.masses
+    ]
+    bodies.append((len(robot.arm.elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
+    return [one for one in bodies if one[1] or any(one[3])]
 
 
 def relief(robot: Robot, variables: Array) -> Array:

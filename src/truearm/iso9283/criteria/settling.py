@@ -133,14 +133,7 @@ def _cycle(
     sigma: float,
 ) -> SettlingCurve:
     at = f"{samples.source}, lines {samples.line[rows[0]]} to {samples.line[rows[-1]]}"
-    if len(rows) < LEAST_SAMPLES:
-        raise InputError(
-            "there are too few samples of this cycle",
-            where=at,
-            came=f"{len(rows)} samples",
-            allowed=f"{LEAST_SAMPLES} or more",
-            cure="Sample faster and longer, or leave the cycle out.",
-        )
+    _refuse_few(len(rows), at)
     clock = clock_of(samples.time[rows])
     time = clock.time - clock.time[0]
     position = in_base(transform, samples.position[rows])
@@ -150,22 +143,7 @@ def _cycle(
     distance = np.asarray(np.linalg.norm(position - _final(position), axis=1))
     outside = _outside(distance, band, sigma)
     last = max(int(_FINAL * len(rows)), 5)
-    if outside[-last:].any():
-        raise InputError(
-            "the record ends before the tip stands",
-            where=at,
-            came=f"{1e3 * distance[-last:].max():.3f} mm from where it ends, within the last tenth of the samples",
-            allowed=f"{1e3 * band:g} mm, the limit band of the plan",
-            cure="Record longer, or plan a wider limit band: the instrument's noise must lie well within it.",
-        )
-    if not outside[0]:
-        raise InputError(
-            "the record begins when the tip is in the limit band already",
-            where=at,
-            came=f"{1e3 * distance[0]:.3f} mm from where it ends",
-            allowed=f"a first sample further away than {1e3 * band:g} mm",
-            cure="Record from before the move on.",
-        )
+    _refuse_incomplete(outside, distance, last, band, at)
     passing = _passings(position, _final(position), band)
     entered = int(np.flatnonzero(passing[:, 0] <= 1.0)[0])
     entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
@@ -186,9 +164,7 @@ def _cycle(
     overshoot = 0.0 if settles else overshoot
     speed = (distance[entered] - distance[entered + 1]) / (time[entered + 1] - time[entered])
     start = _start(time, position, band)
-    settled = stay - entry
-    rounded = 2.0 * clock.sigma
-    posing = stay - start
+    settled, posing, rounded = stay - entry, stay - start, 2.0 * clock.sigma
     if test == "posing-time":
         coarse = sparse = (step > COARSE * posing, False)
         coarse = (coarse[0] or rounded > COARSE * posing, False)
@@ -205,14 +181,9 @@ def _cycle(
             slow or blurred or (not settles and rounded > COARSE * settled) or open_ > COARSE * settled,
             slow or few or blurred,
         )
-    where = part.place
-    if test == "posing-time":
-        planned = plan.test(test)
-        first = planned.places[0] if planned is not None and planned.places else "P1"
-        where = part.place if part.place == first else f"{first}-{part.place}"
     return SettlingCurve(
         test,
-        where,
+        _place(plan, test, part),
         part.conditions,
         number,
         time,
@@ -229,6 +200,46 @@ def _cycle(
         samples.line[rows],
         clock,
     )
+
+
+def _place(plan: PerformancePlan, test: str, part: Part) -> str:
+    """Return the place as values have it: of a posing time with where the way began."""
+    if test != "posing-time":
+        return part.place
+    planned = plan.test(test)
+    first = planned.places[0] if planned is not None and planned.places else "P1"
+    return part.place if part.place == first else f"{first}-{part.place}"
+
+
+def _refuse_few(samples: int, where: str) -> None:
+    if samples < LEAST_SAMPLES:
+        raise InputError(
+            "there are too few samples of this cycle",
+            where=where,
+            came=f"{samples} samples",
+            allowed=f"{LEAST_SAMPLES} or more",
+            cure="Sample faster and longer, or leave the cycle out.",
+        )
+
+
+def _refuse_incomplete(outside: NDArray[np.bool_], distance: Array, last: int, band: float, where: str) -> None:
+    """Refuse a record that ends before the tip stands, or begins when it is within the band already."""
+    if outside[-last:].any():
+        raise InputError(
+            "the record ends before the tip stands",
+            where=where,
+            came=f"{1e3 * distance[-last:].max():.3f} mm from where it ends, within the last tenth of the samples",
+            allowed=f"{1e3 * band:g} mm, the limit band of the plan",
+            cure="Record longer, or plan a wider limit band: the instrument's noise must lie well within it.",
+        )
+    if not outside[0]:
+        raise InputError(
+            "the record begins when the tip is in the limit band already",
+            where=where,
+            came=f"{1e3 * distance[0]:.3f} mm from where it ends",
+            allowed=f"a first sample further away than {1e3 * band:g} mm",
+            cure="Record from before the move on.",
+        )
 
 
 def _refuse_other_times(time: Array, position: Array, where: str) -> None:

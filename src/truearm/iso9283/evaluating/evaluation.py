@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,13 +17,13 @@ from truearm.iso9283.criteria.compliance import PushLine, WildPush, evaluate_pus
 from truearm.iso9283.criteria.corners import CornerCurves, WeaveCurves, corner_values, weaving_values
 from truearm.iso9283.criteria.drift import DriftCourse
 from truearm.iso9283.criteria.paths import PathDeviations, path_values
-from truearm.iso9283.criteria.poses import PoseCloud, evaluate, missing_places
+from truearm.iso9283.criteria.poses import MissingPlace, PoseCloud, evaluate, missing_places
 from truearm.iso9283.criteria.rows import Conditions, Instrument, Quantity, Value, best_fit_of
 from truearm.iso9283.criteria.settling import SettlingCurve, settling_values
 from truearm.iso9283.criteria.velocity import VelocityCurves, velocity_values
 from truearm.iso9283.criteria.wild_rows import UnusualRows
 from truearm.iso9283.evaluating.doubts import refuse_other_push_place, refuse_other_rests
-from truearm.iso9283.planning.criteria import CRITERIA, TESTS, PerformancePlan, PlannedTest
+from truearm.iso9283.planning.criteria import CRITERIA, TESTS, PerformancePlan
 from truearm.iso9283.planning.records import AttainedPoses, Pushes, Samples
 
 #: What kind of number each criterion is; a length if it is not here.
@@ -35,6 +36,12 @@ _QUANTITIES: dict[str, Quantity] = {
     "WS": "ratio",
     "WF": "ratio",
     "compliance": "compliance",
+}
+#: By what tests along paths are evaluated, and the field of an evaluation with their curves.
+_ALONG_PATHS: Final[dict[str, tuple[str, Callable[..., tuple[list[Value], list[Any]]]]]] = {
+    "CR": ("corners", corner_values),
+    "AV": ("velocities", velocity_values),
+    "WS": ("weaves", weaving_values),
 }
 
 
@@ -115,79 +122,51 @@ def evaluated(
                 cure="Give it, or the poses of the test AP, to which the frame is then fitted.",
             )
         alignment = best_fit_of(plan, poses)
-    values: list[Value] = []
-    unusual = UnusualRows()
-    missing: tuple[str, ...] = ()
-    clouds: tuple[PoseCloud, ...] = ()
-    drift: tuple[DriftCourse, ...] = ()
-    pushes: tuple[PushLine, ...] = ()
-    deviations: list[PathDeviations] = []
-    corners: list[CornerCurves] = []
-    velocities: list[VelocityCurves] = []
-    weaves: list[WeaveCurves] = []
-    settling: list[SettlingCurve] = []
     place = alignment.T_base_instrument
     transform: Array = homogeneous(place.rotation[None], np.array(place.translation)[None])[0]
     readings = _readings(measured, instrument)
+    values: list[Value] = []
+    made = Evaluation((), alignment, readings=readings, simulated=measured.simulated)
     if poses is not None:
         progress("poses")
         of_poses = evaluate(plan, poses, alignment, readings["poses"])
         values += of_poses.values
-        clouds, drift = of_poses.clouds, of_poses.drift
-        unusual, missing = of_poses.unusual, of_poses.missing
+        made = replace(made, clouds=of_poses.clouds, drift=of_poses.drift, unusual=of_poses.unusual)
+        made = replace(made, missing=of_poses.missing)
     if paths is not None:
         reading = readings["paths"]
         tie = np.sqrt(np.diag(alignment.covariance_at(plan.cube.centre)))
+        deviations: list[PathDeviations] = []
         for test in ("AT", "AT-reorientation"):
             progress(TESTS[test].name)
             found, courses = path_values(plan, paths, transform, reading, test, tie, alignment.sigma_rot)
             values += found
             deviations += courses
-        progress(TESTS["CR"].name)
-        found, corners = corner_values(plan, paths, transform, reading)
-        values += found
-        progress(TESTS["AV"].name)
-        found, velocities = velocity_values(plan, paths, transform, reading)
-        values += found
-        progress(TESTS["WS"].name)
-        found, weaves = weaving_values(plan, paths, transform, reading)
-        values += found
+        curves: dict[str, Any] = {}
+        for test, (name, values_of) in _ALONG_PATHS.items():
+            progress(TESTS[test].name)
+            found, of_test = values_of(plan, paths, transform, reading)
+            values += found
+            curves[name] = tuple(of_test)
+        made = replace(made, deviations=tuple(deviations), **curves)
     if measured.settling is not None:
         progress(TESTS["t"].name)
         found, settling = settling_values(plan, measured.settling, transform, readings["settling"])
         refuse_other_rests(plan, settling, measured.settling.source)
         values += found
+        made = replace(made, settling=tuple(settling))
     if measured.forces is not None:
         progress(TESTS["compliance"].name)
         refuse_other_push_place(plan, measured.forces, alignment.in_base(measured.forces.position))
         stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, readings["forces"])
         values += stiff
+        made = replace(made, pushes=pushes, wild_pushes=wild_pushes(pushes, readings["forces"]))
     absent = missing_places(plan, values)
-    values += [
-        Value(id_, "position", one.where, float("nan"), _quantity(id_), None, 0, one.conditions, "not-measured")
-        for one in absent
-        for id_ in TESTS[one.test].criteria
-        if not any((value.id, value.where, value.conditions) == (id_, one.where, one.conditions) for value in values)
-    ]
-    there = {value.id for value in values}
-    for planned in plan.tests:
-        values += [_nothing(criterion, planned) for criterion in TESTS[planned.id].criteria if criterion not in there]
-    return Evaluation(
-        tuple(sorted(values, key=lambda value: CRITERIA.index(value.id))),
-        alignment,
-        clouds,
-        drift,
-        tuple(deviations),
-        tuple(corners),
-        tuple(velocities),
-        tuple(weaves),
-        tuple(settling),
-        pushes,
-        unusual,
-        wild_pushes(pushes, readings.get("forces", instrument)),
-        (*missing, *dict.fromkeys(one.words for one in absent)),
-        readings,
-        measured.simulated,
+    values += _not_measured(plan, values, absent)
+    return replace(
+        made,
+        values=tuple(sorted(values, key=lambda value: CRITERIA.index(value.id))),
+        missing=(*made.missing, *dict.fromkeys(one.words for one in absent)),
     )
 
 
@@ -200,12 +179,20 @@ def _readings(measured: Measurements, instrument: Instrument) -> dict[str, Instr
     return made | {name: instrument.reading(one.resolution) for name, one in rest.items() if one is not None}
 
 
-def _nothing(criterion: str, test: PlannedTest) -> Value:
-    """Return the value of a criterion that was planned and not measured."""
-    where = ", ".join(test.places)
-    return Value(
-        criterion, "position", where, float("nan"), _quantity(criterion), None, 0, Conditions(), "not-measured"
-    )
+def _not_measured(plan: PerformancePlan, values: Sequence[Value], absent: Sequence[MissingPlace]) -> list[Value]:
+    """Return a value for each that was planned and not measured, at single places and of whole tests."""
+    there = {(value.id, value.where, value.conditions) for value in values}
+    places = [(id_, one.where, one.conditions) for one in absent for id_ in TESTS[one.test].criteria]
+    made = [_nothing(*place) for place in places if place not in there]
+    known = {value.id for value in (*values, *made)}
+    for planned in plan.tests:
+        where, left_out = ", ".join(planned.places), [one for one in TESTS[planned.id].criteria if one not in known]
+        made += [_nothing(criterion, where, Conditions()) for criterion in left_out]
+    return made
+
+
+def _nothing(criterion: str, where: str, conditions: Conditions) -> Value:
+    return Value(criterion, "position", where, float("nan"), _quantity(criterion), None, 0, conditions, "not-measured")
 
 
 def _quantity(criterion: str) -> Quantity:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -100,67 +100,54 @@ def pose_pictures(
             )
         )
         drawings.append(_accuracy(plan, accuracy, under, other))
-    for test, name, title, words, series in (
+    of_test = {test: fastest([one for one in clouds if one.test == test]) for test in ("vAP", "E")}
+    others: list[tuple[Sequence[Any], str, str, str, Callable[[Any], Figure]]] = [
         (
-            "vAP",
+            of_test["vAP"],
             "approaches",
             "Attained poses by approach",
             "vAP is the largest distance between two barycentres, the large marks. The middle of them is 0.",
-            lambda one: f"from {one.approach}",
+            lambda found: _together(found, lambda one: f"from {one.approach}"),
         ),
         (
-            "E",
+            of_test["E"],
             "robots",
             "Attained poses by robot",
             "E is the largest distance between two barycentres, the large marks. The middle of them is 0.",
-            lambda one: one.robot,
+            lambda found: _together(found, lambda one: one.robot),
         ),
-    ):
-        of_test = fastest([one for one in clouds if one.test == test])
-        if of_test:
-            drawings.append(pictured(name, title, words, _together(of_test, series)))
-    courses = [course for course in drift if len(course.ap) > 1]
-    if courses:
-        drawings.append(
-            pictured(
-                "drift",
-                "Drift from cold",
-                "Change of AP and RP against the first value; dAP and dRP are the largest.",
-                _drift(courses[0]),
-            )
-        )
-    rests = [curve for curve in settling if curve.test == "t"]
-    if rests:
-        drawings.append(
-            pictured(
-                "settling",
-                "Coming to rest",
-                "Distance from the final attained pose. Grey: the limit band. t goes from the first entry into it, the "
-                "first dashed line, to the final stay, the second, of the first cycle; OV is what lies above the band "
-                "between them.",
-                _settling(rests),
-            )
-        )
-    moves = [curve for curve in settling if curve.test == "posing-time"]
-    if moves:
-        drawings.append(
-            pictured(
-                "posing-time",
-                "Posing time over distance",
-                "From the begin of the motion to the final stay in the limit band, each cycle.",
-                _posing(moves),
-            )
-        )
-    if pushes:
-        drawings.append(
-            pictured(
-                "compliance",
-                "Displacement under force",
-                "Along the force, each cycle with the straight line whose slope is its compliance.",
-                _pushes(pushes),
-            )
-        )
-    return drawings
+        (
+            [course for course in drift if len(course.ap) > 1],
+            "drift",
+            "Drift from cold",
+            "Change of AP and RP against the first value; dAP and dRP are the largest.",
+            lambda found: _drift(found[0]),
+        ),
+        (
+            [curve for curve in settling if curve.test == "t"],
+            "settling",
+            "Coming to rest",
+            "Distance from the final attained pose. Grey: the limit band. t goes from the first entry into it, the "
+            "first dashed line, to the final stay, the second, of the first cycle; OV is what lies above the band "
+            "between them.",
+            _settling,
+        ),
+        (
+            [curve for curve in settling if curve.test == "posing-time"],
+            "posing-time",
+            "Posing time over distance",
+            "From the begin of the motion to the final stay in the limit band, each cycle.",
+            _posing,
+        ),
+        (
+            pushes,
+            "compliance",
+            "Displacement under force",
+            "Along the force, each cycle with the straight line whose slope is its compliance.",
+            _pushes,
+        ),
+    ]
+    return drawings + [pictured(name, title, words, draw(found)) for found, name, title, words, draw in others if found]
 
 
 def _under(cloud: PoseCloud) -> str:

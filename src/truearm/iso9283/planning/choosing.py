@@ -100,15 +100,7 @@ def performance_plan(
         InputError: If the arm has fewer than six joints, or cannot come to every pose and along every path of the cube,
             or those are not clear or cannot be driven.
     """
-    if len(robot.joints) < _LEAST_JOINTS:
-        raise InputError(
-            "tests by ISO 9283 keep the orientation of the tip, and this arm cannot",
-            where=robot.name,
-            came=f"{len(robot.joints)} joints",
-            allowed=f"{_LEAST_JOINTS} joints or more",
-        )
-    if ahead not in DIRECTIONS:
-        raise InputError("there is no such direction", where="ahead", came=ahead, allowed=", ".join(DIRECTIONS))
+    _refuse_unfit(robot, ahead)
     find = cube is None
     whole = cube if cube is not None else largest_cube(robot, target=target, ahead=ahead, nearest=nearest, floor=floor)
     kept = unclear is not None or unsuited is not None
@@ -121,20 +113,7 @@ def performance_plan(
         if not layout.reached(unclear):
             missed = layout.missed
             return None
-        found = PerformancePlan(
-            robot,
-            target,
-            tried,
-            plane,
-            layout.poses(),
-            layout.paths,
-            layout.starts(),
-            tuple(_test(one, velocities, loads, layout) for one in wanted),
-            rated_load,
-            rated_velocity,
-            limit_band,
-            hours,
-        )
+        found = layout.plan(velocities, loads, rated_load, rated_velocity, limit_band, hours)
         words = "" if unsuited is None else unsuited(found)
         missed = words or missed
         return None if words else found
@@ -156,6 +135,18 @@ def performance_plan(
         if find and kept
         else "Take a smaller cube, another centre, plane or orientation.",
     )
+
+
+def _refuse_unfit(robot: Robot, ahead: str) -> None:
+    if len(robot.joints) < _LEAST_JOINTS:
+        raise InputError(
+            "tests by ISO 9283 keep the orientation of the tip, and this arm cannot",
+            where=robot.name,
+            came=f"{len(robot.joints)} joints",
+            allowed=f"{_LEAST_JOINTS} joints or more",
+        )
+    if ahead not in DIRECTIONS:
+        raise InputError("there is no such direction", where="ahead", came=ahead, allowed=", ".join(DIRECTIONS))
 
 
 def _shrunk(whole: Cube) -> Iterator[Cube]:
@@ -221,8 +212,8 @@ class _Layout:
     def __init__(
         self, robot: Robot, target: str | None, cube: Cube, plane: str, rotation: Array, tests: Sequence[str]
     ) -> None:
-        self.robot, self.target, self.cube, self.rotation = robot, target, cube, rotation
-        self.plane = cube.plane(plane)
+        self.robot, self.target, self.cube, self.rotation, self.tests = robot, target, cube, rotation, tests
+        self.plane_name, self.plane = plane, cube.plane(plane)
         self.missed = ""
         points = self.plane.measuring_points
         self.places = {f"P{k}": p for k, p in enumerate(points, 1)}
@@ -335,6 +326,31 @@ class _Layout:
             if there.status[0].usable:
                 postures.append((there.joints[0], name))
         return sorted(postures, key=lambda one: float(np.abs(one[0] - first.joints[0]).max()))
+
+    def plan(
+        self,
+        velocities: Sequence[float],
+        loads: Sequence[float],
+        rated_load: float,
+        rated_velocity: float,
+        limit_band: float,
+        hours: float,
+    ) -> PerformancePlan:
+        """Return the plan of the tests where everything was reached."""
+        return PerformancePlan(
+            self.robot,
+            self.target,
+            self.cube,
+            self.plane_name,
+            self.poses(),
+            self.paths,
+            self.starts(),
+            tuple(_test(one, velocities, loads, self) for one in self.tests),
+            rated_load,
+            rated_velocity,
+            limit_band,
+            hours,
+        )
 
     def poses(self) -> Mapping[str, PlannedPose]:
         """Return the poses with their joint positions."""

@@ -242,16 +242,8 @@ def read_plan(path: Path) -> PerformancePlan:
         for place in test.places:
             _known(place, paths if TESTS[test.criterion].readings == "paths" else poses, where, "place")
         _check_approaches(test, poses, starts, where)
-        tests.append(
-            PlannedTest(
-                test.criterion,
-                test.places,
-                test.cycles,
-                tuple(v / 100.0 for v in test.velocities),
-                tuple(v / 100.0 for v in test.loads),
-                test.approaches,
-            )
-        )
+        velocities, loads = (tuple(v / 100.0 for v in shares) for shares in (test.velocities, test.loads))
+        tests.append(PlannedTest(test.criterion, test.places, test.cycles, velocities, loads, test.approaches))
     return PerformancePlan(
         robot,
         content.target,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -70,12 +70,8 @@ def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -
                     cure="Name what it is measured from, with any name.",
                 )
             if name == "distance" and values[row] <= 0.0:
-                raise InputError(
-                    "a distance must be above zero",
-                    where=cells.place(row, places[name]),
-                    came=cells.columns[places[name]][row],
-                    allowed="a number above 0",
-                    cure="Of a target held at a point give x, y and z from that point, 0, 0, 0.",
+                raise _no_distance(
+                    cells, row, places[name], "Of a target held at a point give x, y and z from that point, 0, 0, 0."
                 )
     if readings.fixture is not None:
         for row in np.flatnonzero(readings.reference).tolist():
@@ -86,6 +82,12 @@ def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -
                     came=readings.fixture[row],
                     allowed="nothing in the column fixture",
                 )
+
+
+def _no_distance(cells: Cells, row: int, place: int, cure: str | None = None) -> InputError:
+    came = cells.columns[place][row]
+    where = cells.place(row, place)
+    return InputError("a distance must be above zero", where=where, came=came, allowed="a number above 0", cure=cure)
 
 
 def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Dataset) -> Dataset:
@@ -120,8 +122,7 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
     distance, height, sigma = numbers("distance"), numbers("height"), numbers("sigma", deviation=True)
     for row, (name, other) in enumerate(zip(names, others, strict=True)):
         where = f"{cells.source}, line {cells.lines[row]}"
-        placed, apart = bool(np.isfinite(position[row]).any()), bool(np.isfinite(distance[row]))
-        over = bool(np.isfinite(height[row]))
+        placed, apart, over = (bool(np.isfinite(one[row]).any()) for one in (position, distance, height))
         for one in filter(None, (name, other)):
             if one not in data.fixtures:
                 near = nearest_names(one, data.fixtures)
@@ -142,12 +143,7 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
                 cure="Fill in x, y, z, or fixture and distance, or fixture and height.",
             )
         if distance[row] <= 0.0:
-            raise InputError(
-                "a distance must be above zero",
-                where=cells.place(row, columns["distance"][0]),
-                came=cells.columns[columns["distance"][0]][row],
-                allowed="a number above 0",
-            )
+            raise _no_distance(cells, row, columns["distance"][0])
         if np.isnan(sigma[row]):
             raise InputError(
                 "the row of a fixture has no standard deviation",
@@ -404,74 +400,27 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     """
     checked_unit(length_unit, LENGTH_UNITS, "length unit")
     checked_unit(angle_unit, ANGLE_UNITS, "angle unit")
-    references = dataset.references
-    parts = [dataset] if references is None else [dataset, references]
-    oriented = any(part.quaternion is not None or part.sigma_rot is not None for part in parts)
-    with_sigma = any(part.sigma is not None for part in parts)
-    with_sigma_rot = any(part.sigma_rot is not None for part in parts)
+    parts = [dataset] if dataset.references is None else [dataset, dataset.references]
+    units = [angle_unit if kind == "revolute" else length_unit for kind in dataset.joint_kinds]
+    column = COLUMN["controller" if dataset.joints_are == "controller" else "model"]
     circumstances = {} if dataset.temperature is None else {"temperature": dataset.temperature}
     if dataset.wrench is not None:
         circumstances |= dict(zip((*_FORCE, *_MOMENT), dataset.wrench.T, strict=True))
-    units = [angle_unit if kind == "revolute" else length_unit for kind in dataset.joint_kinds]
-    column = COLUMN["controller" if dataset.joints_are == "controller" else "model"]
-    setup = dataset.setup
-    with_visits = any(part.visit is not None for part in parts)
-    with_roles = references is not None or setup is not None
-    every = [part for part in (*parts, setup) if part is not None]
-    lengths = [name for name in _LENGTHS if any(getattr(part, name) is not None for part in every)]
-    positions = not lengths or any(np.isfinite(part.position).any() for part in every)
-    with_sigma = with_sigma or setup is not None
     order = _order_beside_labels(dataset)
-    heading = [
-        "configuration",
-        *([] if order is None else ["order"]),
-        *(f"{column}_{number} [{unit}]" for number, unit in enumerate(units, 1)),
-        "target",
-        *(["role"] if with_roles else []),
-        *(["visit"] if with_visits else []),
-        *(["fixture"] if any(part.fixtures for part in every) else []),
-        *(f"{axis} [{length_unit}]" for axis in (_POSITION if positions else ())),
-        *(_QUATERNION if oriented else ()),
-        *(f"{name} [{length_unit}]" for name in lengths),
-        *([f"sigma [{length_unit}]"] if with_sigma else []),
-        *(["sigma_rot [mrad]"] if with_sigma_rot else []),
-        *([_SHOWN["scale_sigma"]] if dataset.scale_sigma is not None else []),
-        *(_SHOWN[name] for name in circumstances),
-        *([SIMULATED] if dataset.simulated else []),
-    ]
+    columns = _reading_columns(dataset, parts, length_unit)
+    before = ["configuration", *([] if order is None else ["order"])]
+    before += [f"{column}_{number} [{unit}]" for number, unit in enumerate(units, 1)]
+    behind = [*(_SHOWN[name] for name in circumstances), *([SIMULATED] if dataset.simulated else [])]
+    mark = [YES] if dataset.simulated else []
     joints = [[_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()]
     rows: list[list[list[str]]] = [[] for _ in dataset.labels]
-    mark = [YES] if dataset.simulated else []
-
-    def reading_cells(part: Dataset, role: str, reading: int) -> list[str]:
-        row = [part.targets[part.target[reading]], *([role] if with_roles else [])]
-        if with_visits:
-            once = "" if role == "fixture" else "1"
-            row.append(once if part.visit is None else str(int(part.visit[reading])))
-        if "fixture" in heading:
-            other = int(part.against[reading])
-            row.append(part.fixtures[other] if other >= 0 else "")
-        if positions:
-            row += [_shown(v, length_unit) for v in part.position[reading].tolist()]
-        if oriented:
-            row += _cells(part.quaternion, reading, "1", 4)
-        for name in lengths:
-            row += _cells(getattr(part, name), reading, length_unit, 1)
-        if with_sigma:
-            row += _cells(part.sigma, reading, length_unit, 1)
-        if with_sigma_rot:
-            row += _cells(part.sigma_rot, reading, "mrad", 1)
-        if dataset.scale_sigma is not None:
-            row.append("" if role == "fixture" else _shown(dataset.scale_sigma, "ppm"))
-        return row
-
     for part, role in zip(parts, ROLES, strict=False):
         for reading, configuration in enumerate(part.configuration.tolist()):
             place = [] if order is None else [order[configuration]]
-            row = [dataset.labels[configuration], *place, *joints[configuration], *reading_cells(part, role, reading)]
+            row = [dataset.labels[configuration], *place, *joints[configuration]]
+            row += [cell for _, cells_of in columns for cell in cells_of(part, role, reading)]
             row += [_shown(float(values[configuration]), "1") for values in circumstances.values()]
-            row += mark
-            rows[configuration].append(row)
+            rows[configuration].append(row + mark)
     unmeasured = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
     if unmeasured is not None:
         raise InputError(
@@ -479,15 +428,56 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
             where=f"{dataset.source}, configuration {unmeasured}",
             cure="Leave it out, or give it missing readings.",
         )
+    if (setup := dataset.setup) is not None:
+        for reading in range(len(setup.target)):
+            cells = [cell for _, cells_of in columns for cell in cells_of(setup, "fixture", reading)]
+            rows.append([[""] * len(before) + cells + [""] * len(behind)])
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(heading)
+    writer.writerow([*before, *(heading for headings, _ in columns for heading in headings), *behind])
     writer.writerows(row for found in rows for row in found)
-    for reading in range(0 if setup is None else len(setup.target)):
-        ends = [""] * (len(units) + (order is not None)), [""] * (len(circumstances) + len(mark))
-        row = ["", *ends[0], *reading_cells(setup, "fixture", reading), *ends[1]]  # type: ignore[arg-type]
-        writer.writerow(row)
     return stream.getvalue()
+
+
+#: Returns the cells of a reading from its dataset, its role and its index.
+_CellsOf = Callable[[Dataset, str, int], list[str]]
+
+
+def _reading_columns(dataset: Dataset, parts: Sequence[Dataset], unit: str) -> list[tuple[Sequence[str], _CellsOf]]:
+    """Return the columns that differ from reading to reading: their headings, and what gives the cells of a reading."""
+    setup = dataset.setup
+    every = [part for part in (*parts, setup) if part is not None]
+
+    def fixture(part: Dataset, role: str, reading: int) -> list[str]:
+        other = int(part.against[reading])
+        return [part.fixtures[other] if other >= 0 else ""]
+
+    def visit(part: Dataset, role: str, reading: int) -> list[str]:
+        once = "" if role == "fixture" else "1"
+        return [once if part.visit is None else str(int(part.visit[reading]))]
+
+    def scale(part: Dataset, role: str, reading: int) -> list[str]:
+        return ["" if role == "fixture" or dataset.scale_sigma is None else _shown(dataset.scale_sigma, "ppm")]
+
+    def numbers(field: str, unit: str, count: int) -> _CellsOf:
+        return lambda part, role, reading: _cells(getattr(part, field), reading, unit, count)
+
+    lengths = [name for name in _LENGTHS if any(getattr(part, name) is not None for part in every)]
+    oriented = any(part.quaternion is not None or part.sigma_rot is not None for part in parts)
+    positions = not lengths or any(np.isfinite(part.position).any() for part in every)
+    columns: list[tuple[bool, Sequence[str], _CellsOf]] = [
+        (True, ["target"], lambda part, role, reading: [part.targets[part.target[reading]]]),
+        (len(every) > 1, ["role"], lambda part, role, reading: [role]),
+        (any(part.visit is not None for part in parts), ["visit"], visit),
+        (any(part.fixtures for part in every), ["fixture"], fixture),
+        (positions, [f"{axis} [{unit}]" for axis in _POSITION], numbers("position", unit, 3)),
+        (oriented, _QUATERNION, numbers("quaternion", "1", 4)),
+        *((True, [f"{name} [{unit}]"], numbers(name, unit, 1)) for name in lengths),
+        (any(one is setup or one.sigma is not None for one in every), [f"sigma [{unit}]"], numbers("sigma", unit, 1)),
+        (any(part.sigma_rot is not None for part in parts), ["sigma_rot [mrad]"], numbers("sigma_rot", "mrad", 1)),
+        (dataset.scale_sigma is not None, [_SHOWN["scale_sigma"]], scale),
+    ]
+    return [(headings, cells) for there, headings, cells in columns if there]
 
 
 def _order_beside_labels(dataset: Dataset) -> list[str] | None:

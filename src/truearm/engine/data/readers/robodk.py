@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.engine.base.errors import InputError, counted
 from truearm.engine.base.files import read_text
@@ -121,12 +122,7 @@ def read_robodk(
         measured = MOVING_XYZ_ANGLES.matrices(_numbers(cells, range(9, 12), angle_unit))
         quaternion = quaternion_from_rotation(measured)
         quaternion[lost] = np.nan
-    points, target = np.unique(np.round(tool, 9), axis=0, return_inverse=True)
-    first = np.array([np.flatnonzero(target == k)[0] for k in range(len(points))])
-    order = np.argsort(first)
-    rank = np.empty(len(order), dtype=np.intp)
-    rank[order] = np.arange(len(order))
-    target = rank[target.ravel()]
+    points, target = _tool_points(tool)
     configuration = _configurations(joints, target)
     starts = np.flatnonzero(np.diff(configuration, prepend=-1))
     at = joints[starts]
@@ -146,7 +142,17 @@ def read_robodk(
         number=np.arange(float(count)),
         simulated=any(heading.startswith(SIMULATED) for heading in cells.names),
     )
-    return RoboDKTable(data, points[order], int(lost.sum()))
+    return RoboDKTable(data, points, int(lost.sum()))
+
+
+def _tool_points(tool: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the tool points in the order in which they come, and which of them each row has."""
+    points, target = np.unique(np.round(tool, 9), axis=0, return_inverse=True)
+    first = np.array([np.flatnonzero(target == k)[0] for k in range(len(points))])
+    order = np.argsort(first)
+    rank = np.empty(len(order), dtype=np.intp)
+    rank[order] = np.arange(len(order))
+    return points[order], rank[target.ravel()]
 
 
 def robodk_csv(data: Dataset, tool_points: Sequence[Array], rotations: Sequence[Array | None]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -64,34 +64,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
     joints = tuple(
         _joint(content, number, entry, f"{where}, joints[{number}]") for number, entry in enumerate(content.joints, 1)
     )
-    names = [joint.name for joint in joints]
-    for number, name in enumerate(names, 1):
-        if name in names[: number - 1]:
-            raise InputError(
-                "two joints have the same name",
-                where=f"{where}, joints[{number}]",
-                came=name,
-                cure=f"joints[{names.index(name) + 1}] has it too: rename one of them.",
-            )
-    given = [balancer.name for balancer in content.balancers]
-    for number, called in enumerate(given, 1):
-        if called is not None and called in given[: number - 1]:
-            raise InputError(
-                "two balancers have the same name",
-                where=f"{where}, balancers[{number}]",
-                came=called,
-                cure=f"balancers[{given.index(called) + 1}] has it too, and both would pull: rename one of them, "
-                "or take it out if it is the same one.",
-            )
-    numbered = [("link", "masses", mass.link) for mass in content.masses]
-    for name, truth in content.truths.items():
-        for kind in ("compliance", "backlash", "clearance"):
-            numbered += [("joint", f"truths.{name}.{kind}", joint) for joint in getattr(truth, kind)]
-    for kind, part, number in numbered:
-        if not 1 <= number <= len(joints):
-            raise InputError(
-                f"there is no such {kind}", where=f"{where}, {part}", came=number, allowed=f"1 to {len(joints)}"
-            )
+    _refuse_unsound(content, joints, where)
     robot = Robot(
         name=content.name,
         title=content.title or content.name,
@@ -144,6 +117,32 @@ def _robot(content: RobotFile, where: str) -> Robot:
     )
     check_anchors(robot, where)
     return _with_values(_with_controller(robot, content, where), content, where)
+
+
+def _refuse_unsound(content: RobotFile, joints: Sequence[Joint], where: str) -> None:
+    """Refuse names that are there twice, and numbers of joints that the robot has not."""
+    otherwise = ", and both would pull: rename one of them, or take it out if it is the same one."
+    for part, names, cure in (
+        ("joints", [joint.name for joint in joints], ": rename one of them."),
+        ("balancers", [balancer.name for balancer in content.balancers], otherwise),
+    ):
+        for number, name in enumerate(names, 1):
+            if name is not None and name in names[: number - 1]:
+                raise InputError(
+                    f"two {part} have the same name",
+                    where=f"{where}, {part}[{number}]",
+                    came=name,
+                    cure=f"{part}[{names.index(name) + 1}] has it too{cure}",
+                )
+    numbered = [("link", "masses", mass.link) for mass in content.masses]
+    for name, truth in content.truths.items():
+        for kind in ("compliance", "backlash", "clearance"):
+            numbered += [("joint", f"truths.{name}.{kind}", joint) for joint in getattr(truth, kind)]
+    for kind, part, number in numbered:
+        if not 1 <= number <= len(joints):
+            raise InputError(
+                f"there is no such {kind}", where=f"{where}, {part}", came=number, allowed=f"1 to {len(joints)}"
+            )
 
 
 def _with_controller(robot: Robot, content: RobotFile, where: str) -> Robot:

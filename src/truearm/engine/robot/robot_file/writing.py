@@ -5,13 +5,13 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from truearm.engine.base.units import SHOWN_AS, written
 from truearm.engine.robot.controller import AS_THE_MODEL
 from truearm.engine.robot.parameters import Parameter
-from truearm.engine.robot.parts import GRAVITY, NO_PAYLOAD, Joint
+from truearm.engine.robot.parts import GRAVITY, NO_PAYLOAD, Joint, Truth
 from truearm.engine.robot.proof import Proof, position_text
 from truearm.engine.robot.robot_file.curve_entry import correlations_text, curve_entries
 from truearm.engine.robot.robot_file.entries import NAME, balancer_entry, controller_entry, place_entry, reach_entry
@@ -20,6 +20,8 @@ from truearm.engine.robot.transform import Transform
 from truearm.engine.robot.wrench import refuse_pushed
 
 if TYPE_CHECKING:
+    from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
     from truearm.engine.robot.robot import Robot
 
 #: Texts that stand without quotes, but for words that are no texts in some YAML.
@@ -85,156 +87,161 @@ def _row(entry: Any) -> str | None:
 
 def file_content(robot: Robot) -> dict[str, Any]:
     """Return the entries of a robot file, as its writer takes them."""
-    from ruamel.yaml.comments import CommentedMap, CommentedSeq
-    from ruamel.yaml.scalarstring import DoubleQuotedScalarString
-
-    def flow(content: Mapping[str, Any]) -> CommentedMap:
-        made = CommentedMap(content)
-        made.fa.set_flow_style()
-        return made
-
-    def listed(content: list[Any]) -> CommentedSeq:
-        made = CommentedSeq(content)
-        made.fa.set_flow_style()
-        return made
-
-    def flowing(content: Any) -> Any:
-        """Return an entry with its lists of numbers, and the rows of its tables, on one line each."""
-        if isinstance(content, dict):
-            return {key: flowing(part) for key, part in content.items()}
-        if isinstance(content, list):
-            return [flow(row) for row in content] if isinstance(content[0], dict) else listed(content)
-        return content
-
-    def mm(values: tuple[float, float, float]) -> CommentedSeq:
-        return listed([written(v, "mm") for v in values])
-
-    def text(words: str) -> str:  # the writer leaves some texts without the quotes that its reader needs
-        return words if re.fullmatch(NAME, words) else DoubleQuotedScalarString(words)
-
-    shown = SHOWN_AS
-
-    def joint(j: Joint) -> CommentedMap:
-        row: dict[str, Any] = {"name": j.name, "type": j.kind}
-        units = robot.convention.row_units(j.kind)
-        vectors = [name for name in robot.convention.vectors if f"{name}_x" in j.row]
-        entries = {c: written(v, shown[units[c]]) for c, v in j.row.items()}
-        row |= {name: listed([entries.pop(f"{name}_{a}") for a in "xyz"]) for name in vectors} | entries
-        if j.limits:
-            row["limits"] = listed([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
-        if j.transmission_periods:
-            row["transmission_periods"] = j.transmission_periods
-        if j.bearing is not None:
-            row["bearing"] = written(j.bearing, "mm")
-        if j.max_speed is not None:
-            row["max_speed"] = written(j.max_speed, "deg" if j.kind == "revolute" else "mm")
-        return flow(row)
-
+    curves, in_curves = curve_entries(robot.known, len(robot.joints))
+    quaternion = robot.base_quaternion
     content: dict[str, Any] = {
         "truearm": SCHEMA,
         "name": robot.name,
         "title": robot.title,
-        **({"maker": robot.maker} if robot.maker else {}),
+        "maker": robot.maker or None,
         "source": robot.source,
-        "units": flow({"length": "mm", "angle": "deg"}),
+        "units": _flow({"length": "mm", "angle": "deg"}),
         "convention": robot.convention_name,
-        "joints": [joint(j) for j in robot.joints],
-    }
-    if robot.flange != Transform():
-        content["flange"] = flowing(place_entry(robot.flange))
-    if robot.controller != AS_THE_MODEL:
-        content["controller"] = flowing(controller_entry(robot.controller, robot.joints))
-    if robot.masses:
-        content["masses"] = [
-            flow(
-                {"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}
-                | ({"inertia": listed(list(m.inertia))} if any(m.inertia) else {})
+        "joints": [_joint(robot, j) for j in robot.joints],
+        "flange": None if robot.flange == Transform() else _flowing(place_entry(robot.flange)),
+        "controller": None
+        if robot.controller == AS_THE_MODEL
+        else _flowing(controller_entry(robot.controller, robot.joints)),
+        "masses": [
+            _flow(
+                {"link": m.joint, "mass": m.mass, "cog": _mm(m.cog)}
+                | ({"inertia": _listed(m.inertia)} if any(m.inertia) else {})
             )
             for m in robot.masses
         ]
-    if robot.balancers:
-        content["balancers"] = [flow(_flowing(balancer_entry(b), flow, listed)) for b in robot.balancers]
-    if robot.payload != NO_PAYLOAD:
-        content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
-    if robot.rated_load is not None:
-        content["rated_load"] = robot.rated_load
-    if robot.reach is not None:
-        content["reach"] = flow(reach_entry(robot.reach))
-    if robot.gravity != GRAVITY:
-        content["gravity"] = listed(list(robot.gravity))
-    if robot.tools:
-        content["tools"] = {
-            name: {"targets": {text(t): mm(p) for t, p in tool.targets.items()}, "mass": tool.mass, "cog": mm(tool.cog)}
+        or None,
+        "balancers": [_flow(_on_its_line(balancer_entry(b))) for b in robot.balancers] or None,
+        "payload": None
+        if robot.payload == NO_PAYLOAD
+        else _flow({"mass": robot.payload.mass, "cog": _mm(robot.payload.cog)}),
+        "rated_load": robot.rated_load,
+        "reach": None if robot.reach is None else _flow(reach_entry(robot.reach)),
+        "gravity": None if robot.gravity == GRAVITY else _listed(robot.gravity),
+        "tools": {
+            name: {
+                "targets": {_text(t): _mm(p) for t, p in tool.targets.items()},
+                "mass": tool.mass,
+                "cog": _mm(tool.cog),
+            }
             for name, tool in robot.tools.items()
         }
-    if robot.truths:
-        content["truths"] = {
-            name: {
-                "source": truth.source,
-                "values": {n: written(v, shown[robot.parameters[n].unit]) for n, v in truth.values.items()},
-                "compliance": dict(truth.compliance),
-                **{
-                    kind: {n: written(v, shown["rad"]) for n, v in angles.items()}
-                    for kind, angles in (("backlash", truth.backlash), ("clearance", truth.clearance))
-                    if angles
-                },
-            }
-            for name, truth in robot.truths.items()
-        }
-    if robot.priors:
-        names = {"m": "length", "rad": "angle"}
-        content["priors"] = {names[u]: written(v, shown[u]) for u, v in robot.priors.items()}
-    if robot.effect_names:
-        content["effects"] = list(robot.effect_names)
-    if robot.base_quaternion != (1.0, 0.0, 0.0, 0.0):
-        content["base_quaternion"] = listed(list(robot.base_quaternion))
-    if robot.targets:
-        content["targets"] = [
-            flow({"name": text(t.name)} | ({"quaternion": listed(list(t.quaternion))} if t.quaternion else {}))
+        or None,
+        "truths": {name: _truth(robot, truth) for name, truth in robot.truths.items()} or None,
+        "priors": {{"m": "length", "rad": "angle"}[u]: written(v, SHOWN_AS[u]) for u, v in robot.priors.items()}
+        or None,
+        "effects": list(robot.effect_names) or None,
+        "base_quaternion": None if quaternion == (1.0, 0.0, 0.0, 0.0) else _listed(quaternion),
+        "targets": [
+            _flow({"name": _text(t.name)} | ({"quaternion": _listed(t.quaternion)} if t.quaternion else {}))
             for t in robot.targets
         ]
-    if robot.fixtures:
-        content["fixtures"] = [
-            flow(
-                {"name": text(f.name), "kind": f.kind}
-                | ({} if f.kind == "point" else {"quaternion": listed(list(f.quaternion))})
+        or None,
+        "fixtures": [
+            _flow(
+                {"name": _text(f.name), "kind": f.kind}
+                | ({} if f.kind == "point" else {"quaternion": _listed(f.quaternion)})
             )
             for f in robot.fixtures
         ]
-    curves, in_curves = curve_entries(robot.known, len(robot.joints))
-    single = [name for name in robot.parameters if name in robot.known and name not in in_curves]
-    if single:
-        content["parameters"] = {text(name): flow(_parameter(robot.known[name], shown)) for name in single}
-    if curves:
-        content["joint_curves"] = [
-            {key: DoubleQuotedScalarString(part) if isinstance(part, str) else part for key, part in entry.items()}
-            for entry in curves
+        or None,
+        "parameters": {
+            _text(name): _flow(_parameter(robot.known[name]))
+            for name in robot.parameters
+            if name in robot.known and name not in in_curves
+        }
+        or None,
+        "joint_curves": [
+            {key: _quoted(part) if isinstance(part, str) else part for key, part in entry.items()} for entry in curves
         ]
-    if robot.proof is not None:
-        content["proof"] = _proof(robot, robot.proof, flow, listed, text)
-    if robot.simulated:
-        content["simulated"] = True
-    if robot.history:
-        content["history"] = list(robot.history)
+        or None,
+        "proof": None if robot.proof is None else _proof(robot, robot.proof),
+        "simulated": robot.simulated or None,
+        "history": list(robot.history) or None,
+    }
+    return {name: entry for name, entry in content.items() if entry is not None}
+
+
+def _flow(content: Mapping[str, Any]) -> CommentedMap:
+    """Return a table that is written on one line."""
+    from ruamel.yaml.comments import CommentedMap
+
+    made = CommentedMap(content)
+    made.fa.set_flow_style()
+    return made
+
+
+def _listed(content: Iterable[Any]) -> CommentedSeq:
+    """Return a list that is written on one line."""
+    from ruamel.yaml.comments import CommentedSeq
+
+    made = CommentedSeq(content)
+    made.fa.set_flow_style()
+    return made
+
+
+def _mm(values: tuple[float, float, float]) -> CommentedSeq:
+    return _listed([written(v, "mm") for v in values])
+
+
+def _quoted(words: str) -> str:
+    from ruamel.yaml.scalarstring import DoubleQuotedScalarString
+
+    made: str = DoubleQuotedScalarString(words)
+    return made
+
+
+def _text(words: str) -> str:  # the writer leaves some texts without the quotes that its reader needs
+    return words if re.fullmatch(NAME, words) else _quoted(words)
+
+
+def _flowing(content: Any) -> Any:
+    """Return an entry with its lists of numbers, and the rows of its tables, on one line each."""
+    if isinstance(content, dict):
+        return {key: _flowing(part) for key, part in content.items()}
+    if isinstance(content, list):
+        return [_flow(row) for row in content] if isinstance(content[0], dict) else _listed(content)
     return content
 
 
-def _flowing(
-    entry: Mapping[str, Any], flow: Callable[[Mapping[str, Any]], Any], listed: Callable[[list[Any]], Any]
-) -> dict[str, Any]:
+def _on_its_line(entry: Mapping[str, Any]) -> dict[str, Any]:
     """Return an entry whose tables and lists are written on its own line."""
     return {
-        name: flow(_flowing(part, flow, listed))
-        if isinstance(part, dict)
-        else listed(part)
-        if isinstance(part, list)
-        else part
+        name: _flow(_on_its_line(part)) if isinstance(part, dict) else _listed(part) if isinstance(part, list) else part
         for name, part in entry.items()
     }
 
 
-def _parameter(p: Parameter, shown: Mapping[str, str]) -> dict[str, Any]:
-    unit = shown[p.unit]
+def _joint(robot: Robot, j: Joint) -> CommentedMap:
+    units, unit = robot.convention.row_units(j.kind), "deg" if j.kind == "revolute" else "mm"
+    vectors = [name for name in robot.convention.vectors if f"{name}_x" in j.row]
+    entries = {c: written(v, SHOWN_AS[units[c]]) for c, v in j.row.items()}
+    row: dict[str, Any] = {"name": j.name, "type": j.kind}
+    row |= {name: _listed([entries.pop(f"{name}_{a}") for a in "xyz"]) for name in vectors} | entries
+    if j.limits:
+        row["limits"] = _listed([written(v, unit) for v in j.limits])
+    if j.transmission_periods:
+        row["transmission_periods"] = j.transmission_periods
+    if j.bearing is not None:
+        row["bearing"] = written(j.bearing, "mm")
+    if j.max_speed is not None:
+        row["max_speed"] = written(j.max_speed, unit)
+    return _flow(row)
+
+
+def _truth(robot: Robot, truth: Truth) -> dict[str, Any]:
+    made: dict[str, Any] = {
+        "source": truth.source,
+        "values": {n: written(v, SHOWN_AS[robot.parameters[n].unit]) for n, v in truth.values.items()},
+        "compliance": dict(truth.compliance),
+    }
+    for kind, angles in (("backlash", truth.backlash), ("clearance", truth.clearance)):
+        if angles:
+            made[kind] = {n: written(v, SHOWN_AS["rad"]) for n, v in angles.items()}
+    return made
+
+
+def _parameter(p: Parameter) -> dict[str, Any]:
+    unit = SHOWN_AS[p.unit]
     made: dict[str, Any] = {
         "unit": unit,
         "nominal": written(p.nominal, unit),
@@ -248,40 +255,34 @@ def _parameter(p: Parameter, shown: Mapping[str, str]) -> dict[str, Any]:
     return made
 
 
-def _proof(
-    robot: Robot,
-    proof: Proof,
-    flow: Callable[[Mapping[str, Any]], Any],
-    listed: Callable[[list[Any]], Any],
-    text: Callable[[str], str],
-) -> dict[str, Any]:
+def _proof(robot: Robot, proof: Proof) -> dict[str, Any]:
     """Return the entry of a proof; of a robot that has other joints or parameters by now, without what needs them."""
     made: dict[str, Any] = {"status": proof.status}
     if proof.errors:
-        made["errors"] = [{"code": error.code, "message": text(error.message)} for error in proof.errors]
+        made["errors"] = [{"code": error.code, "message": _text(error.message)} for error in proof.errors]
     if proof.warnings:
-        made["warnings"] = [{"code": warning.code, "message": text(warning.message)} for warning in proof.warnings]
+        made["warnings"] = [{"code": warning.code, "message": _text(warning.message)} for warning in proof.warnings]
     if proof.lower_bound:
         made["lower_bound"] = True
     if proof.held:
-        made["held"] = listed([text(name) for name in proof.held])
+        made["held"] = _listed([_text(name) for name in proof.held])
     if len(proof.region) == len(robot.joints) and all(name in robot.parameters for name in proof.names):
         units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
-        made["region"] = [listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
-        made["joint_error"] = listed([written(v, u) for v, u in zip(proof.joint_error, units, strict=True)])
+        made["region"] = [_listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
+        made["joint_error"] = _listed([written(v, u) for v, u in zip(proof.joint_error, units, strict=True)])
         if proof.loads:
-            made["loads"] = [listed([*one]) for one in proof.loads]
-        made["deviations"] = flow(
+            made["loads"] = [_listed(one) for one in proof.loads]
+        made["deviations"] = _flow(
             {
-                text(name): written(deviation, SHOWN_AS[robot.parameters[name].unit])
+                _text(name): written(deviation, SHOWN_AS[robot.parameters[name].unit])
                 for name, deviation in zip(proof.names, proof.deviations, strict=True)
             }
         )
         found = correlations_text(proof.factor)
-        made["correlations"] = text(found) if isinstance(found, str) else [text(row) for row in found]
+        made["correlations"] = _text(found) if isinstance(found, str) else [_text(row) for row in found]
         if proof.measured:
             made["measured"] = [
-                text(" ".join(position_text(v, u) for v, u in zip(row, units, strict=True))) for row in proof.measured
+                _text(" ".join(position_text(v, u) for v, u in zip(row, units, strict=True))) for row in proof.measured
             ]
     made["sha256"] = proof.digest
     return made

@@ -70,7 +70,7 @@ main()
 
 @pytest.mark.parametrize(
     ("when", "error"),
-    [("truearm.axis_circles.axes", "ValueError"), ("truearm.engine.robot.robot", "ImportError('half a module')")],
+    [("truearm.robot_files.jobs", "ValueError"), ("truearm.engine.robot.robot", "ImportError('half a module')")],
 )
 def test_an_interrupt_while_modules_load(when: str, error: str) -> None:
     script = INTERRUPTED.format(when=when, error=error)

@@ -157,7 +157,7 @@ _CLASSES: Final = {
 }
 #: Features whose jobs have names of their own there.
 _FEATURES: Final = ("hexapod", "iso9283")
-__all__ = ["__version__", *_CLASSES, *JOBS]
+__all__ = ["__version__", "read", *_FEATURES, *_CLASSES, *JOBS]
 
 
 def __getattr__(name: str) -> Any:
@@ -165,7 +165,7 @@ def __getattr__(name: str) -> Any:
         return import_module(f"truearm.{name}")
     if name == "read":
         jobs = {one.removeprefix("import_"): __getattr__(one) for one in JOBS if one.startswith("import_")}
-        return SimpleNamespace(**jobs)
+        return globals().setdefault("read", SimpleNamespace(**jobs))
     home = JOBS.get(name) or _CLASSES.get(name)
     if home is None:
         raise AttributeError(f"module 'truearm' has no attribute {name!r}")

@@ -85,7 +85,11 @@ def test_the_error_to_expect_stands_beside_the_held_out_one() -> None:
     assert list(shown["targets"]) == ["1", "2", "3"]
     assert list(shown["targets"]["2"]) == ["mean", "p95", "interval_90"]
     assert (shown["frame"], shown["payload"]) == ("the instrument's frame", "no payload")
-    (line,) = (line for line in run(28).lines() if line.startswith("Expected over the workspace: mean 0.0"))
+    (line,) = (
+        line
+        for line in run(28).lines()
+        if line.startswith("Expected over the workspace, without the instrument's noise: mean 0.0")
+    )
     assert line.endswith(" mm; targets 1, 2, 3 in the instrument's frame, no payload")
     assert repr(run()).count("Expected over the workspace") == 1
 
@@ -93,7 +97,11 @@ def test_the_error_to_expect_stands_beside_the_held_out_one() -> None:
 def test_a_lower_bound_is_called_one() -> None:
     bound = replace(run(28), expected=replace(run(28).expected, omissions=("values at a bound count as exact",)))
     assert "  may be larger: values at a bound count as exact" in bound.lines()
-    (said,) = [line for line in bound.lines() if line.startswith("Expected over the workspace: mean ")]
+    (said,) = [
+        line
+        for line in bound.lines()
+        if line.startswith("Expected over the workspace, without the instrument's noise: mean ")
+    ]
     assert " mm (90 %: " in said
     assert " or more), 95 % " in said
     assert "95 % below" not in said

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,3 +59,10 @@ def test_a_split_that_leaves_nothing_is_refused(train: float) -> None:
     with pytest.raises(InputError) as refusal:
         data().split(train)
     assert refusal.value.parameter == "train"
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "x", None])
+def test_a_split_by_no_seed_is_refused(seed: Any) -> None:
+    with pytest.raises(InputError) as refusal:
+        data().split(0.7, seed=seed)
+    assert refusal.value.parameter == "seed"

@@ -25,6 +25,7 @@ from tests.house.examples import EXAMPLES
 import truearm
 from truearm import JOBS
 from truearm.engine.base.errors import InputError
+from truearm.engine.command.request import SPACES
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.document.records import Record
 from truearm.engine.robot.effects import EFFECTS
@@ -184,7 +185,9 @@ def test_the_result_is_frozen_and_speaks_for_itself(job: str, folder: Path) -> N
         assert result._repr_html_().startswith("<pre>")
         assert json.loads(json.dumps(result.summary(), allow_nan=False))
         assert (type(result.request).job, type(result.request)) == (job, function(job).request)
-        assert result.request.as_python().startswith(f"truearm.{job}(")
+        space, _, short = job.partition("_")
+        name = f"{SPACES[space]}.{short}" if space in SPACES else job
+        assert result.request.as_python().startswith(f"truearm.{name}(")
     if hasattr(result, "save"):
         refuses_bad_places(result.save)
 

@@ -7,6 +7,7 @@ from collections import defaultdict
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -123,6 +124,8 @@ def test_an_older_name_still_works_and_says_the_new_one(job: str, name: str, old
         told = CliRunner().invoke(app, [f"--{old}=x", "--no-such-option"]).stderr
         assert told.startswith(f"--{old} is {flag_of(name, one)} now; the old word will go.\n")
         assert "No such option: --no-such-option" in told
+        refused = CliRunner().invoke(app, [f"--{old}=x", flag_of(name, one), "x"]).exception
+        assert str(refused) == f"--{old} is {flag_of(name, one)} now: give one of them."
         assert f"--{old} " not in CliRunner().invoke(app, ["--help"]).stdout
 
 
@@ -131,3 +134,11 @@ def test_units_are_those_at_the_edges() -> None:
     assert Number("mm").typed_again(0.005) == ["5"]
     assert from_si(Number("deg").read(90.0, "x"), "deg") == 90.0
     assert Number("%").read(50.0, "x") == 50.0
+
+
+def test_a_result_keeps_what_was_asked_for_whatever_becomes_of_it() -> None:
+    leans = np.full(6, 1e-5)
+    result = truearm.tolerance("kr5", 0.05, lean=leans)  # type: ignore[arg-type]
+    leans[:] = 1.0
+    assert result.request.as_command() == "truearm tolerance kr5 --depth 50 --lean 0.01,0.01,0.01,0.01,0.01,0.01"
+    assert truearm.show(truearm.load_robot("irb120")).request.as_command() == "truearm show ROBOT"

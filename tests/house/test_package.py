@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import truearm
+from truearm.engine.command.request import SPACES
 
 ROOT = Path(__file__).parents[2]
 
@@ -79,4 +80,4 @@ def test_unknown_names_of_the_package_are_refused() -> None:
 @pytest.mark.parametrize("name", [one for one in truearm.JOBS if one.startswith(("import_", "hexapod_", "iso9283_"))])
 def test_a_job_of_a_group_has_a_short_name_in_its_namespace(name: str) -> None:
     space, _, short = name.partition("_")
-    assert getattr(getattr(truearm, {"import": "read"}.get(space, space)), short) is getattr(truearm, name)
+    assert getattr(getattr(truearm, SPACES[space]), short) is getattr(truearm, name)

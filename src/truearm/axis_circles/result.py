@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from truearm.axis_circles.fit import NORMAL_95, TABLES, AxisAnalysis, AxisCircle, AxisFit, analyse
-from truearm.engine.base.errors import InputError, Notice, refusals_of
+from truearm.engine.base.errors import InputError, Notice, counted, refusals_of
 from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.command.arguments import (
@@ -154,7 +154,8 @@ def joint_errors(fit: AxisFit) -> Iterator[Block]:
     """Give what a fit in joint errors says: what was found, of what, and what circles cannot observe."""
     everything = FreeParameters((*fit.free.parameters, *(fit.robot.parameters[r.dropped] for r in fit.redundancies)))
     found = [p for p in fit.free.parameters if p.group != "base"]
-    yield say(f"Joint errors: {len(found)} found, in 95 % intervals:")
+    unseen = f"{counted(len(fit.redundancies), 'combination')} of errors unobservable with circles and held"
+    yield say(f"Joint errors: {len(found)} found, in 95 % intervals; {unseen}:")
     yield each("found", (_joint_error(p, in_words(fit.combination(p.name), everything)) for p in found))
     yield detail("Unobservable with circles, and held at their nominal values:")
     yield each("unseen", (_unseen(r, moves_flange=r.dropped in fit.moving_flange) for r in fit.redundancies))

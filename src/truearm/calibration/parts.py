@@ -160,7 +160,7 @@ def simulated_block(found: SimulatedCalibrations, robot: Robot) -> Block:
     """Return what simulated calibrations say of intervals, those by Monte Carlo beside the linear ones."""
     made: dict[str, Any] = {"trials": found.asked, "settled": found.settled, "seed": found.seed}
     if not found.settled:
-        return detail(f"Monte Carlo: none of {found.asked} simulated calibrations converged", monte_carlo=made)
+        return say(f"Monte Carlo: none of {found.asked} simulated calibrations converged", monte_carlo=made)
     coverage, error, words = arm_coverage(found, robot), found.held_out, ""
     if error is not None:
         ends, linear = (
@@ -175,7 +175,7 @@ def simulated_block(found: SimulatedCalibrations, robot: Robot) -> Block:
         "predictions_mm": {"held_out": _predicted(error), "workspace": _predicted(found.workspace)},
         "parameters": _interval_rows(found, robot),
     }
-    return detail(
+    return say(
         f"Monte Carlo: in {found.settled} simulated calibrations {100.0 * coverage:.1f} % of the linear 95 % intervals "
         f"held the truth{words}",
         monte_carlo=made,

@@ -39,7 +39,7 @@ from truearm.engine.diagnose.expected_error import ExpectedError, expected_error
 from truearm.engine.diagnose.gain import NO_GAIN, Repeatability, repeatability
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
-from truearm.engine.document.document import Block, detail, each, held_by, lines_of, say, under
+from truearm.engine.document.document import Block, detail, each, held_by, leaves_of, say, under
 from truearm.engine.document.records import Record
 from truearm.engine.document.summaries import error_line, errors_summary, expected_blocks, noise_blocks, selection_block
 from truearm.engine.document.tables import parameter_lines
@@ -167,12 +167,14 @@ class Calibration(Record):
             yield detail(f"Held at known places: {listed(self.fit.held.words)}", held=list(self.fit.held.words))
         if self.without:
             left_out = f"{counted(len(self.without), 'configuration')} ({listed(self.without)})"
-            yield detail(f"Left out: {left_out}", without=list(self.without))
+            yield say(f"Left out: {left_out}", without=list(self.without))
         if self.excluded:
             yield excluded_block(self.excluded)
+        tell = detail if self.status is Status.CONVERGED and not self.advice else say
+        yield tell(f"Status: {self.status.value}. {self.advice}".rstrip(), status=self.status.value)
+        for leaf in leaves_of(self._further()):
+            yield replace(leaf, held={})
         yield from expected_blocks(self.expected)
-        yield detail(*lines_of(self._further()))
-        yield say(f"Status: {self.status.value}. {self.advice}".rstrip(), status=self.status.value)
         if self.notes:
             yield say(notes=self.notes)
 

@@ -27,7 +27,7 @@ from truearm.engine.choosing.zones import (
 )
 from truearm.engine.command.arguments import whole_argument
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.document.document import Block, detail, each
+from truearm.engine.document.document import Block, detail, each, say
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.losses import Loss
@@ -71,7 +71,7 @@ class ZoneChoice:
                 f"with them, {self.whole * 1e3:.3f} mm with one model (the held-out part has chosen them: validate "
                 "with new data)."
             )
-        yield detail(
+        yield say(
             text,
             kept=[verdict.box.name for verdict in self.kept],
             overlap_mm=self.overlap * 1e3,

@@ -31,8 +31,6 @@ from truearm.engine.robot.robot_file.entries import controller_summary
 
 #: The report beside the corrected programs.
 REPORT: Final = "compensation.html"
-#: Skipped targets explained one by one where a person reads.
-_EXPLAINED: Final = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,8 +154,8 @@ class FileCorrection(Record):
             expected_mm=self._expected(),
             not_better=self._not_better(),
         )
-        yield detail(
-            *([f"  {self.shared_words}"] if shared and self.shared_words else []),
+        yield say(
+            f"  {self.shared_words}" if shared and self.shared_words else "",
             shift_mm={
                 "mean": self.mean_shift * 1e3,
                 "max": self.largest_shift * 1e3,
@@ -206,13 +204,14 @@ class FileCorrection(Record):
         low, high = self.intervals[1]
         (mean, most), (mean_now, most_now) = ((v.mean() * 1e3, v.max() * 1e3) for v in self.expected)
         interval = f" now (90 %: {low * 1e3:.3f} to {high * 1e3:.3f})"
+        least = "at least " if self.lower_bound else ""
         if self.lower_bound:
             interval = f" now (90 %: {low * 1e3:.3f} or more)"
         elif mean_now < 1.01e3 * REPEATABILITY:
             interval = " or more now (no robot repeats better)"
         return (
             f"{self.name}  {self.language}: {'relative ' * self.relative}error to expect {mean:.3f} mm before, "
-            f"{mean_now:.3f} mm{interval}; largest expected, not a bound: {most:.3f} and {most_now:.3f} mm"
+            f"{least}{mean_now:.3f} mm{interval}; largest expected, not a bound: {most:.3f} and {most_now:.3f} mm"
         )
 
     @property
@@ -281,25 +280,23 @@ class ProgramCorrection(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give each file with the error to expect, what is to be known of these errors, and what was skipped."""
+        if self.simulated is not None:
+            yield from self.simulated.blocks()
         shared = self.result.frames.frames != "assumed"
         yield each("programs", (file.told(shared=shared) for file in self.files))
         known = any(file.expected is not None for file in self.files)
         words = f"  {self.relative}" if known and self.relative else ""
         yield say(words, expected_is_relative=bool(self.relative))
         if known and any(file.kept.keys() & {"in `keep`", "not in `only`"} for file in self.files):
-            yield detail("  Targets that stay because of `keep` or `only` are not in these errors.")
+            yield say("  Targets that stay because of `keep` or `only` are not in these errors.")
         more = "  These errors may be larger: the calibration cannot know all errors of the robot."
         yield detail(more if known and self.lower_bound else "", expected_is_lower_bound=self.lower_bound)
-        skipped = [line for file in self.files for line in file.left_unchanged]
-        yield detail(*skipped[:_EXPLAINED])
-        if len(skipped) > _EXPLAINED:
-            yield detail(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")
+        for file in self.files:
+            yield detail(*file.left_unchanged)
         for split in self.splits:
             if split.moves:
                 moves, added = split.moves, split.added
                 yield say(f"  {moves} move{'s'[: moves > 1]} split by {added} more target{'s'[: added > 1]}")
-        if self.simulated is not None:
-            yield from self.simulated.blocks()
         if self.notes:
             yield say(notes=self.notes)
 

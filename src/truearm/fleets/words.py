@@ -240,8 +240,7 @@ def _changes(found: Analysis) -> Iterator[Words]:
         those = {one.machine for one in changed}
         words = f"{counted(len(those), 'machine')} changed" if those else "none has changed by more than chance"
         yield say(f"Measured again: {counted(len(machines), 'machine')}; {words}.")
-        more = [f"  and {len(changed) - _TOLD} more changes"] if len(changed) > _TOLD else []
-        yield detail(*(f"  {one.machine}: {drift_words(one)}" for one in changed[:_TOLD]), *more)
+        yield detail(*(f"  {one.machine}: {drift_words(one)}" for one in changed))
     for one in (one for kind in found.kinds for one in kind.drifts.alike):
         yield detail(f"  all machines alike: {one.parameter} {sized(one.slope, one.unit, sign=True)} a month")
 
@@ -275,8 +274,7 @@ def _looks(looks: Sequence[Look]) -> Words:
         words = [reason_words(reason) for reason in look.reasons]
         held.append({"robot": look.robot, "why": [reason.why for reason in look.reasons], "words": words})
         text.append(f"  {look.robot}: {'; '.join(words)}")
-    more = [f"  and {len(looks) - _TOLD} more"] if len(looks) > _TOLD else []
-    return detail(*(text[: _TOLD + 1] if looks else []), *more, look_first=held)
+    return say(*(text if looks else []), look_first=held)
 
 
 def outcome_words(found: Analysis) -> str:
@@ -295,10 +293,10 @@ def analysis_blocks(found: Analysis, draw: str | None = None) -> Iterator[Block]
     )
     yield from _accuracy(found)
     if draw is not None and found.errors:
-        yield detail(draw)
-    yield each("kinds", (_kind(kind, several=len(found.kinds) > 1) for kind in found.kinds))
-    yield from _changes(found)
+        yield say(draw)
     yield _looks(found.looks)
+    yield from _changes(found)
+    yield each("kinds", (_kind(kind, several=len(found.kinds) > 1) for kind in found.kinds))
 
 
 def analysis_notices(found: Analysis) -> list[Notice]:

@@ -136,7 +136,7 @@ class Plan(Record):
             words = "More poses than were looked at are needed to come within 10 % of that."
         yield say(words, enough=enough, nominal_mm=nominal)
         numbers = zip(prediction.numbers, prediction.chosen.tolist(), prediction.random.tolist(), strict=True)
-        yield detail(
+        yield say(
             f"That assumes that a coordinate of a reading is off by {significant(self.noise * 1e3, 3)} mm about the "
             "model, by the instrument and by what the model cannot follow; give `noise` where you know better.",
             by_number=[{"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3} for n, c, r in numbers],

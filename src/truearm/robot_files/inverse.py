@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from truearm.engine.base.arrays import axes
 from truearm.engine.base.errors import InputError, Notice, refusals_of
@@ -82,10 +82,6 @@ def joints_csv(
     return stream.getvalue()
 
 
-#: Poses explained one by one where a person reads.
-_EXPLAINED: Final = 10
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class JointTable(Record):
     """Joints for poses."""
@@ -150,12 +146,10 @@ class JointTable(Record):
             joints_are=self.joints_are,
             status=dict(status),
         )
-        attention = self.attention
-        for entry in attention[:_EXPLAINED]:
+        for entry in self.attention:
             name = f"{entry['pose']} ({entry['branch']})" if entry["branch"] else entry["pose"]
             yield say(f"  {name}: {entry['status']}. {entry['advice']}")
-        rest = len(attention) - _EXPLAINED
-        yield say(f"  and {rest} more; the JSON summary lists all" if rest > 0 else "", attention=[*attention])
+        yield say(attention=[*self.attention])
         yield say(*joints_lines(self.joints_are))
 
 

@@ -21,7 +21,7 @@ from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.base.writing import write_files
 from truearm.engine.command.arguments import folder_for
 from truearm.engine.data.readers.canonical import csv_text
-from truearm.engine.document.document import Block, detail, say, under
+from truearm.engine.document.document import Block, Words, detail, say, under
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import Status
 from truearm.engine.programs.gauge import best_agreement
@@ -55,7 +55,9 @@ class Demonstration(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give both results, and where their reports are."""
-        yield under("calibration", self.calibration.everything())
+        mark, errors, *rest = self.calibration.everything()
+        further = (replace(block, is_detail=True) if isinstance(block, Words) else block for block in rest)
+        yield under("calibration", [mark, errors, *further])
         if self.correction is None:
             yield say(correction=None)
         else:

@@ -57,7 +57,7 @@ class _OneOrEach(Numbers):
 
     def typed_again(self, value: Any) -> list[str]:
         """Return them with commas between."""
-        return super().typed_again(value if isinstance(value, Sequence) else [value])
+        return super().typed_again([value] if isinstance(value, int | float) else value)
 
 
 class Validate(OfData, Loaded, ForcedAt, Noted, AlsoIntoFolder, Repeatable):

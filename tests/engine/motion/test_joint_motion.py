@@ -191,7 +191,7 @@ def test_a_path_that_leaves_the_reach_says_where() -> None:
     with pytest.raises(InputError) as refused:
         joint_motion(load_robot("li3"), path)
     assert "mm along the path" in str(refused.value)
-    assert refused.value.cure == "Move the path towards the arm, or start elsewhere (`seed_joints`)."  # it is free already
+    assert refused.value.cure == "Move the path towards the arm, or start elsewhere (`seed_joints`)."
     travelled = float(str(refused.value).split(" mm along")[0])
     reached = np.linalg.norm([0.3 + travelled / 1e3, 0.1, 0.3])
     assert 0.4 < reached < 1.2

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, is_dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -53,8 +53,8 @@ class Kind:
         return typed
 
     def typed_again(self, value: Any) -> list[str]:
-        """Return a value as it is typed, once for each time that the option is repeated."""
-        return [str(value)]
+        """Return a value as it is typed, once for each time that the option is repeated; an object by its kind."""
+        return [type(value).__name__.upper() if is_dataclass(value) or hasattr(value, "shape") else str(value)]
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class GivenFiles(Given):
 
     def typed_again(self, value: Any) -> list[str]:
         """Return each of them."""
-        return [*map(str, value)] if isinstance(value, list | tuple) else [str(value)]
+        return [*map(str, value)] if isinstance(value, list | tuple) else super().typed_again(value)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import inspect
 import json
 import typing
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from dataclasses import replace
 from functools import partial
@@ -50,8 +50,12 @@ class Command(TyperCommand):
         if "--out=" in args or ("--out", "") in pairwise(args):  # a variable of the shell that is not set
             raise CommandError("--out: no file or folder is given; got ''.")
         today: Mapping[str, str] = getattr(self.callback, "today", {})
-        for old in dict.fromkeys(word for arg in args if (word := arg.partition("=")[0]) in today):
-            print_line(f"{old} is {today[old]} now; the old word will go.", err=True)
+        words = {arg.partition("=")[0] for arg in args}
+        for old in [word for word in today if word in words]:
+            if today[old] in words:
+                raise CommandError(f"{old} is {today[old]} now: give one of them.")
+            with suppress(OSError):  # a closed or full stream costs the note alone
+                print_line(f"{old} is {today[old]} now; the old word will go.", err=True)
         args = [today.get(word, word) + sign + value for word, sign, value in (arg.partition("=") for arg in args)]
         try:
             return super().parse_args(ctx, args)
@@ -204,7 +208,11 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
     run.__annotations__ = {one.name: one.annotation for one in every}
     run.__doc__ = spelled_by(request.help_text(), declared)
     run.__name__ = request.job
-    words = {f"--{one.formerly}": flag_of(name, one) for name, one in declared.items() if one.formerly}
+    words = {
+        f"--{one.formerly}": flag_of(name, one)
+        for name, one in declared.items()
+        if one.formerly and not one.is_argument
+    }
     run.today = words  # type: ignore[attr-defined]
     return run
 

@@ -13,7 +13,7 @@ from truearm.engine.base.files import path_argument
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.excluded import Exclusion, read_exclusions, without_readings
 from truearm.engine.data.statistics import Errors, errors_of, without_table_motion
-from truearm.engine.document.document import Block, detail
+from truearm.engine.document.document import Block, say
 from truearm.engine.robot.robot import Robot
 
 Part = Literal["training", "held out", "left out"]
@@ -51,7 +51,7 @@ def excluded_block(excluded: Sequence[Excluded]) -> Block:
         }
         for one in excluded
     ]
-    return detail(f"Excluded: {counted(parts.total(), 'reading')} ({told}): {reasons(excluded)}", excluded=rows)
+    return say(f"Excluded: {counted(parts.total(), 'reading')} ({told}): {reasons(excluded)}", excluded=rows)
 
 
 def reasons(excluded: Sequence[Excluded]) -> str:

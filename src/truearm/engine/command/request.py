@@ -13,12 +13,14 @@ import sys
 import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from copy import copy
+from copy import copy, deepcopy
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from typing import Any, ClassVar, Final, ParamSpec, Protocol, TypeVar, dataclass_transform
 
 from truearm.engine.command.kinds import ByFlags, Kind
 
+#: Namespaces of jobs, by how their names begin.
+SPACES: Final = {"hexapod": "hexapod", "import": "read", "iso9283": "iso9283"}
 #: What a default is that is compared with what was given.
 _PLAIN: Final = (bool, int, float, str, tuple)
 
@@ -141,8 +143,11 @@ class Request:
         if hasattr(made, "request"):
             kept = copy(self)
             for name, declared in self.options():
+                value = getattr(self, name)
                 if not (declared.in_command or declared.repeated):
                     object.__setattr__(kept, name, self.default(name))
+                elif isinstance(value, list | dict) or hasattr(value, "shape"):  # whoever gave it may change it
+                    object.__setattr__(kept, name, deepcopy(value))
             object.__setattr__(made, "request", kept)
         return made
 
@@ -201,7 +206,9 @@ class Request:
         for name, _, value in self.given():
             said = written_in_python(value)
             words.append(said if not self.__dataclass_fields__[name].kw_only else f"{name}={said}")
-        return f"truearm.{self.job}({', '.join(words)})"
+        space, _, short = self.job.partition("_")
+        name = f"{SPACES[space]}.{short}" if space in SPACES else self.job
+        return f"truearm.{name}({', '.join(words)})"
 
     def as_command(self) -> str:
         """Return the command as it can be typed again: what was given, and a place for where results go."""

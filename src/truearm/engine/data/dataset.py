@@ -329,7 +329,7 @@ class Dataset:
         Raises
         ------
         InputError
-            If one part would have no configuration.
+            If one part would have no configuration, or `seed` is no whole number from 0.
         """
         n = self.configurations
         share = finite_number(train, "train")
@@ -341,7 +341,10 @@ class Dataset:
                 came=train,
                 allowed=f"a share above 0 and below 1, or 1 to {n - 1} configurations",
             )
-        order = np.random.default_rng(seed).permutation(n)
+        whole = finite_number(seed, "seed")
+        if whole < 0 or whole != int(whole):
+            raise InputError("a whole number from 0 belongs here", parameter="seed", came=seed)
+        order = np.random.default_rng(int(whole)).permutation(n)
         return self.of_configurations(order[:count]), self.of_configurations(order[count:])
 
     def _at(self, indices: IntArray) -> Dataset:

@@ -240,16 +240,21 @@ def each(key: str, entries: Iterable[Words | Iterable[Block]]) -> Each:
     return Each(key, [[entry] if isinstance(entry, Words) else [*entry] for entry in entries])
 
 
+def leaves_of(blocks: Iterable[Block]) -> Iterator[Words | Table]:
+    """Give the blocks that have lines, also those inside others."""
+    for block in blocks:
+        if isinstance(block, Words | Table):
+            yield block
+        elif isinstance(block, Under):
+            yield from leaves_of(block.blocks)
+        elif isinstance(block, Each):
+            for entry in block.entries:
+                yield from leaves_of(entry)
+
+
 def lines_of(blocks: Iterable[Block], *, details: bool = True) -> list[str]:
     """Return what blocks say as lines of text, without details if these are not asked for."""
-    lines: list[str] = []
-    for block in blocks:
-        if isinstance(block, Under | Each):
-            parts = [block.blocks] if isinstance(block, Under) else block.entries
-            lines += [line for part in parts for line in lines_of(part, details=details)]
-        elif isinstance(block, Words | Table) and (details or not block.is_detail):
-            lines += block.lines
-    return lines
+    return [line for leaf in leaves_of(blocks) if details or not leaf.is_detail for line in leaf.lines]
 
 
 def held_by(blocks: Iterable[Block]) -> dict[str, Any]:

@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from truearm.engine.base.errors import Notice, as_html, counted, has_error, listed, short_text, worst_first
-from truearm.engine.base.units import Marked, parts_of, said_of, with_mark, without_mark
+from truearm.engine.base.units import Marked, parts_of, said_of, with_mark
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.document.document import Block, detail, held_by, lines_of, say
+from truearm.engine.document.document import Block, detail, held_by, leaves_of, lines_of, say
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 
@@ -108,22 +108,26 @@ def notice_lines(notices: Sequence[Notice]) -> list[str]:
 def first_screen(record: Record) -> list[str]:
     """Return at most ten lines, with the one that says where files are: the answer, the next step, and what to know.
 
-    The last of these counts what is not among them. Lists are shown as a whole.
+    Details stand where there is room for them. The last line counts what is left out. Lists are shown as a whole.
     """
-    if record.is_list:
-        return record.lines()
+    everything = record.lines()
+    if record.is_list or len(everything) < _LINES:
+        return everything
     notices, steps = worst_first(getattr(record, "warnings", ())), getattr(record, "next", ())
-    mark, answer = said_of(record.simulated_from), without_mark(lines_of(record.blocks(), details=False))
+    mark, leaves = said_of(record.simulated_from), [*leaves_of(record.blocks())]
     room = _LINES - len(mark) - len(steps[:1]) - 2  # the last two count the rest, and say where files are
-    grave = sum(notice.level == "error" for notice in notices)
-    shown = min(len(notices), _FIRST, max(1, grave, room - len(answer)))
-    text = [*mark, *answer[: room - shown], *(step.line for step in steps[:1]), *notice_lines(notices[:shown])]
-    if len(record.lines()) == len(text) + 1:  # no shorter than what counts it
-        return record.lines()
+    grave, answer = sum(one.level == "error" for one in notices), sum(len(x.lines) for x in leaves if not x.is_detail)
+    shown = min(len(notices), _FIRST, max(1, grave, room - answer))
+    spare, text = room - shown - answer, list[str]()
+    for leaf in leaves:
+        if not leaf.is_detail or len(leaf.lines) <= spare:
+            text += leaf.lines
+            spare -= len(leaf.lines) * leaf.is_detail
+    text = [*mark, *text[: room - shown], *(step.line for step in steps[:1]), *notice_lines(notices[:shown])]
     rest = Counter[str](notice.level for notice in notices[shown:])
-    rest["line"] = len(record.lines()) - len(text) - rest.total()
+    rest["line"] = len(everything) - len(text) - rest.total()
     more = listed([counted(count, what) for what, count in rest.items() if count])
-    return [*text, f"And {more} more, which `details` shows."] if more else text
+    return [*text, f"And {more} more, which `details` shows."]
 
 
 def notice_summaries(notices: Sequence[Notice]) -> list[dict[str, str]]:

@@ -69,7 +69,7 @@ def selection_block(selection: Selection) -> Block:
         ],
         "passed_over": [{"effects": list(effects), "status": status} for effects, status in selection.passed_over],
     }
-    return detail(*text, selection=figures)
+    return say(*text, selection=figures)
 
 
 def errors_summary(errors: Errors) -> dict[str, Any]:
@@ -193,11 +193,11 @@ def expected_blocks(expected: ExpectedError) -> Iterator[Block]:
     )
     places = max(3, -math.floor(math.log10(max(mean, 1e-6))) + 1)
     if expected.lower_bound:
-        figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} or more), 95 % {p95:.{places}f} mm"
+        figures = f"at least {mean:.{places}f} mm (90 %: {low:.{places}f} or more), 95 % {p95:.{places}f} mm or more"
     else:
         figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), 95 % below {p95:.{places}f} mm"
     yield say(
-        f"Expected over the workspace: mean {figures}; {expected_of(expected)}",
+        f"Expected over the workspace, without the instrument's noise: mean {figures}; {expected_of(expected)}",
         expected_mm={
             **_expectation(expected.overall, expected.lower_bound),
             "lower_bound": expected.lower_bound,

@@ -333,7 +333,7 @@ class Comparison:
             if rows:
                 yield say(f"  {verdict}{' by more than both intervals leave open' * told_apart}: {len(rows)}")
             if told_apart:
-                shown = [row for row in rows if row.component == "position"][:8]
+                shown = [row for row in rows if row.component == "position"] or rows
                 yield detail(*(f"    {row.id} {row.where}, {row.under}: {row.change}" for row in shown))
 
 

@@ -48,8 +48,6 @@ RESULT: Final = "iso9283.json"
 REPORT: Final = "report.html"
 EVALUATION_FILES: Final = (RESULT, REPORT)
 SCHEMA: Final = "truearm-iso9283-result/1"
-#: So many criteria are on the first screen.
-_FIRST: Final = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,11 +99,10 @@ class Iso9283Evaluation(Record):
         wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = ["  " + "  ".join(map(str.ljust, row, wide)).rstrip() for row in rows]
         if lines:
-            yield (say if self.comparison is None else detail)(
-                "Each at its worst place and fastest velocity, with its 95 % interval or the range of its cycles.",
-                *lines[:_FIRST],
-            )
-            yield detail(*lines[_FIRST:], f"All places, axes and angles are in the report and in {RESULT}.")
+            tell = say if self.comparison is None else detail
+            words = "Each at its worst place and fastest velocity, with its 95 % interval or the range of its cycles."
+            yield tell(words, *lines)
+            yield detail(f"All places, axes and angles are in the report and in {RESULT}.")
         yield say(criteria=[value_summary(value) for value in self.values], **self._drawn())
         absent = dict.fromkeys(value.id for value in self.values if value.id not in criteria)
         if absent:

@@ -9,7 +9,7 @@ from typing import Final
 
 from truearm.engine.base.errors import Notice, counted, millimetres
 from truearm.engine.base.writing import output_folder, write_files
-from truearm.engine.document.document import Block, Words, detail, each, say, under
+from truearm.engine.document.document import Block, Words, each, say, under
 from truearm.engine.document.records import Record
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.iso9283.planning.criteria import TESTS, PerformancePlan, PlannedTest
@@ -117,7 +117,7 @@ class Iso9283Plan(Record):
 
 
 def _test(test: PlannedTest, line: str) -> Words:
-    return detail(
+    return say(
         line,
         criterion=test.id,
         criteria=list(TESTS[test.id].criteria),

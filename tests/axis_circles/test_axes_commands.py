@@ -41,7 +41,7 @@ def test_axes_tolerance_and_lines(truearm: Truearm, kr5: Path, tmp_path: Path) -
     found = {e["name"]: e for e in said["joint_errors"]["found"]}
     assert found["ebeta_2"]["value"] == pytest.approx(0.1813, abs=0.005)
     assert found["ebeta_2"]["interval"][0] < found["ebeta_2"]["value"] < found["ebeta_2"]["interval"][1]
-    plain = truearm("axes", "kr5", kr5, "--measurement-frame", "robot", "--out", out)
+    plain = truearm("axes", "kr5", kr5, "--measurement-frame", "robot", "--details", "--out", out)
     assert "ez_6 (moves the flange)" in plain.out
     errors = out / "joint-errors.yaml"
 

@@ -152,7 +152,7 @@ def test_several_places_and_sides_from_plan_to_data(truearm: Truearm, tmp_path: 
         writer = csv.DictWriter(stream, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    run = truearm("hexapod", "solve", sheet, "--out", data)
+    run = truearm("hexapod", "solve", sheet, "--details", "--out", data)
     assert run.code == 0
     assert "place fixture_2, side 4, design" in run.out
     assert "Tool changer, from 5 pairs of readings with 2 attachments:" in run.out

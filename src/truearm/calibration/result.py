@@ -150,6 +150,9 @@ class Calibration(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give the figures people look for, the held-out error first, in mm and mrad."""
+        status, sound = f"Status: {self.status.value}. {self.advice}".rstrip(), self.status is Status.CONVERGED
+        if not sound or self.advice:
+            yield say(status)
         unseen, trained = self.validation, counted(self.train.configurations, "training configuration")
         before, after = f"  nominal     {error_line(self.nominal)}", f"  calibrated  {error_line(self.train)}"
         if unseen is None:
@@ -170,8 +173,7 @@ class Calibration(Record):
             yield say(f"Left out: {left_out}", without=list(self.without))
         if self.excluded:
             yield excluded_block(self.excluded)
-        tell = detail if self.status is Status.CONVERGED and not self.advice else say
-        yield tell(f"Status: {self.status.value}. {self.advice}".rstrip(), status=self.status.value)
+        yield detail("" if self.advice or not sound else status, status=self.status.value)
         for leaf in leaves_of(self._further()):
             yield replace(leaf, held={})
         yield from expected_blocks(self.expected)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from typing import Annotated, Any, Final, NoReturn, TextIO
@@ -65,7 +65,7 @@ COMMANDS: Final = {
     "studio": "truearm.studio.command.studio",
 }
 #: Jobs that a command runs instead for devices of their own.
-OF_DEVICES: Final = {
+OF_DEVICES: Final[Mapping[str, tuple[str, ...]]] = {
     "plan": ("truearm.inclinometers.jobs.plan_inclinometers",),
     "simulate": ("truearm.inclinometers.jobs.simulate_inclinometers",),
 }

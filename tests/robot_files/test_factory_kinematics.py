@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -135,3 +136,9 @@ def test_a_plate_gets_worse_when_the_data_sheet_is_taken_for_the_controllers_kin
     before = plate_error(run(original, arm), wanted(original))
     after = plate_error(run(corrected.files[0].text.decode(), arm), wanted(original))
     assert after > 1.5 * before
+
+
+def test_types_that_fit_as_well_are_told_and_a_better_one_is_a_warning(cell: Path) -> None:
+    imported = truearm.import_ur_kinematics(cell / "calibration.conf", "ur10")
+    for fitting, codes in (({}, []), ({"ur10e": 1.0}, ["type-not-told"]), ({"ur10e": 1e-9}, ["type-doubtful"])):
+        assert [notice.code for notice in replace(imported, fitting=fitting).warnings] == codes

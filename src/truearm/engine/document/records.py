@@ -23,9 +23,9 @@ _FIRST: Final = 3
 
 
 class Record:
-    """A result that a person can read: its text is what the command prints, its summary what JSON holds.
+    """A result that a person can read: its text is what the command prints with details, its summary what JSON holds.
 
-    Where it holds data or a robot that are simulated, both begin with that, whatever the record's own class returns.
+    Where it holds data or a robot that are simulated, both say so first.
     """
 
     #: What was asked for; None of what no job has made. It says itself as a call in Python and as a command.
@@ -83,7 +83,7 @@ class Record:
         return self.summary()
 
     def lines(self) -> list[str]:
-        """Return the result in words and figures, line by line, as the command prints it."""
+        """Return the result in words and figures, line by line, details among them."""
         return with_mark(lines_of(self.everything()), self.simulated_from)
 
     def __repr__(self) -> str:

@@ -192,7 +192,7 @@ def counted() -> tuple[dict[str, Counter[str]], dict[str, int], list[str]]:
             elif isinstance(node, ast.ClassDef) and DECLARING.match(dotted):
                 held = [n.target for n in node.body if isinstance(n, ast.AnnAssign)]
                 declared.update(name_of(one) for one in held if name_of(one) in options)
-            elif isinstance(node, ast.Call) and name_of(node.func) == "Notice" and node.args:
+            elif isinstance(node, ast.Call) and name_of(node.func) == "Rule" and node.args:
                 first = node.args[0]
                 codes |= {first.value} if isinstance(first, ast.Constant) and isinstance(first.value, str) else set()
     loops = cycles(graph)

@@ -42,7 +42,7 @@ def test_a_fit_that_leaves_nothing_is_not_taken_for_one_without_noise(seed: int)
     true = float(np.linalg.norm(apart, axis=2).mean())
     assert found.expected.overall.interval_90[1] > true
     assert found.expected.overall.mean > 0.1e-3
-    (notice,) = [n for n in found.warnings if n.code == FEW_READINGS]
+    (notice,) = [n for n in found.warnings if n.code == FEW_READINGS.code]
     assert notice.level == "warning"
     assert "The training readings are 33 numbers. The 41 parameters take up 3" in notice.message
     assert "no deviation is declared: it is assumed, 0.1 mm (position)" in notice.message
@@ -92,7 +92,7 @@ def test_readings_enough_are_no_notice() -> None:
 
 def test_a_check_counts_the_numbers() -> None:
     (notice,) = check("ur5e", in_turn(16, 0, declared=False)).warnings[-1:]
-    assert notice.code == FEW_READINGS
+    assert notice.code == FEW_READINGS.code
     assert "48 numbers, for 41 parameters of the geometric model" in notice.message
 
 
@@ -109,7 +109,7 @@ def test_errors_that_the_fit_has_eaten_do_not_make_data_narrow() -> None:
     for poses, few in ((11, True), (13, False)):
         found = calibrate("irb120", one.of_configurations(np.arange(poses)), train="all")
         codes = [notice.code for notice in found.warnings]
-        assert (FEW_READINGS in codes) is few
+        assert (FEW_READINGS.code in codes) is few
         assert "narrow-data" not in codes
 
 

@@ -212,7 +212,7 @@ def test_a_reading_that_is_off_is_no_exchange_of_targets(side: tuple[float, floa
         target=np.tile(np.arange(3), 20),
         position=position,
     )
-    found = {(s.code, s.configuration, s.target) for s in rigid_suspects(data)}
+    found = {(s.rule.code, s.configuration, s.target) for s in rigid_suspects(data)}
     assert found == {("outliers", str(c), str(t + 1)) for c, t in zip(wrong, at, strict=True)}
 
 

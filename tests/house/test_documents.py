@@ -6,7 +6,6 @@ commands and pipelines go to the shell.
 
 from __future__ import annotations
 
-import ast
 import io
 import os
 import re
@@ -16,7 +15,6 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import get_args
@@ -26,13 +24,13 @@ from tests.house.test_options import TWICE, declared_apart
 
 from truearm.commands import main
 from truearm.engine.base.limits import LIMITS
-from truearm.engine.data.rigid_tool import Suspicion
 from truearm.engine.diagnose.changes import Kind
 
 ROOT = Path(__file__).parents[2]
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 GUIDE = sorted((ROOT / "docs" / "guide").glob("*.md"))
-DOCUMENTS = [ROOT / "README.md", ROOT / "docs" / "api.md", *GUIDE]
+NOTICES = ROOT / "docs" / "guide" / "notices.md"
+DOCUMENTS = [ROOT / "README.md", ROOT / "docs" / "api.md", *(page for page in GUIDE if page != NOTICES)]
 #: Pages that are one session from top to bottom; elsewhere every block of Python stands for itself.
 SESSIONS = ("api.md", "notebook.md")
 PAGES = [
@@ -273,52 +271,35 @@ def test_the_architecture_can_be_read_at_one_sitting() -> None:
     assert len(ARCHITECTURE.read_text().splitlines()) <= 250
 
 
-#: What makes a notice, or becomes one, and the level that it has if none is given.
-NOTICES = {"Notice": "warning", "Slip": "error", "Suspect": "warning"}
+#: Where notices are read that others wrote: from robot files, from results.
+READ_BACK = ("engine/robot/robot_file/reading.py", "engine/command/split.py", "studio/measuring.py", "studio/pages/")
 
 
-@cache
-def calls_in_code() -> list[ast.Call]:
-    """Return every call in the code, of files in which a notice or a next step is named at all."""
-    texts = [file.read_text() for file in (ROOT / "src" / "truearm").rglob("*.py")]
-    named = re.compile(rf"\b({'|'.join((*NOTICES, 'NextStep'))})\(")
-    trees = [ast.parse(text) for text in texts if named.search(text)]
-    return [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
+def sources() -> dict[str, str]:
+    """Return the text of every file of the package."""
+    package = ROOT / "src" / "truearm"
+    return {file.relative_to(package).as_posix(): file.read_text() for file in sorted(package.rglob("*.py"))}
 
 
-def notices_in_code() -> dict[str, set[str]]:
-    """Return the levels of every code in the code; those that are chosen where it runs are not among them."""
-    found: dict[str, set[str]] = {code: set() for code in (*get_args(Kind), *get_args(Suspicion))}
-    for call in calls_in_code():
-        if not isinstance(call.func, ast.Name) or call.func.id not in NOTICES:
-            continue
-        if not call.args or not isinstance(call.args[0], ast.Constant):
-            continue
-        given = call.args[2] if call.func.id == "Notice" and len(call.args) > 2 else None
-        levels = found.setdefault(str(call.args[0].value), set())
-        if given is None:
-            levels.add(NOTICES[call.func.id])
-        elif isinstance(given, ast.Constant):
-            levels.add(str(given.value))
-    return found
+def test_the_page_of_notices_is_made_from_the_rules() -> None:
+    run = subprocess.run([sys.executable, ROOT / "script" / "notices.py"], capture_output=True, text=True)
+    assert (run.returncode, run.stderr) == (0, "")
 
 
-def test_every_code_of_a_notice_stands_in_the_guide_with_its_level() -> None:
-    rows = [line.split("|") for page in GUIDE for line in page.read_text().splitlines() if line.startswith("| `")]
-    codes = notices_in_code()
-    assert len(codes) > 60
-    for code, levels in codes.items():
-        told = [row[2] for row in rows if f"`{code}`" in row[1] and re.search("note|warning|error", row[2])]
-        assert told, f"{code} has no row with its level"
-        assert all(any(level in cell for cell in told) for level in levels), f"{code}: {levels}, told as {told}"
+def test_notices_are_made_by_rules_and_every_rule_makes_some() -> None:
+    texts = sources()
+    for name, text in texts.items():
+        if name != "engine/base/errors.py" and not name.startswith(READ_BACK):
+            assert not re.search(r"\bNotice\(", text), name
+    rules = [rule for text in texts.values() for rule in re.findall(r"^(\w+): Final = Rule\(", text, re.M)]
+    code = "\n".join(texts.values())
+    assert len(rules) > 200
+    assert [rule for rule in rules if len(re.findall(rf"\b{rule}\b(?!: Final)", code)) == 0] == []
 
 
 def test_every_code_of_a_next_step_stands_in_the_guide() -> None:
     text = (ROOT / "docs" / "guide" / "results.md").read_text().split("## What to do next")[1].split("\n## ")[0]
-    codes = set(get_args(Kind))
-    for call in calls_in_code():
-        if isinstance(call.func, ast.Name) and call.func.id == "NextStep":
-            codes |= {str(arg.value) for arg in call.args[:1] if isinstance(arg, ast.Constant)}
+    codes = set(get_args(Kind)).union(*(re.findall(r'\bNextStep\(\s*"([\w-]+)"', code) for code in sources().values()))
     assert len(codes) > 12
     for code in codes:
         assert f"`{code}`" in text, code

@@ -338,7 +338,7 @@ def test_of_many_targets_the_wrong_one_is_named() -> None:
         position=position,
     )
     (suspect,) = rigid_suspects(data)
-    assert (suspect.code, suspect.configuration, suspect.target) == ("outliers", "5", "t17")
+    assert (suspect.rule.code, suspect.configuration, suspect.target) == ("outliers", "5", "t17")
 
 
 def test_reference_points_are_a_table_that_is_bounded(tmp_path: Path, allowing: Callable[[str], None]) -> None:

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.base.units import Marked, parts_of
 from truearm.engine.data.circles import FEWEST, Circle, fit_circle
 from truearm.engine.data.dataset import Dataset, IntArray
@@ -496,6 +496,28 @@ TABLES: Final = ("standard-dh", "s-model", "hayati")
 _LARGEST_MISFIT: Final = 2.0
 
 
+LEFT_OUT: Final = Rule(
+    "left-out",
+    "warning",
+    "configurations that belong to no run",
+)
+NO_CIRCLE: Final = Rule(
+    "no-circle",
+    "warning",
+    "a target that was not used in a run",
+)
+NOT_CIRCULAR: Final = Rule(
+    "not-circular",
+    "warning",
+    "the points are further from their circles than their deviations allow",
+)
+MISFIT: Final = Rule(
+    "misfit",
+    "warning",
+    "the robot's convention cannot hold the measured axes",
+)
+
+
 @dataclass(frozen=True, eq=False)
 class AxisAnalysis:
     """What circles say about a robot."""
@@ -626,17 +648,15 @@ class AxisAnalysis:
         said = []
         if self.found.left_out:
             said.append(
-                Notice(
-                    "left-out",
+                LEFT_OUT(
                     f"{self.found.left_out} of {self.data.configurations} configurations belong to no run in which one"
                     " joint moves alone, and were not used.",
                 )
             )
-        said += [Notice("no-circle", f"A target was not used in one run. {refusal}") for refusal in self.found.refused]
+        said += [NO_CIRCLE(f"A target was not used in one run. {refusal}") for refusal in self.found.refused]
         if self.found.excess > 1.0:
             said.append(
-                Notice(
-                    "not-circular",
+                NOT_CIRCULAR(
                     f"The points are {self.found.excess:.2g} times further from their circles than the declared"
                     " deviations allow. The arm gives way, or something moved. All deviations are widened by that"
                     " factor.",
@@ -645,8 +665,7 @@ class AxisAnalysis:
         misfit = self.calibrated.residual
         if misfit is not None and misfit > _LARGEST_MISFIT:
             said.append(
-                Notice(
-                    "misfit",
+                MISFIT(
                     f"The convention {self.nominal.convention_name} leaves {misfit:.2g} deviations between the robot's"
                     " axes and the measured ones. If axes are parallel, convert the robot to hayati or to joint-errors."
                     " Otherwise the arm does not turn about fixed axes.",

@@ -12,7 +12,7 @@ import numpy as np
 
 from truearm.bags.standstills import Recording, Sighting, found_in
 from truearm.bags.streams import TargetStream, read_streams
-from truearm.engine.base.errors import InputError, Notice, counted, listed, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, listed, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.writing import output_file, write_files
 from truearm.engine.command.arguments import file_for, files_of
@@ -27,6 +27,17 @@ if TYPE_CHECKING:
 PAGE: Final = ".html"
 #: Fewer messages than this share are lost in ordinary recordings.
 _LOST: Final = 0.05
+
+
+MESSAGES_MISSING: Final = Rule(
+    "messages-missing",
+    "warning",
+    "5 % of the joints' messages or more were lost, by the usual time between two of them; not told where their "
+    "times are too uneven. What was found is usable, but motions shorter than the gaps are not seen. Usual causes "
+    "are a recorder that is too slow and a topic that is published with *best effort*",
+    cure="Lighten the load of the network or of the recorder, or let the topic be published reliably.",
+    gravity=0,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,11 +60,9 @@ class ImportedBag(Record):
         if lost < _LOST * (lost + kept):
             return ()
         return (
-            Notice(
-                "messages-missing",
+            MESSAGES_MISSING(
                 f"About {lost} of {lost + kept} messages of the joints are missing, by the times of the others. "
-                "Motions shorter than the gaps are not seen. Lighten the load of the network or of the recorder, or "
-                "let the topic be published reliably.",
+                "Motions shorter than the gaps are not seen.",
             ),
         )
 

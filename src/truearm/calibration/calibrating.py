@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from truearm.calibration.holding import held_argument
 from truearm.calibration.result import RESULT_FILES, Calibration
 from truearm.calibration.zones import WantedZones, choose_zones, zone_file_names, zones_argument
-from truearm.engine.base.errors import InputError, Notice, listed, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, listed, refusals_of
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.version import __version__
 from truearm.engine.choosing.candidates import (
@@ -47,10 +47,11 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of, without_table_motion
 from truearm.engine.data.thinning import readings_digest
 from truearm.engine.diagnose.base_changes import checked_parts, with_one_base
+from truearm.engine.diagnose.case import DOUBTED, PULLED, Case
 from truearm.engine.diagnose.data_check import notices_of
 from truearm.engine.diagnose.gain import check_gain
 from truearm.engine.diagnose.held_places import check_held
-from truearm.engine.diagnose.judgement import DOUBTED, PULLED, judge
+from truearm.engine.diagnose.judgement import judge
 from truearm.engine.diagnose.simulated_calibrations import (
     SimulatedCalibrations,
     check_linear,
@@ -138,6 +139,13 @@ _LEAST: Final = 100
 _BAR: Final = 20
 
 
+NOT_SIMULATED: Final = Rule(
+    "not-simulated",
+    "note",
+    "no calibration was simulated, because the fit leaves open what predictions depend on",
+)
+
+
 def simulate_calibrations(
     fit: Fit,
     training: Dataset,
@@ -154,11 +162,9 @@ def simulate_calibrations(
     """
     if fit.status not in (Status.CONVERGED, Status.AT_BOUND):
         return None, [
-            Notice(
-                "not-simulated",
+            NOT_SIMULATED(
                 f"No calibration was simulated, because this one ended with {fit.status.value}: intervals say nothing "
                 "of what the data do not determine.",
-                "note",
             )
         ]
 
@@ -382,14 +388,15 @@ def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Cal
         *found.notices,
     )
     judged = judge(
-        fit,
-        parts.readings,
-        first,
-        validation or train_errors,
-        parts.noticed,
-        of_split,
-        asked.loss,
-        held_out=second is not None,
+        Case(
+            fit,
+            parts.readings,
+            first,
+            validation or train_errors,
+            tuple(parts.noticed),
+            of_split,
+            held_out=second is not None,
+        )
     )
     simulated, told = None, list[Notice]()
     if asked.monte_carlo is not None:

@@ -235,7 +235,7 @@ def arm_coverage(found: SimulatedCalibrations, robot: Robot) -> float:
 #: Ends of a fit with which a result can be sound.
 SOUND: Final = (Status.CONVERGED.value, Status.AT_BOUND.value)
 #: Warnings that speak against a result; the second is of earlier versions.
-_WARNINGS: Final = (NO_GAIN, "not-better")
+_WARNINGS: Final = (NO_GAIN.code, "not-better")
 
 
 class ResultKeptError(InputError):

@@ -138,7 +138,7 @@ class Calibration(Record):
     def faults(self) -> tuple[str, ...]:
         """What keeps it from replacing a sound result: a bad status, errors and ``no-gain``, by their codes."""
         told = [self.status.value] if self.status.value not in SOUND else []
-        told += [notice.code for notice in self.warnings if notice.level == "error" or notice.code == NO_GAIN]
+        told += [notice.code for notice in self.warnings if notice.level == "error" or notice.code == NO_GAIN.code]
         return tuple(dict.fromkeys(told))
 
     @property

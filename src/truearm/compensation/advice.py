@@ -11,7 +11,7 @@ import numpy as np
 
 from truearm.compensation.limit import beyond_measured
 from truearm.compensation.program_correction import MOST_SEGMENTS, CorrectedPrograms, ProgramSplit
-from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.programs.chosen_targets import ALONE
 from truearm.engine.programs.correction import LARGEST_STEP, LIKELY, Correction
 from truearm.engine.programs.gauge import turns_between
@@ -24,11 +24,54 @@ _TURNED: Final = 0.01
 #: With so few targets and no frame, a correction without a mean is no correction.
 _FEW_TARGETS: Final = 3
 _LISTED: Final = 5
-_NOTHING_CORRECTED: Final = "nothing-corrected"
+_NOTHING_CORRECTED: Final = Rule(
+    "nothing-corrected",
+    "warning",
+    "all targets stay, or only one is left to correct and nothing says where its frame is",
+    gravity=2,
+)
 #: Share by which masses differ that are the same load.
 _SAME_MASS: Final = 0.1
 #: A tool is measured where the program has it, within what a calibration cannot know of the flange [m].
 _TOOL_APART: Final = 0.004
+
+
+TARGETS_SKIPPED: Final = Rule(
+    "targets-skipped",
+    "warning",
+    "targets that could not be corrected, which was accepted, with the reason",
+    gravity=2,
+)
+INSTRUCTIONS_UNKNOWN: Final = Rule(
+    "instructions-unknown",
+    "warning",
+    "instructions that truearm does not know",
+)
+CONFIGURATION_ON_EDGE: Final = Rule(
+    "configuration-on-edge",
+    "warning",
+    "targets that moved across the edge of their configuration",
+)
+POSTURE_GUESSED: Final = Rule(
+    "posture-guessed",
+    "warning",
+    "nothing says in which posture the robot reaches its first pose",
+)
+MOVES_NOT_DIVIDED: Final = Rule(
+    "moves-not-divided",
+    "warning",
+    "moves that `--split` left",
+)
+LOAD_CHANGES: Final = Rule(
+    "load-changes",
+    "warning",
+    "the program changes what the robot carries, and the correction does not",
+)
+CARRIES_NOTHING: Final = Rule(
+    "no-payload",
+    "warning",
+    "the arm bends, and the robot carries nothing",
+)
 
 
 def check_correction(
@@ -45,16 +88,13 @@ def check_correction(
     made = _corrected(result)
     skipped = sum(len(one.skipped) for one in corrections)
     if skipped:
-        made.append(
-            Notice("targets-skipped", f"{_counted(skipped, 'target')} left unchanged, as listed with the reason.")
-        )
+        made.append(TARGETS_SKIPPED(f"{_counted(skipped, 'target')} left unchanged, as listed with the reason."))
     made += [*_not_better(robot, result), *_beyond(robot, result)]
     unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
         made.append(
-            Notice(
-                "instructions-unknown",
+            INSTRUCTIONS_UNKNOWN(
                 f"{_counted(sum(unknown.values()), 'unknown instruction')} left alone: {words}"
                 f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
             )
@@ -62,8 +102,7 @@ def check_correction(
     edges = [(one, row) for one in corrections for row in one.on_edge]
     if edges:
         made.append(
-            Notice(
-                "configuration-on-edge",
+            CONFIGURATION_ON_EDGE(
                 f"{_counted(len(edges), 'target')} moved across the edge of a quadrant or turn of the configuration "
                 f"by a joint that stands on it, as at 0: {_lines(edges)}. Controllers "
                 "take the nearest posture there, but step through these first.",
@@ -71,8 +110,7 @@ def check_correction(
         )
     if result.guessed:
         made.append(
-            Notice(
-                "posture-guessed",
+            POSTURE_GUESSED(
                 f"Nothing says in which posture the robot reaches its first pose ({'; '.join(result.guessed)}): it was "
                 "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be.",
             )
@@ -80,8 +118,7 @@ def check_correction(
     unsplit = sum(len(one.unsplit) for one in splits)
     if unsplit:
         made.append(
-            Notice(
-                "moves-not-divided",
+            MOVES_NOT_DIVIDED(
                 f"{_counted(unsplit, 'straight or circular move')} not split: the start of such a move is not sure; or "
                 "a target was not corrected, is given by joints or is an offset; or the posture changes on the way; or "
                 f"{MOST_SEGMENTS} segments are not enough; or its instruction has options that segments cannot have.",
@@ -91,8 +128,7 @@ def check_correction(
     made += _apart(result)
     if any(one.program.load_changes for one in corrections) and any(effect.loaded for effect in robot.effects):
         made.append(
-            Notice(
-                "load-changes",
+            LOAD_CHANGES(
                 "The programs change what the robot carries (GripLoad, TLoad, tload). Targets were corrected for the "
                 "load of the tool alone; where the robot carries more, the arm bends further than is expected here.",
             )
@@ -100,22 +136,37 @@ def check_correction(
     unweighed = not result.loads or None in result.loads.values()
     if robot.payload == NO_PAYLOAD and unweighed and any(effect.loaded for effect in robot.effects):
         made.append(
-            Notice(
-                "no-payload",
+            CARRIES_NOTHING(
                 "The robot carries nothing in this correction. If its tool weighs something, give it with `payload`.",
             )
         )
     return tuple(made)
 
 
+NO_TARGETS: Final = Rule(
+    "no-targets",
+    "warning",
+    "the programs hold nothing to correct",
+    gravity=2,
+)
+
+
 def _corrected(result: CorrectedPrograms) -> list[Notice]:
     """Say what the correction rests on, or that there is none."""
     corrections = result.corrections
     if not any(one.program.targets for one in corrections):
-        return [Notice("no-targets", "There is no target in the programs that could be corrected.")]
+        return [NO_TARGETS("There is no target in the programs that could be corrected.")]
     alone = sum(why == ALONE for one in corrections for why in one.kept.values())
     made = _assumed(result) if any(one.corrected.any() for one in corrections) else _nothing(alone)
     return made + _by_joints(corrections)
+
+
+NOT_BETTER_HERE: Final = Rule(
+    "not-better-here",
+    "warning",
+    "targets that would rather get worse, and what became of them",
+    gravity=2,
+)
 
 
 def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
@@ -148,7 +199,7 @@ def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
         else "The corrections are small beside what is known of them: "
         f"{'give `tools`, or ' * _flange_counts(result)}measure more configurations near the program."
     )
-    return [Notice("not-better-here", words)]
+    return [NOT_BETTER_HERE(words)]
 
 
 def _flange_counts(result: CorrectedPrograms) -> bool:
@@ -157,6 +208,15 @@ def _flange_counts(result: CorrectedPrograms) -> bool:
     turns = np.concatenate([one.before[rows, :3, :3] for one, rows in judged])
     alike = result.frames.frames == "assumed" and np.allclose(turns, turns[0], atol=_TURNED)
     return result.frames.tools == "assumed" and not alike
+
+
+BEYOND_MEASURED: Final = Rule(
+    "beyond-measured",
+    "warning",
+    "targets that were corrected although a joint stands there beyond what was measured, by more than a tenth of its "
+    "range",
+    gravity=2,
+)
 
 
 def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
@@ -169,8 +229,7 @@ def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     if not found:
         return []
     return [
-        Notice(
-            "beyond-measured",
+        BEYOND_MEASURED(
             f"{_counted(len(found), 'target')} corrected although {_joints_beyond(robot, found)} stood well outside "
             f"the range measured in calibration: {_lines(found)}. What the model leaves out counts more there than "
             "where it was measured.",
@@ -193,15 +252,21 @@ def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
 def _nothing(alone: int) -> list[Notice]:
     """Say that no target was corrected, and why not if single ones were without a frame whose place is known."""
     if not alone:
-        return [Notice(_NOTHING_CORRECTED, "Nothing was corrected: the programs are as they were.")]
+        return [_NOTHING_CORRECTED("Nothing was corrected: the programs are as they were.")]
     left = "only one target is left to correct" if alone == 1 else f"{alone} targets are left, each alone in its frame"
     return [
-        Notice(
-            _NOTHING_CORRECTED,
+        _NOTHING_CORRECTED(
             f"Nothing can be corrected: {left}, and `frames` is not given. The error of a single target could as well "
             f"be that of its frame. {'It stays as it is' if alone == 1 else 'They stay as they are'}: give `frames`.",
         )
     ]
+
+
+JOINT_TARGETS_KEPT: Final = Rule(
+    "joint-targets-kept",
+    "note",
+    "targets given by joints, which stay",
+)
 
 
 def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
@@ -210,13 +275,18 @@ def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
         return []
     stay = "is given by joints and stays as it is" if kept == 1 else "are given by joints and stay as they are"
     return [
-        Notice(
-            "joint-targets-kept",
+        JOINT_TARGETS_KEPT(
             f"{counted(kept, 'target')} {stay}, as home positions should. Where one was computed from a place in "
             "space, `joint_targets=correct` corrects it too.",
-            "note",
         )
     ]
+
+
+LOADS_TAKEN: Final = Rule(
+    "loads-taken",
+    ("warning", "note"),
+    "what the arm carries with each tool, by the program or as in calibration",
+)
 
 
 def _loads(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
@@ -234,12 +304,21 @@ def _loads(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
         )
     said.append("`payload` says it for all of them.")
     if not other:
-        return [Notice("loads-taken", " ".join(said), "note")]
+        return [LOADS_TAKEN(" ".join(said), "note")]
     said.append(
         f"In its calibration the robot carried {own:g} kg. If it carried one of these tools then, that payload was "
         "wrong: calibration and programs are off by what it bends, and the errors to expect do not contain that."
     )
-    return [Notice("loads-taken", " ".join(said))]
+    return [LOADS_TAKEN(" ".join(said))]
+
+
+TOOL_APART: Final = Rule(
+    "tool-apart",
+    "warning",
+    "a tool that was measured is more than 4 mm from where the program has it",
+    cure="Check that the target is the tip of that tool, and that the last joint has its zero where the controller "
+    "has it.",
+)
 
 
 def _apart(result: CorrectedPrograms) -> list[Notice]:
@@ -249,13 +328,24 @@ def _apart(result: CorrectedPrograms) -> list[Notice]:
         return []
     words = ", ".join(f"{tool or 'the flange'} by {apart * 1e3:.1f} mm" for tool, apart in far.items())
     return [
-        Notice(
-            "tool-apart",
+        TOOL_APART(
             f"Tools are not where the program has them on the flange: {words}. A flange that calibration cannot place "
-            "explains one or two millimetres. Check that the target is the tip of that tool, and that the last joint "
-            "has its zero where the controller has it.",
+            "explains one or two millimetres.",
         )
     ]
+
+
+TOOLS_ASSUMED: Final = Rule(
+    "tools-assumed",
+    "warning",
+    "where base and flange were put, because the files do not say",
+)
+FRAMES_ASSUMED: Final = Rule(
+    "frames-assumed",
+    "warning",
+    "where base and flange were put, because the files do not say",
+    gravity=2,
+)
 
 
 def _assumed(result: CorrectedPrograms) -> list[Notice]:
@@ -266,9 +356,9 @@ def _assumed(result: CorrectedPrograms) -> list[Notice]:
         if few:
             words[0] += f" With so few targets ({min(few)}) little or nothing of the correction is left: give `frames`."
         if few or not result.choice.was_taught("frames"):
-            made.append(Notice("frames-assumed", words[0]))
+            made.append(FRAMES_ASSUMED(words[0]))
     if frames.tools == "assumed" and not result.choice.was_taught("tools"):
-        made.append(Notice("tools-assumed", words[-1]))
+        made.append(TOOLS_ASSUMED(words[-1]))
     return made
 
 

@@ -360,13 +360,13 @@ def _check_numbers_read(language: Language, result: CorrectedPrograms, accepted:
         "the program computes with numbers of targets, which the correction changes: another branch or another place "
         f"may follow ({'; '.join(places[:_SHOWN])}{more})"
     )
-    if NUMBERS_READ in accepted:
-        return [Notice(NUMBERS_READ, f"{words[0].upper()}{words[1:]}. It was accepted.")]
+    if NUMBERS_READ.code in accepted:
+        return [NUMBERS_READ(f"{words[0].upper()}{words[1:]}. It was accepted.")]
     raise InputError(
         words,
         parameter="programs",
         cure="Let the program compute with numbers of its own, leave these targets as they are with `keep`, or accept "
-        f"it with `accept={NUMBERS_READ}`.",
+        f"it with `accept={NUMBERS_READ.code}`.",
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation.program_correction import CorrectedPrograms
-from truearm.engine.base.errors import InputError, Notice, Words, refusals_of, wrong_kind
+from truearm.engine.base.errors import InputError, Notice, Rule, Words, refusals_of, wrong_kind
 from truearm.engine.base.files import exists, path_argument
 from truearm.engine.base.units import ANGLE_UNITS, LENGTH_UNITS, quantity_si
 from truearm.engine.base.writing import writable_folder
@@ -151,6 +151,14 @@ def refuse_kinematics_of_another_arm(robot: Robot, accepted: Collection[str]) ->
         )
 
 
+CONTROLLER_NOMINAL: Final = Rule(
+    "controller-nominal",
+    "warning",
+    "it was said that a controller computes with the data sheet whose maker calibrates every arm",
+    gravity=2,
+)
+
+
 def controller_notices(robot: Robot, programs: Sequence[Program]) -> list[Notice]:
     """Say where it was answered that a controller computes with the data sheet, and its maker calibrates every arm."""
     calibration = _calibration(programs)
@@ -159,8 +167,7 @@ def controller_notices(robot: Robot, programs: Sequence[Program]) -> list[Notice
     if not _poses(programs):
         return []
     return [
-        Notice(
-            "controller-nominal",
+        CONTROLLER_NOMINAL(
             f"Controllers of {calibration.maker} compute with what the factory measured of each arm, and the poses "
             "were corrected for one that computes with the data sheet, as was said. On an arm with its own "
             "controller that makes programs worse; give its file with `controller_kinematics`.",
@@ -257,6 +264,14 @@ def correction_limit(robot: Robot) -> CorrectionLimit:
     return CorrectionLimit(_TIMES * moved, _TIMES * max(turned, moved / reach(believed, None)), words)
 
 
+CORRECTIONS_LARGE: Final = Rule(
+    "corrections-large",
+    "warning",
+    "targets are moved or turned farther than the robot's errors explain, which was "
+    "[accepted](programs.md#how-large-a-correction-may-be)",
+)
+
+
 def check_size(
     moved: Array,
     turned: Array,
@@ -290,7 +305,7 @@ def check_size(
             f"Targets are moved and turned by up to {largest.text}, which was accepted. Errors of this robot explain "
             f"{limit.text}: {limit.words}. {check}"
         )
-        return [] if limit.allows(largest) else [Notice("corrections-large", said)]
+        return [] if limit.allows(largest) else [CORRECTIONS_LARGE(said)]
     worst = int((moved if largest.moved > holds.moved else turned).argmax())
     enough = f"{_up(largest.moved * 1e3)}mm,{_up(math.degrees(largest.turned))}deg"
     raise InputError(
@@ -361,6 +376,14 @@ def ledger_of(robot: object) -> Path | None:
     return ledger_beside(Path(robot))
 
 
+LEDGER_NOT_WRITTEN: Final = Rule(
+    "ledger-not-written",
+    "note",
+    "the folder of the robot file cannot be written to, so copies of the programs without comment may not be known "
+    "as corrected",
+)
+
+
 def ledger_to_write(ledger: Path | None) -> tuple[Path | None, list[Notice]]:
     """Return the ledger if it can be written, and say so if it cannot."""
     if ledger is None:
@@ -372,7 +395,7 @@ def ledger_to_write(ledger: Path | None) -> tuple[Path | None, list[Notice]]:
             f"{ledger} cannot be written. A copy of these programs may not be known as corrected once its comment is "
             "removed."
         )
-        return None, [Notice("ledger-not-written", message, "note")]
+        return None, [LEDGER_NOT_WRITTEN(message)]
     return ledger, []
 
 

@@ -33,7 +33,7 @@ from truearm.compensation.limit import (
     refuse_proprietary_controller,
     with_controller,
 )
-from truearm.engine.base.errors import Notice, counted, listed, millimetres, refusals_of
+from truearm.engine.base.errors import Notice, Rule, counted, listed, millimetres, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.command.arguments import (
@@ -45,7 +45,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.engine.command.split import accept_argument, changed_since, refuse_unaccepted, told_of
+from truearm.engine.command.split import MAKER, accept_argument, changed_since, refuse_unaccepted, told_of
 from truearm.engine.command.texts import positions_of
 from truearm.engine.diagnose.external_force import check_force
 from truearm.engine.document.document import Block, detail, say, under
@@ -314,6 +314,20 @@ def _entries(arm: Robot, languages: Sequence[Language], texts: Mapping[str, str]
     )
 
 
+BETWEEN_TARGETS: Final = Rule(
+    "between-targets",
+    "warning",
+    "between its targets the program leaves the path by more than 0.02 mm",
+    cure="Take a smaller `spacing`.",
+)
+UNTIMED_MOVES: Final = Rule(
+    "untimed-moves",
+    "note",
+    "the language cannot say how long a joint motion takes, so what motion adds to the loads may be another",
+    cure="Write `move_to=poses`, or run the program slowly.",
+)
+
+
 def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], notices: list[Notice]) -> dict[str, str]:
     """Return the files of a program in every language, and add what is to be said of them."""
     texts: dict[str, str] = {}
@@ -330,24 +344,19 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
     foreign = [one for one in languages if arm.maker and not one.runs_on(arm.maker)]
     if foreign:
         written = ", ".join(f"{one.name} of {one.makers[0]}" for one in foreign)
-        notices.append(Notice("maker", f"{arm.name} is of {arm.maker}, and programs were written in {written}."))
+        notices.append(MAKER(f"{arm.name} is of {arm.maker}, and programs were written in {written}."))
     if content.beside > _FAR:
         notices.append(
-            Notice(
-                "between-targets",
-                f"Between its targets the program leaves the path by up to {millimetres(content.beside)} mm. Take a "
-                "smaller `spacing`.",
+            BETWEEN_TARGETS(
+                f"Between its targets the program leaves the path by up to {millimetres(content.beside)} mm.",
             )
         )
     untimed = [one.name for one in languages if content.untimed(one.name)]
     if untimed:
         notices.append(
-            Notice(
-                "untimed-moves",
+            UNTIMED_MOVES(
                 f"{listed(untimed)} cannot say how long a joint motion takes: the robot goes as fast as it is set to, "
-                "and what motion adds to the loads is another than was corrected. Write `move_to=poses`, or run the "
-                "program slowly.",
-                "note",
+                "and what motion adds to the loads is another than was corrected.",
             )
         )
     return texts

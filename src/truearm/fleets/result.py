@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.base.files import exists
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import output_folder, write_files
@@ -39,6 +39,37 @@ class Run:
     lost: tuple[str, ...] = ()  #: Robots of parts that were given up, because their workers died of them.
 
 
+WORKERS_DIED: Final = Rule(
+    "workers-died",
+    "error",
+    "workers died again and again of some parts, whose robots are not in the result",
+    cure="Run it again with more memory, or leave these robots out.",
+)
+ROBOTS_FAILED: Final = Rule(
+    "robots-failed",
+    "warning",
+    "some robots could not be calibrated; each says why in `robots.csv`",
+    gravity=2,
+)
+ROBOTS_IN_ERROR: Final = Rule(
+    "robots-in-error",
+    "warning",
+    "results of some robots end with an error, as `calibrate` alone would say; no figure of the series contains them",
+    cure="Look at their reports first, mend their data or options, and run this again.",
+)
+NO_RESULT: Final = Rule(
+    "no-result",
+    "error",
+    "no robot has a result that can be used",
+    cure="Mend what their messages name, and run this again.",
+)
+ROBOTS_OUTDATED: Final = Rule(
+    "robots-outdated",
+    "warning",
+    "a robot failed, and `robots/NAME` holds what an earlier run found of it",
+)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Fleet(Record):
     """A fleet of robots."""
@@ -53,20 +84,16 @@ class Fleet(Record):
         found = []
         if self.run.lost:
             found.append(
-                Notice(
-                    "workers-died",
+                WORKERS_DIED(
                     f"Workers died again and again of parts with {counted(len(self.run.lost), 'robot')} "
-                    f"({listed(self.run.lost)}), and these are not in the result. Run it again with more memory, or "
-                    "leave these robots out.",
-                    "error",
+                    f"({listed(self.run.lost)}), and these are not in the result.",
                 )
             )
         failed = self.analysis.failed
         if failed:
             names = listed([name for name, _ in failed])
             found.append(
-                Notice(
-                    "robots-failed",
+                ROBOTS_FAILED(
                     f"{len(failed)} of {counted(self.analysis.measurements, 'robot')} could not be calibrated "
                     f"({names}); the first: {failed[0][1]}",
                 )
@@ -74,28 +101,22 @@ class Fleet(Record):
         wrong = [look for look in self.analysis.looks if any(reason.why == "error" for reason in look.reasons)]
         if wrong:
             found.append(
-                Notice(
-                    "robots-in-error",
+                ROBOTS_IN_ERROR(
                     f"The {'result' if len(wrong) == 1 else 'results'} of {counted(len(wrong), 'robot')} "
                     f"({listed([look.robot for look in wrong])}) should not be used: calibrated alone, each ends "
-                    "with an error. No figure of the series contains them. Look at their reports first, mend their "
-                    "data or options, and run this again.",
+                    "with an error. No figure of the series contains them.",
                 )
             )
         if self.analysis.usable == 0:
             found.append(
-                Notice(
-                    "no-result",
-                    f"None of {counted(self.analysis.measurements, 'robot')} has a result that can be used. Mend what "
-                    "their messages name, and run this again.",
-                    "error",
+                NO_RESULT(
+                    f"None of {counted(self.analysis.measurements, 'robot')} has a result that can be used.",
                 )
             )
         outdated = self._outdated()
         if outdated:
             found.append(
-                Notice(
-                    "robots-outdated",
+                ROBOTS_OUTDATED(
                     f"{listed(outdated)} could not be calibrated, and what an earlier run wrote of it stands below "
                     f"{ROBOTS}: remove these folders, or do not use them.",
                 )

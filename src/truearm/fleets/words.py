@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.document.document import Block, Words, detail, each, say, under
 from truearm.fleets.analysis import (
@@ -299,24 +299,52 @@ def analysis_blocks(found: Analysis, draw: str | None = None) -> Iterator[Block]
     yield each("kinds", (_kind(kind, several=len(found.kinds) > 1) for kind in found.kinds))
 
 
+ROBOTS_DIFFER: Final = Rule(
+    "robots-differ",
+    "warning",
+    "parameters of some robots are not like those of the others",
+    cure="Look for a collision, a wrong mastering or wrong data before these results are used. Priors that this "
+    "fleet proposes do not count them.",
+)
+ROBOTS_DRIFT: Final = Rule(
+    "robots-drift",
+    "warning",
+    "parameters of some machines changed from campaign to campaign by more than chance",
+)
+DRIFT_ALIKE: Final = Rule(
+    "drift-alike",
+    "warning",
+    "the same parameters changed alike in all of five or more machines: look at what measured them",
+)
+ANOTHER_MACHINE: Final = Rule(
+    "another-machine",
+    "warning",
+    "most parameters of a machine changed as much as robots differ: is it the same machine?",
+    cure="Check whether the entry 'of' names the same machine.",
+)
+DRIFT_UNDATED: Final = Rule(
+    "drift-undated",
+    "note",
+    "a machine was measured several times, but not at two known dates",
+    cure="Correct the dates beside them.",
+)
+
+
 def analysis_notices(found: Analysis) -> list[Notice]:
     """Return what to know about the figures of a fleet."""
     notices = []
     differing = {one.robot for kind in found.kinds for one in kind.differences}
     if differing:
         notices.append(
-            Notice(
-                "robots-differ",
+            ROBOTS_DIFFER(
                 f"{counted(len(differing), 'robot')} {'differs' if len(differing) == 1 else 'differ'} from the others "
-                f"({listed(sorted(differing))}). Look for a collision, a wrong mastering or wrong data before "
-                "these results are used. Priors that this fleet proposes do not count them.",
+                f"({listed(sorted(differing))}).",
             )
         )
     changed = list(dict.fromkeys(one.machine for one in found.drifts if one.significant))
     if changed:
         notices.append(
-            Notice(
-                "robots-drift",
+            ROBOTS_DRIFT(
                 f"{counted(len(changed), 'machine')} changed between campaigns by more than chance "
                 f"({listed(changed)}). An instrument, a tool or a temperature that differed between the campaigns "
                 "looks the same.",
@@ -325,8 +353,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
     alike = [one.parameter for kind in found.kinds for one in kind.drifts.alike]
     if alike:
         notices.append(
-            Notice(
-                "drift-alike",
+            DRIFT_ALIKE(
                 f"The same parameters changed alike in all machines ({listed(alike)}): what measured them has more "
                 "likely changed than all of them.",
             )
@@ -334,20 +361,17 @@ def analysis_notices(found: Analysis) -> list[Notice]:
     others = [name for kind in found.kinds for name in kind.drifts.others]
     if others:
         notices.append(
-            Notice(
-                "another-machine",
+            ANOTHER_MACHINE(
                 f"Most parameters of {listed(others)} changed from one campaign to the next by as much as robots "
-                "differ from one another. Check whether the entry 'of' names the same machine.",
+                "differ from one another.",
             )
         )
     undated = [name for kind in found.kinds for name in kind.drifts.undated]
     if undated:
         notices.append(
-            Notice(
-                "drift-undated",
+            DRIFT_UNDATED(
                 f"{listed(undated)} {'was' if len(undated) == 1 else 'were'} measured several times, but not at two "
-                "different known dates, so no change is told. Correct the dates beside them.",
-                "note",
+                "different known dates, so no change is told.",
             )
         )
     return notices

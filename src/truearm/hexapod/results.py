@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted
+from truearm.engine.base.errors import InputError, Notice, Rule, counted
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import output_file, write_text
 from truearm.engine.data.dataset import Dataset
@@ -110,6 +111,14 @@ class SolvedPose:
         )
 
 
+ATTACHMENTS_NOT_COMPARED: Final = Rule(
+    "attachments-not-compared",
+    "warning",
+    "No configuration was measured with two attachments. The data declare no standard deviation then",
+    cure="Measure a few configurations again after the next attachment.",
+)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodSolution(Record):
     """The tool's cups, from lengths."""
@@ -127,11 +136,10 @@ class HexapodSolution(Record):
         if self.attached is None or self.attached.found is not None:
             return ()
         return (
-            Notice(
-                "attachments-not-compared",
+            ATTACHMENTS_NOT_COMPARED(
                 f"The tool was attached {self.attached.count} times, and no configuration was measured with two of "
                 "the attachments: how well the tool changer repeats the cups is not known, and the data declare no "
-                "standard deviations. Measure a few configurations again after the next attachment.",
+                "standard deviations.",
             ),
         )
 

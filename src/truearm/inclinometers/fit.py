@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice, counted, listed
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, listed
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.inclinations import Inclinations, InclinometerReadings, Instruments, Pairs
 from truearm.engine.fit.frames import initial_frames
@@ -459,11 +459,27 @@ def check_tilting(start: Robot, fit: TiltingFit, read: Inclinations, *, pushed: 
     )
 
 
+TILTING_NOT_CONVERGED: Final = Rule(
+    "tilting-not-converged",
+    "error",
+    "the solver's steps did not become small",
+)
+
+
 def _not_converged(fit: TiltingFit) -> list[Notice]:
     if fit.converged:
         return []
     message = "The solver's steps did not become small. Check forces, payloads, masses and joint positions."
-    return [Notice("tilting-not-converged", message, "error")]
+    return [TILTING_NOT_CONVERGED(message)]
+
+
+TILTING_BELOW_ZERO: Final = Rule(
+    "tilting-below-zero",
+    "error",
+    "a tilt, a play or a compliance is negative by more than 3 deviations: signs of forces or joints, masses, or "
+    "pairs are wrong",
+    cure="Check the signs of forces and joints, the masses in the robot file, and which configurations were compared.",
+)
 
 
 def _below_zero(fit: TiltingFit) -> list[Notice]:
@@ -472,13 +488,18 @@ def _below_zero(fit: TiltingFit) -> list[Notice]:
     if not below:
         return []
     return [
-        Notice(
-            "tilting-below-zero",
-            f"{listed(below)}: found to be negative, which no spring, play or gap is. Check the signs of forces and "
-            "joints, the masses in the robot file, and which configurations were compared.",
-            "error",
+        TILTING_BELOW_ZERO(
+            f"{listed(below)}: found to be negative, which no spring, play or gap is.",
         )
     ]
+
+
+INCLINATIONS_SCATTER: Final = Rule(
+    "inclinations-scatter",
+    ("warning", "error"),
+    "what is left of the changes is more than 2 (10: error) times as large as declared: an instrument moved, a force "
+    "or payload is not as stated, or bearings and links give way",
+)
 
 
 def _scatter(fit: TiltingFit, read: Inclinations) -> list[Notice]:
@@ -489,8 +510,7 @@ def _scatter(fit: TiltingFit, read: Inclinations) -> list[Notice]:
     left = np.sqrt(squares.sum(axis=(0, 2)) / np.maximum(used.sum(axis=(0, 2)), 1))
     worst = int(np.argmax(left))
     return [
-        Notice(
-            "inclinations-scatter",
+        INCLINATIONS_SCATTER(
             f"What is left of the changes of inclination is {fit.excess:.1f} times as large as their declared "
             f"deviations, most on {read.instruments.names[worst]} ({math.degrees(float(left[worst])):.2g} deg): an "
             "instrument moved, a force or payload is not as stated, or bearings and links give way too. Deviations are "
@@ -498,6 +518,20 @@ def _scatter(fit: TiltingFit, read: Inclinations) -> list[Notice]:
             "error" if fit.excess > _WRONG else "warning",
         )
     ]
+
+
+UPRIGHT_UNSEEN: Final = Rule(
+    "upright-unseen",
+    "warning",
+    "backlash and compliance of a joint whose axis stands upright were not seen: push the flange sideways",
+)
+TILTING_UNSEEN: Final = Rule(
+    "tilting-unseen",
+    "warning",
+    "no load that was read tells these constants well: three quarters of their deviation or less were removed",
+    cure="Read inclinometers behind these joints where the moment about or across their axes turns round; 'truearm "
+    "plan' with the device inclinometers chooses such postures.",
+)
 
 
 def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
@@ -514,19 +548,15 @@ def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
             "and give the poses of both as `pushed`."
         )
         told.append(
-            Notice(
-                "upright-unseen",
+            UPRIGHT_UNSEEN(
                 f"{_stay(by_poses)}: gravity does not turn a joint whose axis stands "
                 f"upright, and inclinometers do not see its turn. {cure}",
             )
         )
     if others:
         told.append(
-            Notice(
-                "tilting-unseen",
-                f"{_stay(others)}: no change of load that was read tells them well. Read "
-                "inclinometers behind these joints where the moment about or across their axes turns round; "
-                "'truearm plan' with the device inclinometers chooses such postures.",
+            TILTING_UNSEEN(
+                f"{_stay(others)}: no change of load that was read tells them well.",
             )
         )
     return told
@@ -550,15 +580,20 @@ def _upright(robot: Robot) -> Iterable[int]:
             yield joint + 1
 
 
+UNPAIRED: Final = Rule(
+    "unpaired",
+    "note",
+    "configurations without a partner were left out",
+)
+
+
 def _unpaired(read: Inclinations) -> list[Notice]:
     if not read.unpaired:
         return []
     return [
-        Notice(
-            "unpaired",
+        UNPAIRED(
             f"{counted(len(read.unpaired), 'configuration')} ({listed(read.unpaired)}) had no partner and "
             f"{'was' if len(read.unpaired) == 1 else 'were'} left out: those of the orders 1 and 2, 3 and 4 and so on "
             "are compared.",
-            "note",
         )
     ]

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, listed
+from truearm.engine.base.errors import InputError, Notice, Rule, listed
 from truearm.engine.data.inclinations import Inclinations
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
@@ -56,6 +56,13 @@ class Mounting:
         return np.array([_turn_of(mount) for mount in self.mounts])
 
 
+INSTRUMENT_TURNED: Final = Rule(
+    "instrument-turned",
+    "note",
+    "an instrument sits turned by more than 5 deg on its link",
+)
+
+
 def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
     """Find how instruments sit on their links.
 
@@ -89,10 +96,8 @@ def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
     ]
     if turned:
         notices.append(
-            Notice(
-                "instrument-turned",
+            INSTRUMENT_TURNED(
                 f"By their angles instruments sit turned on their links: {listed(turned)}. This is taken into account.",
-                "note",
             )
         )
     return Mounting(found.mounts, found.zeros, tuple(notices))

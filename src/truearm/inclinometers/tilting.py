@@ -14,7 +14,16 @@ import numpy as np
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
-from truearm.engine.base.errors import InputError, Notice, counted, has_error, name_parameter, refusals_of, wrong_kind
+from truearm.engine.base.errors import (
+    InputError,
+    Notice,
+    Rule,
+    counted,
+    has_error,
+    name_parameter,
+    refusals_of,
+    wrong_kind,
+)
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.base.version import __version__
@@ -398,6 +407,16 @@ def _proven(robot: Robot, fit: TiltingFit, read: Inclinations, joints: Array, to
     return sealed(made, proof)
 
 
+TILTING_NOT_BETTER: Final = Rule(
+    "tilting-not-better",
+    "warning",
+    "geometry alone leaves no more of the poses: the joints tilt less than is known of them, or something else is "
+    "wrong",
+    cure="Calibrate without them.",
+    gravity=2,
+)
+
+
 def _compared(geometry: Calibration, alone: Calibration) -> list[Notice]:
     """Say if the constants do not help the poses."""
     errors = [one.validation or one.train for one in (geometry, alone)]
@@ -405,11 +424,10 @@ def _compared(geometry: Calibration, alone: Calibration) -> list[Notice]:
     if after is None or before is None or after.mean < before.mean:
         return []
     return [
-        Notice(
-            "tilting-not-better",
+        TILTING_NOT_BETTER(
             f"With tilt, backlash and compliance of the joints the poses are missed by {after.mean * 1e3:.3f} mm, by "
             f"the geometry alone by {before.mean * 1e3:.3f} mm: the joints of this robot tilt less than is known of "
-            "them, or something else is wrong with it or with the inclinations. Calibrate without them.",
+            "them, or something else is wrong with it or with the inclinations.",
         )
     ]
 

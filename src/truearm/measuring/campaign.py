@@ -12,7 +12,7 @@ from typing import Final, Self
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.robot.chain import Array
 from truearm.measuring.reading_log import ReadingLog
 from truearm.measuring.session import Entry, Session
@@ -20,6 +20,14 @@ from truearm.measuring.sources import Incoming, Source
 
 #: So many configurations are named in a notice.
 _NAMED: Final = 5
+
+
+TORN_LINE: Final = Rule(
+    "torn-line",
+    "note",
+    "the log ended with a part of a line",
+    gravity=0,
+)
 
 
 class Campaign:
@@ -109,13 +117,44 @@ class Campaign:
         if not self.log.torn:
             return []
         return [
-            Notice(
-                "torn-line",
+            TORN_LINE(
                 "The log ended with a part of a line, as where a machine is stopped: that reading was not confirmed, "
                 "and is measured again.",
-                "note",
             )
         ]
+
+
+CLOCK_BACK: Final = Rule(
+    "clock-back",
+    "warning",
+    "a reading has an earlier time than the one before",
+)
+MANY_LEFT_OUT: Final = Rule(
+    "many-left-out",
+    "warning",
+    "at more than half of the configurations every target was left out, and `not-seen` does not say so",
+)
+OTHER_ORDER: Final = Rule(
+    "other-order",
+    "note",
+    "not measured in the order of the plan",
+)
+NOT_JUDGED: Final = Rule(
+    "not-judged",
+    "note",
+    "nothing says how readings were taken",
+)
+NESTS_MISSED: Final = Rule(
+    "nests-missed",
+    "warning",
+    "in some rounds not all nests were measured; where they were hidden",
+)
+NO_NESTS: Final = Rule(
+    "no-nests",
+    "note",
+    "no nests were measured",
+    cure="Name them as `nests`.",
+)
 
 
 def session_notices(session: Session) -> list[Notice]:
@@ -124,8 +163,7 @@ def session_notices(session: Session) -> list[Notice]:
     found = []
     if back := _gone_back(readings):
         found.append(
-            Notice(
-                "clock-back",
+            CLOCK_BACK(
                 f"The clock went back before {_numbers(back)}. The order is that in which readings came; the drift of "
                 "nests over time may be wrong.",
             )
@@ -133,8 +171,7 @@ def session_notices(session: Session) -> list[Notice]:
     none = len(session.without_reading)
     if 2 * none > len(session.labels):
         found.append(
-            Notice(
-                "many-left-out",
+            MANY_LEFT_OUT(
                 f"At {none} of {len(session.labels)} configurations every target was left out: "
                 f"{len(session.left_out)} of {session.planned} readings of targets are "
                 "missing. If the instrument does not see them there, plan for it: `truearm plan` with `device`.",
@@ -143,38 +180,30 @@ def session_notices(session: Session) -> list[Notice]:
     jumps = _out_of_order(session)
     if jumps:
         found.append(
-            Notice(
-                "other-order",
+            OTHER_ORDER(
                 f"Not measured in the order of the plan: {_some(jumps)}. The file says in which order it was.",
-                "note",
             )
         )
     kept = [entry for entry in session.kept if entry.reading is not None]
     blind = sum(session.quality.unasked(entry.reading) for entry in kept if entry.reading is not None)
     if blind:
         found.append(
-            Notice(
-                "not-judged",
+            NOT_JUDGED(
                 f"Of {blind} of {len(kept)} readings that are kept nothing says how they were taken, or no limit was "
                 "given: scatter, settling and samples of the dwell were not judged.",
-                "note",
             )
         )
     if session.missed_rounds:
         found.append(
-            Notice(
-                "nests-missed",
+            NESTS_MISSED(
                 f"In {session.missed_rounds} of {session.rounds} rounds not all nests were measured: what moved in "
                 f"between is not known as well.{_hidden(session)}",
             )
         )
     if readings and not session.nests:
         found.append(
-            Notice(
-                "no-nests",
-                "No fixed nests were measured along the way: nobody can tell whether instrument or robot moved. "
-                "Name them as `nests`.",
-                "note",
+            NO_NESTS(
+                "No fixed nests were measured along the way: nobody can tell whether instrument or robot moved.",
             )
         )
     return found

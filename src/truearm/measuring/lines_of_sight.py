@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, Words, counted
+from truearm.engine.base.errors import InputError, Notice, Rule, Words, counted
 from truearm.engine.motion.arm_capsules import ArmCapsules
 from truearm.engine.motion.cell import KeepOut, box_distance, segment_distance
 from truearm.engine.robot.chain import Array
@@ -20,6 +20,14 @@ from truearm.measuring.session import Session
 #: Of so many configurations the extent is compared, and it is told from so many times on.
 _FEWEST: Final = 3
 _TIMES: Final = 10.0
+
+
+UNITS_UNLIKELY: Final = Rule(
+    "units-unlikely",
+    "warning",
+    "the readings reach ten times as far as the configurations of the plan, or a tenth of it",
+    cure="Check the unit of lengths, and that it is this plan.",
+)
 
 
 def extent_notices(session: Session, flange: Array) -> list[Notice]:
@@ -39,11 +47,9 @@ def extent_notices(session: Session, flange: Array) -> list[Notice]:
         driven = _extent(flange[[places[e.label] for e in kept]])
         if driven and not 1.0 / _TIMES < read / driven < _TIMES:
             return [
-                Notice(
-                    "units-unlikely",
+                UNITS_UNLIKELY(
                     f"The readings of {name} at {len(kept)} configurations are {read * 1e3:.4g} mm apart, root mean "
-                    f"square about their middle, and the flange of the robot {driven * 1e3:.4g} mm. Check the unit of "
-                    "lengths, and that it is this plan.",
+                    f"square about their middle, and the flange of the robot {driven * 1e3:.4g} mm.",
                 )
             ]
     return []
@@ -52,6 +58,14 @@ def extent_notices(session: Session, flange: Array) -> list[Notice]:
 def _extent(places: Array) -> float:
     """Return how far places ``(n, 3)`` are from their middle [m], the root of the mean square."""
     return float(np.sqrt(((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+NOT_SEEN: Final = Rule(
+    "not-seen",
+    ("note", "warning"),
+    "a virtual instrument cannot read all that is asked for: at some configurations nothing (warning), or of some "
+    "targets (note)",
+)
 
 
 def sight_notices(session: Session, device: Device, placed: Robot, joints: Array) -> tuple[Notice, ...]:
@@ -81,8 +95,7 @@ def sight_notices(session: Session, device: Device, placed: Robot, joints: Array
     blind = int((asked.any(axis=1) & ~seen.any(axis=1)).sum())
     nothing = f"none at {blind} of {counted(len(joints), 'configuration')}" if blind else "some at every configuration"
     return (
-        Notice(
-            "not-seen",
+        NOT_SEEN(
             f"With the {device.name} {seen.sum()} {of_pairs} can be read, {nothing}: {device.reads_where}. The others "
             f"are left out. A plan that is made with the instrument asks for what it sees: {cure}.",
             "warning" if blind else "note",

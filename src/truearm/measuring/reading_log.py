@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 from pydantic import BaseModel, Field, StringConstraints
 
-from truearm.engine.base.errors import InputError, Notice, is_one_line, printable
+from truearm.engine.base.errors import InputError, Notice, Rule, is_one_line, printable
 from truearm.engine.base.files import read_bytes, read_yaml, reason_of
 from truearm.engine.base.units import as_number, sized_si, to_si, written
 from truearm.engine.robot.chain import Array
@@ -100,6 +100,15 @@ class Air:
     humidity: float | None = None
 
 
+NOT_SAID: Final = Rule(
+    "not-said",
+    "note",
+    "serial numbers, reflector or air that nobody said",
+    cure="Whoever repeats the measurement needs it; give `about`.",
+    gravity=0,
+)
+
+
 @dataclass(frozen=True)
 class About:
     """What a campaign was measured with; None for what nobody said."""
@@ -156,10 +165,8 @@ class About:
         if not self.missing:
             return []
         return [
-            Notice(
-                "not-said",
-                f"Nobody said: {', '.join(self.missing)}. Whoever repeats the measurement needs it; give `about`.",
-                "note",
+            NOT_SAID(
+                f"Nobody said: {', '.join(self.missing)}.",
             )
         ]
 

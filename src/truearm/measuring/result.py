@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import write_files
 from truearm.engine.data.dataset import Dataset
@@ -25,6 +25,21 @@ DATA: Final = "measurements.csv"
 PAGE: Final = "measure.html"
 #: How a measuring goes on that is not finished.
 GOES_ON: Final = "The same command goes on there."
+
+
+UNFINISHED: Final = Rule(
+    "unfinished",
+    "warning",
+    "readings are still to be taken",
+    gravity=2,
+)
+NESTS_MOVED: Final = Rule(
+    "nests-moved",
+    "warning",
+    "the nests moved together by more than five times what noise explains",
+    cure="Wait until the instrument is warm, fix its stand, and measure again.",
+    gravity=2,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,8 +164,7 @@ class Measured(Record):
         if step is None:
             return []
         return [
-            Notice(
-                "unfinished",
+            UNFINISHED(
                 f"{counted(self.session.outstanding, 'reading')} are still to be taken; next is {step.label}, "
                 f"{step.names[0]}. {GOES_ON}",
             )
@@ -164,11 +178,10 @@ class Measured(Record):
         if far <= 5.0 * noise * math.sqrt(2.0 / len(drift.names)):
             return []
         return [
-            Notice(
-                "nests-moved",
+            NESTS_MOVED(
                 f"The nests moved together by up to {far * 1e3:.3f} mm, and by chance a coordinate of a reading is off "
                 f"by no more than {noise * 1e3:.4f} mm: instrument or floor moved. The readings are not corrected for "
-                "it. Wait until the instrument is warm, fix its stand, and measure again.",
+                "it.",
             )
         ]
 

@@ -15,7 +15,7 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted, printable, shortened
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, printable, shortened
 from truearm.engine.base.units import LENGTH_UNITS, as_number, sized_si, to_si
 from truearm.engine.data.readers.rows import QUATERNION_TOLERANCE
 from truearm.measuring.session import Entry, Reading, Session
@@ -87,6 +87,23 @@ class _Client:
     lines: int = 0
 
 
+WRONG_TOKENS: Final = Rule(
+    "wrong-tokens",
+    "warning",
+    "connections without the right token",
+)
+LINES_REFUSED: Final = Rule(
+    "lines-refused",
+    "warning",
+    "lines that could not be taken",
+)
+CUT_OFF: Final = Rule(
+    "cut-off",
+    "warning",
+    "connections that sent too much, or were too many",
+)
+
+
 # Readings sent by a program of this machine, a line each, over TCP.
 #
 # Any program of this machine can reach loopback, and could forge points. So a connection begins with a token that only
@@ -137,18 +154,16 @@ class Listener:
         found = []
         if self._wrong_tokens:
             found.append(
-                Notice(
-                    "wrong-tokens",
+                WRONG_TOKENS(
                     f"{counted(self._wrong_tokens, 'connection')} without the right token "
                     f"{'was' if self._wrong_tokens == 1 else 'were'} refused.",
                 )
             )
         if self._refused:
-            found.append(Notice("lines-refused", f"{counted(self._refused, 'line')} that came could not be taken."))
+            found.append(LINES_REFUSED(f"{counted(self._refused, 'line')} that came could not be taken."))
         if self._cut_off:
             found.append(
-                Notice(
-                    "cut-off",
+                CUT_OFF(
                     f"{counted(self._cut_off, 'connection')} sent too much at once, or connected beside too many "
                     "others, and was cut off.",
                 )

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted
+from truearm.engine.base.errors import InputError, Notice, Rule, counted
 from truearm.engine.base.files import read_bytes
 from truearm.engine.base.units import as_number, to_si
 from truearm.engine.data.readers.cells import Cells, lines_of, read_cells
@@ -52,6 +52,30 @@ class _Counts:
     broken: list[str] = field(default_factory=list)
     replaced: list[str] = field(default_factory=list)
     not_read: dict[str, str] = field(default_factory=dict)
+
+
+ROWS_BROKEN: Final = Rule(
+    "rows-broken",
+    "warning",
+    "rows that could not be read",
+)
+FILE_REPLACED: Final = Rule(
+    "file-replaced",
+    "warning",
+    "rows that were read are no longer in their file",
+)
+NOT_READ: Final = Rule(
+    "not-read",
+    "note",
+    "what is not read in the folder",
+    gravity=0,
+)
+LINE_WITHOUT_END: Final = Rule(
+    "line-without-end",
+    "warning",
+    "the last line of a file has no line break, and is not read",
+    gravity=0,
+)
 
 
 class WatchedFolder:
@@ -114,15 +138,13 @@ class WatchedFolder:
             rest = len(counts.broken) - _NAMED
             more = f" and {rest} more" if rest > 0 else ""
             found.append(
-                Notice(
-                    "rows-broken",
+                ROWS_BROKEN(
                     f"{counted(len(counts.broken), 'row')} could not be read: {' '.join(counts.broken[:_NAMED])}{more}",
                 )
             )
         if counts.replaced:
             found.append(
-                Notice(
-                    "file-replaced",
+                FILE_REPLACED(
                     f"{', '.join(dict.fromkeys(counts.replaced))}: rows that were read are no longer there, or have "
                     "changed. What was read stays as it was; rows that differ count as new.",
                 )
@@ -130,16 +152,11 @@ class WatchedFolder:
         if counts.not_read:
             words = "; ".join(f"{name}: {why.rstrip('.')}" for name, why in sorted(counts.not_read.items())[:_NAMED])
             rest = len(counts.not_read) - _NAMED
-            found.append(
-                Notice(
-                    "not-read", f"Not read in {self.folder}: {words}{f' and {rest} more' if rest > 0 else ''}.", "note"
-                )
-            )
+            found.append(NOT_READ(f"Not read in {self.folder}: {words}{f' and {rest} more' if rest > 0 else ''}."))
         open_ends = [name for name, file in self._files.items() if file.open_end]
         if open_ends:
             found.append(
-                Notice(
-                    "line-without-end",
+                LINE_WITHOUT_END(
                     f"The last line of {', '.join(open_ends)} has no line break at its end and is not read: it may be "
                     "half of a row.",
                 )

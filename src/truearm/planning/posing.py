@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted, degrees, listed, millimetres, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, degrees, listed, millimetres, refusals_of
 from truearm.engine.base.limits import limit
 from truearm.engine.base.writing import output_file, write_files
 from truearm.engine.command.arguments import files_of, joints_argument, robot_argument, whole_argument
@@ -37,6 +37,14 @@ if TYPE_CHECKING:
 PAGE: Final = ".html"
 #: What is put behind the name of a set to name the file of its poses.
 POSES: Final = "-poses.csv"
+
+
+UNREACHABLE_POSES: Final = Rule(
+    "unreachable-poses",
+    "error",
+    "poses of the set that the robot cannot go to; the files do not have them",
+    cure="Take another centre, a smaller side, or another orientation.",
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,12 +76,9 @@ class PlannedPoses(Record):
         if not missed:
             return ()
         return (
-            Notice(
-                "unreachable-poses",
+            UNREACHABLE_POSES(
                 f"{counted(len(missed), 'pose')} of the set {self.made.name} cannot be reached within the joint limits "
-                f"and {'is' if len(missed) == 1 else 'are'} left out: {listed(missed)}. Take another centre, a smaller "
-                "side, or another orientation.",
-                "error",
+                f"and {'is' if len(missed) == 1 else 'are'} left out: {listed(missed)}.",
             ),
         )
 

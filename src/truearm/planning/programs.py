@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.units import as_number
 from truearm.engine.command.arguments import folder_for, numbers_argument
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.diagnose.external_force import RATING_UNKNOWN
 from truearm.engine.programs import PROGRAM_LANGUAGES
 from truearm.engine.programs.joint_speeds import (
     counts_notices,
@@ -49,6 +50,15 @@ from truearm.planning.result import Plan
 _MOST_NAMED: Final = 6
 
 
+OVERLOAD: Final = Rule(
+    "overload",
+    "warning",
+    "the flange carries more than the `rated_load` of the robot file. Plans without a program say it, too",
+    cure="Check the unit and the tool of `payload` before anything is driven.",
+    gravity=2,
+)
+
+
 def load_notices(robot: Robot) -> list[Notice]:
     """Return what to know of a load above that for which the arm is rated, or of an arm whose rating is not known."""
     mass = robot.payload.mass
@@ -56,22 +66,28 @@ def load_notices(robot: Robot) -> list[Notice]:
         if mass <= 0.0:
             return []
         return [
-            Notice(
-                "rating-unknown",
+            RATING_UNKNOWN(
                 f"The flange carries {mass:g} kg, and the robot file does not say for how much {robot.name} is rated "
                 "(rated_load): see that it may carry that.",
-                "note",
             )
         ]
     if mass <= robot.rated_load:
         return []
     return [
-        Notice(
-            "overload",
-            f"The flange carries {mass:g} kg, and {robot.name} is rated for {robot.rated_load:g} kg. "
-            "Check the unit and the tool of `payload` before anything is driven.",
+        OVERLOAD(
+            f"The flange carries {mass:g} kg, and {robot.name} is rated for {robot.rated_load:g} kg.",
         )
     ]
+
+
+TOOL_ASSUMED: Final = Rule(
+    "tool-assumed",
+    ("note", "warning"),
+    "nobody said what the flange carries, or which targets are measured: the program tells the controller of what "
+    "the message names. Targets: those of the first of the robot file's `tools`; of a file of readings (`--from`) "
+    "where these have them; else three reflectors about 150 mm apart, as of no robot. Load: that of the same tool, "
+    "else 0 kg; where the robot file has targets, always 0 kg. A wrong load can stop the robot or let it give way",
+)
 
 
 def targets_notices(robot: Robot, given: Robot, device: str = "") -> list[Notice]:
@@ -85,11 +101,9 @@ def targets_notices(robot: Robot, given: Robot, device: str = "") -> list[Notice
     if given.targets:
         return []
     return [
-        Notice(
-            "tool-assumed",
+        TOOL_ASSUMED(
             "Nobody said the targets of the flange: what is measured, and kept clear, is assumed, "
             f"{_taken(robot, given, device, weighed=True)}. State the targets in the robot file.",
-            "note",
         )
     ]
 
@@ -109,10 +123,10 @@ def assumed_notices(robot: Robot, given: Robot, device: str = "", *, weighed: bo
     cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []
     cures += [] if given.targets else ["State the targets in the robot file."]
     return [
-        Notice(
-            "tool-assumed",
+        TOOL_ASSUMED(
             f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is "
             f"assumed, {_taken(robot, given, device, weighed=weighed)}. {' '.join(cures)}",
+            "warning",
         )
     ]
 
@@ -251,6 +265,17 @@ def program_wanted(
     return ProgramWanted(program, language, driving, approach)
 
 
+FASTER_THAN_ASKED: Final = Rule(
+    "faster-than-asked",
+    "warning",
+    "`krl` and `fanuc` say shares in whole percent, rounded down, and at 1 % the fastest arms go faster than "
+    "`--speed`; so may their first move (that of an LR Mate 251.6 mm/s instead of 250). Less than 1 % cannot be "
+    "said, and a share is one of the joints' speed however short the way, so that parts of a move are no slower; the "
+    "override of the pendant makes it slower. Head and sheet have that speed",
+    cure="Set the override of the controller lower, or state a higher `speed`.",
+)
+
+
 def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str = "", *, weighed: bool) -> Plan:
     """Return a plan with the program that drives it.
 
@@ -273,11 +298,9 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str
     if fastest > _CLOSE * wanted.driving.speed:
         notices.insert(
             0,
-            Notice(
-                "faster-than-asked",
+            FASTER_THAN_ASKED(
                 f"{language.name} says no share below 1 %: {'' if speeds else 'where joints are as fast as any, '}"
-                f"a target goes at up to {shown_speed(fastest)} mm/s. Set the override of the controller lower, or "
-                "state a higher `speed`.",
+                f"a target goes at up to {shown_speed(fastest)} mm/s.",
             ),
         )
     texts = dict(language.motion(program))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted, did_you_mean, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, did_you_mean, refusals_of
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import write_new_text
 from truearm.engine.command.arguments import (
@@ -34,6 +34,13 @@ from truearm.robot_files.formats import FORMATS
 
 if TYPE_CHECKING:
     from truearm.robot_files.jobs import ConvertRobot, ExportRobot, ExportToRobodk
+
+
+LEFT_OUT: Final = Rule(
+    "left-out",
+    "warning",
+    "what the robot file in the other convention cannot hold",
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,7 +88,7 @@ class ExportedRobot(Record):
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """What to know about it: what the format cannot hold, and what speaks against the calibration."""
-        return (*(Notice("left-out", message) for message in self.left_out), *self.told)
+        return (*(LEFT_OUT(message) for message in self.left_out), *self.told)
 
     @property
     def finished(self) -> bool:

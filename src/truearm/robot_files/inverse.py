@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from truearm.engine.base.arrays import axes
-from truearm.engine.base.errors import InputError, Notice, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import write_text
@@ -207,6 +207,13 @@ def _near(asked: FindJoints, arm: Robot, joints_are: JointsOf, poses: int) -> Ar
     return array_argument(seed, "seed_joints", shape, f"{len(arm.joints)} numbers, one for each joint of {arm.name}")
 
 
+MODEL_FRAME: Final = Rule(
+    "model-frame",
+    "note",
+    "the poses were taken in the model's base frame, and the pendant shows them in another",
+)
+
+
 def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]:
     """Say if poses were taken in the model's base frame, and a pendant would show them in another."""
     controller = robot.controller
@@ -214,11 +221,9 @@ def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]
     if frame != "base" or alike:
         return []
     return [
-        Notice(
-            "model-frame",
+        MODEL_FRAME(
             "The poses were taken as those of the model's flange in its base frame. The controller has them elsewhere "
             "('truearm show' says where): for poses that the pendant shows use `frame=controller`.",
-            "note",
         )
     ]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted, listed, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, listed, refusals_of
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.base.units import SHOWN_AS, Marked, from_si, parts_of
 from truearm.engine.base.writing import output_folder, write_files
@@ -389,14 +389,26 @@ def _identified(asked: FindInfluence, given: _Given, parts: _Parts) -> Identifie
     return Identified(robots, errors, held_out, first.configurations, by_influence, by_norm, asked.placement)
 
 
+POSES_UNMET: Final = Rule(
+    "poses-unmet",
+    "warning",
+    "the parameters cannot meet these poses; their sets are where the steps ended",
+)
+INFLUENCE_WORSE: Final = Rule(
+    "influence-worse",
+    "note",
+    "influence leaves more on the judging configurations than least squares over all poses",
+    cure="Calibrate with 'truearm calibrate'.",
+)
+
+
 def _compared(found: Identified) -> list[Notice]:
     """Say if poses were not met, and which way is the better one."""
     told = []
     unmet = int((~found.by_influence.converged).sum())
     if unmet:
         told.append(
-            Notice(
-                "poses-unmet",
+            POSES_UNMET(
                 f"{counted(unmet, 'pose')} of {len(found.by_influence.converged)} could not be met by these parameters:"
                 " their sets are where the steps ended.",
             )
@@ -404,15 +416,20 @@ def _compared(found: Identified) -> list[Notice]:
     by_influence, at_once = (found.errors[way].position for way in ("influence", "least squares"))
     if by_influence is not None and at_once is not None and at_once.mean < by_influence.mean:
         told.append(
-            Notice(
-                "influence-worse",
+            INFLUENCE_WORSE(
                 f"Identification by influence leaves {by_influence.mean * 1e3:.3f} mm, least squares from all poses at "
                 f"once {at_once.mean * 1e3:.3f} mm: one pose sees three combinations of the parameters, and what it "
-                "does not see stays wrong. Calibrate with 'truearm calibrate'.",
-                "note",
+                "does not see stays wrong.",
             )
         )
     return told
+
+
+NO_INFLUENCE: Final = Rule(
+    "no-influence",
+    "note",
+    "these parameters do not change the pose of the tip anywhere",
+)
 
 
 def _still(made: Influence) -> list[Notice]:
@@ -427,4 +444,4 @@ def _still(made: Influence) -> list[Notice]:
     if not still:
         return []
     message = f"{listed(still)} {'does' if len(still) == 1 else 'do'} not change the pose of the tip anywhere."
-    return [Notice("no-influence", message, "note")]
+    return [NO_INFLUENCE(message)]

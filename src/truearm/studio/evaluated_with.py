@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.base.files import read_bytes
 from truearm.engine.base.manifest import hash_of
 from truearm.engine.robot.robot import Robot, fitted_from
@@ -34,6 +34,32 @@ def evaluated_with(result: ResultFile) -> str:
     return f"Of {', '.join(told)}."
 
 
+OTHER_ROBOT: Final = Rule(
+    "other-robot",
+    "warning",
+    "the result is of [another robot](studio.md#what-a-result-is-of) than the one that is chosen; programs are not "
+    "corrected with it, and the page Jog does not draw it",
+)
+OTHER_SETTINGS: Final = Rule(
+    "other-settings",
+    "warning",
+    "the result was made with another model, training part, seed, loss, payload or gravity than are chosen; one of "
+    "tests with another alignment, comparison or noise",
+)
+OTHER_MEASUREMENTS: Final = Rule(
+    "other-measurements",
+    "warning",
+    "the result is of other measurements than those that are chosen, or they were changed, or one of tests does not "
+    "say of which",
+)
+OTHER_PLAN: Final = Rule(
+    "other-plan",
+    "warning",
+    "the result is of another plan of tests than the one that is chosen, or that was changed; or plan or result is "
+    "of another robot",
+)
+
+
 def other_evaluations(result: ResultFile | None, project: Project, robot: Robot) -> list[Notice]:
     """Return what a result is not of, though it is chosen now; of no result, whether the plan is of the robot.
 
@@ -51,13 +77,13 @@ def other_evaluations(result: ResultFile | None, project: Project, robot: Robot)
             "This result does not say which files it is of, as it was written by an older version: whether they are "
             "those that are chosen cannot be told. Evaluate them again."
         )
-        found.append(Notice("other-measurements", text, "warning"))
+        found.append(OTHER_MEASUREMENTS(text))
         if plan is not None and not is_of_plan(result, plan):
-            found.append(Notice("other-plan", "This result is of another plan than the one that is chosen.", "warning"))
+            found.append(OTHER_PLAN("This result is of another plan than the one that is chosen."))
     else:
         plans = [*_other_files(("plan",), result.inputs, project)] or [*_other_robot_file(result.inputs, project)]
-        found += _told("other-plan", "was evaluated by", plans)
-        found += _told("other-measurements", "is of", [*_other_files(_MEASURED, result.inputs, project)])
+        found += _told(OTHER_PLAN, "was evaluated by", plans)
+        found += _told(OTHER_MEASUREMENTS, "is of", [*_other_files(_MEASURED, result.inputs, project)])
         pairs += _other_files(_HOW, result.inputs, project)
     instrument = result.instrument
     if instrument is not None and not (
@@ -65,7 +91,7 @@ def other_evaluations(result: ResultFile | None, project: Project, robot: Robot)
     ):
         then = _noise(instrument.sigma_mm, instrument.sigma_rot_deg)
         pairs.append((then, _noise(files.noise_mm, files.noise_rot_deg)))
-    return [*found, *_told("other-settings", "was made with", pairs)]
+    return [*found, *_told(OTHER_SETTINGS, "was made with", pairs)]
 
 
 def stamps_of(project: Project) -> tuple[Any, ...]:
@@ -94,7 +120,7 @@ def _other_robot(
     for name, things in of.items():
         are = "are" if len(things) > 1 else "is"
         text = f"{' and '.join(things)} {are} of the robot {name}, and {now} is chosen."
-        found.append(Notice("other-plan", text[0].upper() + text[1:], "warning"))
+        found.append(OTHER_PLAN(text[0].upper() + text[1:]))
     return found
 
 
@@ -133,11 +159,11 @@ def _changed(name: str, then: ReadFile, now: str, path: Path, folder: Path) -> I
         yield f"{name} {then.file}", f"{name} {now}"
 
 
-def _told(code: str, verb: str, pairs: list[tuple[str, str]]) -> list[Notice]:
+def _told(rule: Rule, verb: str, pairs: list[tuple[str, str]]) -> list[Notice]:
     if not pairs:
         return []
     was, is_now = ("; ".join(pair[k] for pair in pairs) for k in (0, 1))
-    return [Notice(code, f"This result {verb} {was}. Chosen now: {is_now}. Evaluate again.", "warning")]
+    return [rule(f"This result {verb} {was}. Chosen now: {is_now}. Evaluate again.")]
 
 
 def _plan(project: Project, name: str) -> PerformancePlan | None:

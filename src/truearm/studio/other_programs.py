@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from truearm.engine.base.errors import Notice
+from truearm.engine.base.errors import Notice, Rule
 from truearm.studio import words
 from truearm.studio.project import PROJECT_FILE, ChangedFile, Project
 
@@ -14,6 +14,13 @@ from truearm.studio.project import PROJECT_FILE, ChangedFile, Project
 _LOOK: Final = 2.0
 #: So many files are named.
 _NAMED: Final = 8
+
+
+FILES_CHANGED: Final = Rule(
+    "files-changed",
+    ("note", "warning"),
+    "another program has changed files of the project: they are shown as they are now (note), or not yet (warning)",
+)
 
 
 class OtherPrograms:
@@ -55,7 +62,7 @@ class OtherPrograms:
             if changes != self._told:
                 self._told = changes
                 text = f"{_words(changes)} Press reload to see them as they are now."
-                self._said.content = words.notice(Notice("files-changed", text, "warning"))
+                self._said.content = words.notice(FILES_CHANGED(text, "warning"))
                 self._said.visible = bool(changes)
 
     def shown(self, before: Sequence[ChangedFile]) -> None:
@@ -67,7 +74,7 @@ class OtherPrograms:
         files = [one for one in before if one.name != PROJECT_FILE]
         if files and not self._busy():
             self._project.seen(files)
-            self._tell(Notice("files-changed", f"{_words(files)} The pages show them as they are now.", "note"))
+            self._tell(FILES_CHANGED(f"{_words(files)} The pages show them as they are now."))
         if files or self._told:
             self.look()
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import viser
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.base.files import confined_reads, exists
 from truearm.engine.base.writing import put_back_old
 from truearm.engine.robot.library import load_robot
@@ -34,6 +34,18 @@ _TOLD: Final = 40
 #: Width of the pages, and width and height of the notices, which float over a corner of the scene [px].
 _WIDTH: Final = 520
 _NOTICES: Final = (440, 230)
+
+
+REFUSED: Final = Rule(
+    "refused",
+    ("error", "warning"),
+    "a job refused what it was given (error); a request from elsewhere was turned away (warning)",
+)
+CANCELLED: Final = Rule(
+    "cancelled",
+    "note",
+    "a long action was cancelled, and nothing was written",
+)
 
 
 class Window:
@@ -65,7 +77,7 @@ class Window:
         self._theme()
         self._frame(pages)
         gate.fits = self._fits
-        gate.say = lambda text: self.tell(Notice("refused", text.removeprefix("refused: "), "warning"))
+        gate.say = lambda text: self.tell(REFUSED(text.removeprefix("refused: "), "warning"))
         self._windows = Windows(server, gate)
         self._others.start()
 
@@ -183,7 +195,7 @@ class Window:
         there is none, as for keys, it comes up over the window for some seconds.
         """
         text = words.refusal(error)
-        self.tell(Notice("refused", text, "error"))
+        self.tell(REFUSED(text))
         if not self._refusals.put(self._acted if element is None else element, text):
             self._windows.notify(text)
 
@@ -231,7 +243,7 @@ class Window:
                         for folder in (self.project.folder, self.project.file("result")):
                             if folder is not None and folder.is_dir():
                                 put_back_old(folder)
-                        self.tell(Notice("cancelled", f"{title} was cancelled; nothing was written.", "note"))
+                        self.tell(CANCELLED(f"{title} was cancelled; nothing was written."))
                     elif isinstance(outcome, InputError):
                         self._doing.content = words.paragraph(f"{title}: refused")
                         self.refuse(outcome)
@@ -333,7 +345,7 @@ class Window:
                     page.refresh()
                 except InputError as error:
                     all_shown = False
-                    self.tell(Notice("refused", f"{page.title}: {words.refusal(error)}", "error"))
+                    self.tell(REFUSED(f"{page.title}: {words.refusal(error)}"))
             self._refusals.shown_anew()
             if all_shown:
                 self._others.shown(changes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import viser
 from viser._messages import (
@@ -18,11 +18,18 @@ from viser._messages import (
 )
 from websockets.asyncio.server import ServerConnection
 
-from truearm.engine.base.errors import Notice
+from truearm.engine.base.errors import Rule
 from truearm.engine.base.files import read_bytes
 from truearm.studio import words
 from truearm.studio.gate import Gate
 from truearm.studio.uploads import Upload
+
+READ_ONLY: Final = Rule(
+    "read-only",
+    "warning",
+    "another window works on the project; this one reads until you press *Take over*; what is changed in it is set "
+    "back",
+)
 
 
 class Windows:
@@ -97,7 +104,7 @@ class Windows:
                 button.on_click(partial(self._take_over, connection))
                 self.banners[number] = [said, button]
         who = "Another window works on this project" if self._gate.has_worker else "No window works on this project now"
-        text = words.notice(Notice("read-only", f"{who}; this one only reads.", "warning"))
+        text = words.notice(READ_ONLY(f"{who}; this one only reads."))
         for said, _ in [*self.banners.values()]:
             said.content = text
 

@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Level, Notice, degrees, millimetres
+from truearm.engine.base.errors import InputError, Level, Notice, Rule, degrees, millimetres
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.statistics import Errors, errors_of
-from truearm.engine.diagnose.wrong_robot import LARGEST_SHARE_LEFT
+from truearm.engine.diagnose.wrong_robot import IMPLAUSIBLE, LARGEST_SHARE_LEFT
 from truearm.engine.fit.fit import place
 from truearm.engine.fit.problem import Problem
 from truearm.engine.fit.refit import Moved, Refit, refit
@@ -33,6 +33,16 @@ _WARNING: Final = 4.0
 _ERROR: Final = 10.0
 #: Noise of readings that declare none [m]: of a camera. Trackers are better.
 _NOISE: Final = 1e-4
+
+
+BEYOND_PROOF: Final = Rule(
+    "beyond-proof",
+    ("warning", "error"),
+    "positions are off by more than 4 times (10: error) what the robot's own [proof](results.md#files) lets expect "
+    "at these configurations, with their sigma (0.1 mm if none is declared); a proof that is a lower bound is "
+    "doubted from 10 times on, by a warning",
+    gravity=2,
+)
 
 
 def check_proof(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
@@ -68,8 +78,7 @@ def check_proof(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
         return []
     assumed = f", with {_NOISE * 1e3:g} mm of noise, since no sigma is declared" if data.sigma is None else ""
     return [
-        Notice(
-            "beyond-proof",
+        BEYOND_PROOF(
             f"The positions are off by {off * 1e3:.2g} mm (root mean square), {off / expected:.2g} times the "
             f"{expected * 1e3:.2g} mm that the robot's own calibration lets expect here{assumed}. The robot changed "
             "since, carries another payload, or does what its model lacks: calibrate it again, and do not rely on its "
@@ -120,12 +129,10 @@ def check_frames(robot: Robot, data: Dataset, errors: Errors, known: Moved | Non
     if not beyond:
         return []
     return [
-        Notice(
-            "implausible",
+        IMPLAUSIBLE(
             f"Half of the readings are off by more than {millimetres(float(np.median(off)))} mm, where the arm "
             f"reaches {reach * 1e3:.0f} mm (allowed: {LARGEST_SHARE_LEFT:g} of that): these are not readings of this "
             "robot, or their units, joints or targets are mistaken. Look at them with 'truearm check'.",
-            "error",
         )
     ]
 
@@ -157,6 +164,20 @@ def _extent(data: Dataset) -> float:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+TOOL_MOVED: Final = Rule(
+    "tool-moved",
+    ("warning", "error"),
+    "they fit with the tool, or single targets, elsewhere on the flange",
+    gravity=2,
+)
+BASE_MOVED: Final = Rule(
+    "base-moved",
+    ("warning", "error"),
+    "the readings fit in another frame: [the instrument or the base was moved since](results.md#what-was-moved-since)",
+    gravity=2,
+)
 
 
 def _moved(
@@ -206,21 +227,21 @@ def _moved(
             f"The instrument or the robot's base was moved since the calibration{hedge}.{doubt} Judge the robot with "
             f"`refit=base`, {new}, or compare distances with 'truearm distances'."
         )
-        return Notice("base-moved", message, level)
+        return BASE_MOVED(message, level)
     if best == "tool":
         message = (
             f"The readings agree with the robot if the tool sits elsewhere on the flange: {_motion(again)}, they are "
             f"off by {with_errors}. The tool was mounted anew since the calibration{hedge}.{doubt} Judge the robot "
             f"with `refit=tool`, {new}."
         )
-        return Notice("tool-moved", message, level)
+        return TOOL_MOVED(message, level)
     far = max(again.shifts, key=lambda name: again.shifts[name])
     message = (
         f"The readings agree with the robot if its targets sit elsewhere on the flange: target {far} by "
         f"{millimetres(again.shifts[far])} mm, which moved farthest; then they are off by {with_errors}. Targets were "
         f"put on anew since the calibration{hedge}.{doubt} Judge the robot with `refit=targets`, {new}."
     )
-    return Notice("tool-moved", message, level)
+    return TOOL_MOVED(message, level)
 
 
 def _left_with_both(robot: Robot, data: Dataset, readings: int) -> float:
@@ -231,12 +252,20 @@ def _left_with_both(robot: Robot, data: Dataset, readings: int) -> float:
     return _rms(_sizes(errors_of(place(robot, data), data))) * math.sqrt(numbers / (numbers - unknowns))
 
 
+FRAMES_DIFFER: Final = Rule(
+    "frames-differ",
+    ("warning", "error"),
+    "they fit only with another base and other targets: find both with `--model frames`",
+    cure="Find them with 'truearm calibrate' and `model=frames`.",
+    gravity=2,
+)
+
+
 def _both_moved(left: float, off: Array, *, beyond: bool) -> Notice:
-    return Notice(
-        "frames-differ",
+    return FRAMES_DIFFER(
         f"The readings agree with the robot only with another base and other targets: they are then off by "
         f"{millimetres(left)} mm instead of {millimetres(_rms(off))} (root mean square). Both the instrument (or the "
-        "base) and the tool were moved since the calibration. Find them with 'truearm calibrate' and `model=frames`.",
+        "base) and the tool were moved since the calibration.",
         "error" if beyond else "warning",
     )
 
@@ -254,6 +283,14 @@ _PLACED_WITHIN: Final = 1e-3
 _LEAST_IMPROVEMENT_TARGET_NAMES: Final = 4.0
 #: Targets among which names are looked for.
 _MOST_TARGETS: Final = 20
+
+
+TARGETS_RENAMED: Final = Rule(
+    "targets-renamed",
+    "error",
+    "the readings fit other targets of the robot better",
+    cure="Give the targets the names that they had in the calibration.",
+)
 
 
 def check_names(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
@@ -290,10 +327,7 @@ def check_names(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
         return []
     words = ", ".join(f"{name} is {other}" for name, other in meant.items())
     return [
-        Notice(
-            "targets-renamed",
-            f"The readings fit other targets of the robot better: {words}. Give the targets the names that they had in "
-            "the calibration.",
-            "error",
+        TARGETS_RENAMED(
+            f"The readings fit other targets of the robot better: {words}.",
         )
     ]

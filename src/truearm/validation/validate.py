@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from truearm.engine.base.errors import InputError, Notice, counted, has_error, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, has_error, refusals_of
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.manifest import sets_in
 from truearm.engine.base.writing import output_folder, write_files
@@ -23,7 +23,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.engine.command.split import changed_since, training_of
+from truearm.engine.command.split import TRAINING_DATA, changed_since, training_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, Spread, errors_of
 from truearm.engine.diagnose.external_force import check_force, check_payload
@@ -290,6 +290,13 @@ def _judged(asked: Validate, given: _Given) -> _Judged:
     return _Judged(judged, errors, found, tuple(mistaken))
 
 
+OTHER_SESSION: Final = Rule(
+    "other-session",
+    "note",
+    "of `validate`: the robot warmed up in the session of its calibration, and is judged as in the middle of that",
+)
+
+
 def _of_another_session(robot: Robot, data: Dataset) -> tuple[Dataset, list[Notice]]:
     """Return readings without their numbers, where these would say how warm the arm was in the session of the fit."""
     if data.number is None or LEFT not in robot.parameters:
@@ -298,7 +305,7 @@ def _of_another_session(robot: Robot, data: Dataset) -> tuple[Dataset, list[Noti
         "The robot grew while it warmed up in the session that it was calibrated in. How warm it was in this one "
         "nobody knows, so it is judged as in the middle of that session."
     )
-    return replace(data, number=None), [Notice("other-session", words, "note")]
+    return replace(data, number=None), [OTHER_SESSION(words)]
 
 
 def measure_farther(distances: RegionDistances | None) -> tuple[NextStep, ...]:
@@ -340,8 +347,7 @@ def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[N
         f"{rest}; the rest was held out, and its errors are in the result of the calibration" if used > count else rest
     )
     return [
-        Notice(
-            "training-data",
+        TRAINING_DATA(
             f"The robot was calibrated with these readings: {count} of their {of} configurations are those it was "
             f"trained on{held_out}. These errors flatter it. Validate with measurements that were not used.",
         )

@@ -216,7 +216,7 @@ LEVELS: Final[tuple[Level, ...]] = ("note", "warning", "error")
 
 @dataclass(frozen=True)
 class Notice:
-    """A warning in plain words."""
+    """A warning in plain words, made by its rule."""
 
     code: str  #: Stable short name, for programs: ``redundant``, ``at-bound``.
     message: str  #: What was noticed and what to do about it.
@@ -224,15 +224,48 @@ class Notice:
     #: The readings that it is about, where it is about single ones: label of the configuration and name of the target,
     #: which is empty for all that were read there.
     at: tuple[tuple[str, str], ...] = field(default=(), compare=False, repr=False)
+    rule: Rule | None = field(default=None, compare=False, repr=False)  #: What made it; None if it came from a file.
+
+    @property
+    def gravity(self) -> int:
+        """Its place among notices of its level, see :class:`Rule`; what is said of a file comes first."""
+        return 2 if self.rule is None else self.rule.gravity
 
     def summary(self) -> dict[str, str]:
         """Return it as JSON holds it."""
         return {"code": self.code, "level": self.level, "message": self.message}
 
 
+@dataclass(frozen=True)
+class Rule:
+    """A kind of notice. It is declared once, beside the function that finds it, and makes the notices of its code.
+
+    The guide's table of codes is made from the rules.
+    """
+
+    code: str  #: Stable short name, for programs.
+    level: Level | tuple[Level, ...]  #: How bad it is; the usual level first where it is chosen when it is told.
+    meaning: str  #: What was noticed, for the guide: a part of a sentence in Markdown.
+    cure: str = ""  #: What to do about it, in sentences; they end each message.
+    #: Its place among notices of its level: 2 if a figure that was asked for may not hold, 1 if a part of the result
+    #: may not, 0 if the result holds.
+    gravity: int = 1
+    unless: frozenset[str] = frozenset()  #: Codes of notices beside which it says nothing.
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """Every level that it may have, the usual one first."""
+        return self.level if isinstance(self.level, tuple) else (self.level,)
+
+    def __call__(self, said: str, level: Level | None = None, at: tuple[tuple[str, str], ...] = ()) -> Notice:
+        """Return the notice: what was noticed, with figures and names, and the cure behind it."""
+        message = f"{said} {self.cure}" if self.cure else said
+        return Notice(self.code, message, level or self.levels[0], at, self)
+
+
 def worst_first(notices: Iterable[Notice]) -> tuple[Notice, ...]:
-    """Return notices with errors first and notes last, otherwise in their order."""
-    return tuple(sorted(notices, key=lambda notice: -LEVELS.index(notice.level)))
+    """Return notices with errors first and notes last, and the gravest of a level first; otherwise in their order."""
+    return tuple(sorted(notices, key=lambda notice: (-LEVELS.index(notice.level), -notice.gravity)))
 
 
 def has_error(notices: Iterable[Notice]) -> bool:

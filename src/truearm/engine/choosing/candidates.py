@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.base.limits import limit, refuse_beyond
 from truearm.engine.choosing.cross_validation import FOLDS, Folds, LinearFit
 from truearm.engine.data.dataset import Dataset
@@ -58,6 +58,13 @@ def refuse_balancers_that_are_not_there(robot: Robot, effects: Sequence[str]) ->
         )
 
 
+BALANCER_HELD: Final = Rule(
+    "balancer-held",
+    "note",
+    "all configurations carry one load, which does not tell how strong a [balancer](models.md#balancers) is",
+)
+
+
 def without_unseen_balancers(model: Model, data: Dataset) -> tuple[Model, list[Notice]]:
     """Return a model without balancers where all readings were taken under one load, and what to know of that.
 
@@ -72,7 +79,7 @@ def without_unseen_balancers(model: Model, data: Dataset) -> tuple[Model, list[N
         "relieves, so its strength is held at what the robot file states. Measure some configurations with another "
         "weight or a pull at the flange, and enter that in the columns force_x [N] to force_z [N]."
     )
-    return kept, [Notice("balancer-held", words, "note")]
+    return kept, [BALANCER_HELD(words)]
 
 
 def _load_changes(data: Dataset) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.choosing.search import CURVE
 from truearm.engine.choosing.selection import ORDERED, Selection
 from truearm.engine.data.dataset import Dataset
@@ -74,18 +74,42 @@ def identify_chosen(
         selection = selection.instead(fit.status.value)
 
 
+CHOSEN_IN_PART: Final = Rule(
+    "chosen-in-part",
+    "note",
+    "the data are large: `auto` chose the model by a part of the training configurations",
+)
+
+
 def check_part(compared: Dataset, data: Dataset) -> list[Notice]:
     """Say if a model was chosen by a part of the data."""
     if compared.configurations == data.configurations:
         return []
     return [
-        Notice(
-            "chosen-in-part",
+        CHOSEN_IN_PART(
             f"The data are large for so many effects: the model was chosen by {compared.configurations} of "
             f"{counted(data.configurations, 'training configuration')}, evenly spaced, and fitted to all of them.",
-            "note",
         )
     ]
+
+
+SMALLER_MODEL: Final = Rule(
+    "smaller-model",
+    "note",
+    "`auto` took a smaller model, because the fit of the one it [chose](models.md#let-the-data-choose) first was not "
+    "sound",
+)
+ORDER_IN_THE_MODEL: Final = Rule(
+    "order-in-the-model",
+    "note",
+    "`auto` took warm-up or approach: predictions without an order are those of the middle of the session",
+)
+PERIODS_FOUND: Final = Rule(
+    "periods-found",
+    ("note", "warning"),
+    "errors that repeat with the joints' angles, which `auto` found; a warning where other numbers of periods would "
+    "look the same",
+)
 
 
 def check_choice(selection: Selection) -> list[Notice]:
@@ -94,28 +118,23 @@ def check_choice(selection: Selection) -> list[Notice]:
     if selection.passed_over:
         effects, status = selection.passed_over[0]
         found.append(
-            Notice(
-                "smaller-model",
+            SMALLER_MODEL(
                 f"The model that was chosen first ({listed(effects) or 'geometric'}) ended in {status}, so a smaller "
                 "one was taken. More configurations, which move every joint, could bear it.",
-                "note",
             )
         )
     ordered = [name for name in selection.model.effects if name in ORDERED]
     if ordered:
         found.append(
-            Notice(
-                "order-in-the-model",
+            ORDER_IN_THE_MODEL(
                 f"The model follows the order of this campaign ({listed(ordered)}). That cleans the other parameters. "
                 "Predictions whose place in an order is not known, of other sessions for example, are those of the "
                 "middle of this one.",
-                "note",
             )
         )
     if selection.lines:
         found.append(
-            Notice(
-                "periods-found",
+            PERIODS_FOUND(
                 f"Errors that repeat with the joints' angles were found and taken out: "
                 f"{'; '.join(line.words for line in selection.lines)}. The numbers of periods stand in the calibrated "
                 "robot as transmission_periods.",

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, refusals_of
 from truearm.engine.base.files import exists, path_argument
 from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.units import sized_si
@@ -161,6 +161,15 @@ def refuse_ways_of_another(ways: Path) -> None:
         )
 
 
+PLAN_REPLACED: Final = Rule(
+    "plan-replaced",
+    "warning",
+    "another plan of truearm stood in the folder and was replaced. Measurements and programs by that one do not "
+    "belong to this one",
+    gravity=2,
+)
+
+
 def replaced_notices(folder: Path, name: str, text: str) -> tuple[Notice, ...]:
     """Return what to know of a plan that truearm wrote earlier, nobody changed, and another is written over.
 
@@ -173,8 +182,7 @@ def replaced_notices(folder: Path, name: str, text: str) -> tuple[Notice, ...]:
         if name in one.files and exists(folder / name) and one.files[name] != hash_of(text.encode()):
             again = f", written by '{one.command}'" if one.command else ""
             return (
-                Notice(
-                    "plan-replaced",
+                PLAN_REPLACED(
                     f"Another plan stood in {folder / name}{again}, and was replaced. What was measured or programmed "
                     "by that plan does not belong to this one. To keep both, write them to different places.",
                 ),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from truearm.engine.base.errors import Notice, counted, refusals_of
+from truearm.engine.base.errors import Notice, Rule, counted, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.excluded import Exclusion, read_exclusions, without_readings
@@ -106,19 +106,33 @@ def count_excluded(excluded: tuple[Excluded, ...]) -> dict[str, int]:
     return dict(found)
 
 
+EXCLUDED: Final = Rule(
+    "excluded",
+    "note",
+    "readings that [`--exclude`](results.md#excluding-readings) leaves out, with their reasons; they count as missing",
+)
+
+
 def excluded_notices(excluded: tuple[Excluded, ...]) -> list[Notice]:
     """Say how many readings are excluded, before any split."""
     count = sum(one.readings for one in excluded)
     if not count:
         return []
     return [
-        Notice(
-            "excluded",
+        EXCLUDED(
             f"{counted(count, 'reading')} {'is' if count == 1 else 'are'} excluded: {reasons(excluded)}. Excluded "
             f"readings count as missing. {_RULE}",
-            "note",
         )
     ]
+
+
+HELD_OUT_EXCLUDED: Final = Rule(
+    "held-out-excluded",
+    "warning",
+    "readings that would judge are [excluded](results.md#excluding-readings); what the held-out errors are with them "
+    "and without",
+    gravity=2,
+)
 
 
 def check_excluded(
@@ -146,8 +160,7 @@ def check_excluded(
                 f"at most; without {it} {some.mean * 1e3:.3f} and {some.max * 1e3:.3f} mm."
             )
     return [
-        Notice(
-            "held-out-excluded",
+        HELD_OUT_EXCLUDED(
             f"{counted(count, 'reading')} of the held-out part {'is' if count == 1 else 'are'} excluded: "
             f"{reasons(mine)}.{told} {_RULE}",
         )

@@ -10,7 +10,16 @@ from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from truearm.engine.base.errors import InputError, Notice, counted, did_you_mean, listed, nearest_names, wrong_kind
+from truearm.engine.base.errors import (
+    InputError,
+    Notice,
+    Rule,
+    counted,
+    did_you_mean,
+    listed,
+    nearest_names,
+    wrong_kind,
+)
 from truearm.engine.base.files import exists
 from truearm.engine.base.manifest import written_differently
 from truearm.engine.command.arguments import choices_argument
@@ -131,6 +140,14 @@ def train_count(train: object, n: int, where: str) -> int:
     return int(train)
 
 
+HELD_OUT_SEEN: Final = Rule(
+    "held-out-seen",
+    "warning",
+    "held-out configurations are copies of training ones, or have their joint positions: their errors flatter the fit",
+    gravity=2,
+)
+
+
 def check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[Notice]:
     """Say if the fit has seen what was held out: copies, or other readings at the same joint positions."""
     seen = copies(data, held_out, training)
@@ -148,8 +165,7 @@ def check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[
         )
     cures = ["Leave copies out; for a bootstrap, draw from the training configurations alone and use `train=all`."]
     return [
-        Notice(
-            "held-out-seen",
+        HELD_OUT_SEEN(
             f"Of {counted(len(held_out), 'held-out configuration')} {' and '.join(told)}: the fit has seen them, and "
             f"the errors flatter it. "
             + " ".join(
@@ -160,6 +176,15 @@ def check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[
             ),
         )
     ]
+
+
+TRAINING_DATA: Final = Rule(
+    "training-data",
+    "warning",
+    "the robot was calibrated with these readings before, in this file or another order: the fit has seen what is "
+    "held out now",
+    gravity=2,
+)
 
 
 def check_trained_before(
@@ -180,8 +205,7 @@ def check_trained_before(
         return []
     count, of, seed = before.split
     return [
-        Notice(
-            "training-data",
+        TRAINING_DATA(
             f"The robot to begin with was calibrated with these readings already, on {count} of its {of} "
             f"configurations (seed {seed}): what is held out now was partly seen then, and the held-out errors "
             "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
@@ -189,12 +213,19 @@ def check_trained_before(
     ]
 
 
+NOTHING_HELD_OUT: Final = Rule(
+    "nothing-held-out",
+    "warning",
+    "there is a fit, and no evidence of how good it is elsewhere",
+    cure="Leave `train` out to see the error on configurations the fit has not seen.",
+    gravity=2,
+)
+
+
 def nothing_held_out() -> Notice:
     """Say that there is no proof."""
-    return Notice(
-        "nothing-held-out",
-        "Nothing was held out: the errors are those of the training readings and flatter the model. "
-        "Leave `train` out to see the error on configurations the fit has not seen.",
+    return NOTHING_HELD_OUT(
+        "Nothing was held out: the errors are those of the training readings and flatter the model.",
     )
 
 
@@ -232,19 +263,26 @@ _UNSOUND: Final = ("rank-loss", "not-converged", "implausible")
 _ELSEWHERE: Final = "narrow-data"
 #: The calibration is of another robot than the file says.
 _WRONG: Final = "wrong-robot"
-#: Programs of another maker's robots.
-OTHER_MAKER: Final = "maker"
+MAKER: Final = Rule(
+    "maker",
+    "warning",
+    "the programs are in the language of another maker than the robot's; `compensate` asks for it to be accepted",
+)
 #: Targets that would rather get worse, see :mod:`truearm.engine.programs.correction`.
 NOT_BETTER: Final = "not-better-here"
 #: Programs that compute with the numbers of targets that are corrected.
-NUMBERS_READ: Final = "numbers-read"
+NUMBERS_READ: Final = Rule(
+    "numbers-read",
+    "warning",
+    "the program computes with numbers of corrected targets, which was accepted",
+)
 #: Programs of which some targets cannot be corrected.
 SKIPPED: Final = "skipped"
 
 
 def accept_argument(accept: object, robot: Robot) -> tuple[str, ...]:
     """Return the names of what is accepted although it speaks against a correction."""
-    of_programs = (OTHER_MAKER, OTHER_ARM, NUMBERS_READ, SKIPPED, NOT_BETTER)
+    of_programs = (MAKER.code, OTHER_ARM, NUMBERS_READ.code, SKIPPED, NOT_BETTER)
     known = dict.fromkeys((*_UNSOUND, _ELSEWHERE, _WRONG, *_against(robot), *of_programs))
     return choices_argument(accept, "accept", list(known), "status or notice")
 
@@ -279,30 +317,44 @@ def check_maker(robot: Robot, language: Language, accept: tuple[str, ...]) -> li
     if not robot.maker or language.runs_on(robot.maker):
         return []
     theirs = f"{language.name} runs on controllers of {language.makers[0]}"
-    if OTHER_MAKER in accept:
-        return [Notice(OTHER_MAKER, f"{theirs}, and {robot.name} is of {robot.maker}. It was accepted.")]
+    if MAKER.code in accept:
+        return [MAKER(f"{theirs}, and {robot.name} is of {robot.maker}. It was accepted.")]
     raise InputError(
         "the programs are for robots of another maker",
         parameter="robot",
         where=robot.name,
         came=f"a robot of {robot.maker} and programs in {language.name}",
         cure=f"{theirs}: give the calibration of the robot that runs them. If it is this one, mend the entry maker of "
-        f"its file, or give `accept={OTHER_MAKER}`.",
+        f"its file, or give `accept={MAKER.code}`.",
     )
+
+
+UNPROVEN: Final = Rule(
+    "unproven",
+    "note",
+    "nothing is known of how the robot was calibrated",
+    cure="Calibrate it anew to have that in its file.",
+)
 
 
 def known_of(robot: Robot) -> list[Notice]:
     """Return what is to be said of a calibration before programs are corrected with it."""
     if robot.proof is None:
         return [
-            Notice(
-                "unproven",
+            UNPROVEN(
                 "Nothing is known of how this robot was calibrated and of how well it is known, so the errors of its "
-                "targets cannot be predicted. Calibrate it anew to have that in its file.",
-                "note",
+                "targets cannot be predicted.",
             )
         ]
     return told_of(robot)
+
+
+CHANGED_SINCE_WRITTEN: Final = Rule(
+    "changed-since-written",
+    "warning",
+    "the robot's file was changed or exchanged since it was written together with others",
+    gravity=2,
+)
 
 
 def changed_since(robot: object) -> list[Notice]:
@@ -313,8 +365,7 @@ def changed_since(robot: object) -> list[Notice]:
     if not others:
         return []
     return [
-        Notice(
-            "changed-since-written",
+        CHANGED_SINCE_WRITTEN(
             f"{Path(robot).name} was changed or exchanged after it was written together with {', '.join(others)}: "
             "what they say is not about it.",
         )
@@ -330,15 +381,22 @@ def told_of(robot: Robot) -> list[Notice]:
     ]
 
 
+EDITED_BY_HAND: Final = Rule(
+    "edited-by-hand",
+    "warning",
+    "the robot's values were changed after its calibration",
+    cure="Take the file that calibration wrote, or calibrate again.",
+    gravity=2,
+)
+
+
 def _edited(robot: Robot) -> list[Notice]:
     if robot.proof is None or is_intact(robot):
         return []
     return [
-        Notice(
-            "edited-by-hand",
+        EDITED_BY_HAND(
             "The values of this robot were changed after its calibration, so what is known of its accuracy is not "
-            "about them: the errors of targets cannot be predicted. Take the file that calibration wrote, or calibrate "
-            "again.",
+            "about them: the errors of targets cannot be predicted.",
         )
     ]
 

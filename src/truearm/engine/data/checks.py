@@ -14,12 +14,16 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice, counted, millimetres, nearest_names
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, millimetres, nearest_names
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.inclinations import Inclinations
 from truearm.engine.data.rigid_tool import (
     DEVIATIONS,
+    OUTLIERS,
     SAME_POINT,
+    TARGET_MISTAKEN,
+    TARGETS_SWAPPED,
+    UNIT_LENGTH,
     UNMOVED,
     Suspect,
     constellation,
@@ -100,15 +104,20 @@ def _closer_together(data: Dataset) -> list[Notice]:
         how = f"{size} closer together" if by > 1.0 else f"{size} farther apart"
         mine = np.flatnonzero(np.isin(data.configuration, which) & data.has_position).tolist()
         found.append(
-            Notice(
-                "unit-length",
+            UNIT_LENGTH(
                 f"The targets lie {how} at {named_configurations(data.labels, which)} than at the others: the "
                 "positions there, or those of the others, are in another unit of length. Mend their numbers.",
-                "error",
                 at=tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in mine),
             )
         )
     return found
+
+
+TEMPERATURE_UNLIKELY: Final = Rule(
+    "temperature-unlikely",
+    "warning",
+    "temperatures below -30 or above 80 degC",
+)
 
 
 def _temperatures(data: Dataset) -> list[Notice]:
@@ -119,8 +128,7 @@ def _temperatures(data: Dataset) -> list[Notice]:
     if low >= _COLDEST and high <= _WARMEST:
         return []
     return [
-        Notice(
-            "temperature-unlikely",
+        TEMPERATURE_UNLIKELY(
             f"The temperature goes from {low:g} to {high:g} degC; arms work between {_COLDEST:g} and {_WARMEST:g}. "
             "Is it in kelvin or degrees Fahrenheit?",
         )
@@ -142,6 +150,14 @@ class Ranged(Protocol):
         """Return which readings it cannot have read, ``(readings,)``."""
 
 
+BEYOND_RANGE: Final = Rule(
+    "beyond-range",
+    "warning",
+    "readings outside the range of the instrument that `--device` names",
+    cure="Check the units, and that it was this device.",
+)
+
+
 def check_range(data: Dataset, device: Ranged) -> list[Notice]:
     """Say which readings are beyond the range of the device that they are said to come from."""
     beyond = np.flatnonzero(device.beyond_range(data)).tolist()
@@ -150,10 +166,9 @@ def check_range(data: Dataset, device: Ranged) -> list[Notice]:
     where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in beyond]
     words = _listed(["/".join(one) for one in where])
     return [
-        Notice(
-            "beyond-range",
+        BEYOND_RANGE(
             f"{counted(len(beyond), 'reading')} {_are(beyond)} beyond what the device {device.name} can read "
-            f"(configuration/target): {words}. It is a {device.summary}. Check the units, and that it was this device.",
+            f"(configuration/target): {words}. It is a {device.summary}.",
             at=tuple(where),
         )
     ]
@@ -166,19 +181,19 @@ def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
         suspects: What was found, of some readings more than once.
     """
     advice = {
-        "outliers": (
+        OUTLIERS: (
             "reading is far from where it must be",
             "Measure it again or leave it out; `loss=cauchy` lets it count little.",
             "readings are far from where they must be",
             "Measure them again or leave them out; `loss=cauchy` lets them count little.",
         ),
-        "targets-swapped": (
+        TARGETS_SWAPPED: (
             "target was taken for another one of its configuration",
             "Exchange their names in the file.",
             "targets of the same configuration were taken for each other",
             "Exchange their names in the file.",
         ),
-        "target-mistaken": (
+        TARGET_MISTAKEN: (
             "reading was taken from another point than it names",
             "Leave these cells empty, or measure it again.",
             "readings were taken from another point than they name",
@@ -186,18 +201,18 @@ def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
         ),
     }
     told: dict[tuple[str, str], Suspect] = {}
-    for code in ("targets-swapped", "target-mistaken", "outliers"):
+    for rule in (TARGETS_SWAPPED, TARGET_MISTAKEN, OUTLIERS):
         for one in suspects:
-            if one.code == code:
+            if one.rule == rule:
                 told.setdefault((one.configuration, one.target), one)
     notices = []
-    for code, words in advice.items():
-        mine = [s for s in dict.fromkeys(suspects) if s.code == code and told[s.configuration, s.target] == s]
+    for rule, words in advice.items():
+        mine = [s for s in dict.fromkeys(suspects) if s.rule == rule and told[s.configuration, s.target] == s]
         if mine:
             what, cure = words[:2] if len(mine) == 1 else words[2:]
             named = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in mine]
             message = f"{len(mine)} {what} (configuration/target): {_listed(named)}. {cure}"
-            notices.append(Notice(code, message, at=tuple((s.configuration, s.target) for s in mine)))
+            notices.append(rule(message, at=tuple((s.configuration, s.target) for s in mine)))
     return notices
 
 
@@ -237,9 +252,9 @@ def _mistaken_references(data: Dataset) -> list[tuple[int, int, Suspect]]:
         neighbours = [k for k in (c - 1, c + 1) if 0 <= k < data.configurations and np.isfinite(off[k, t])]
         alone = bool(neighbours) and all(off[k, t] <= allowed for k in neighbours)
         if nearest and gaps[nearest] < SAME_POINT:
-            found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], f"is {nearest}")))
+            found.append((c, t, Suspect(TARGET_MISTAKEN, data.labels[c], names[t], f"is {nearest}")))
         elif alone and off[c, t] > _FAR:
-            found.append((c, t, Suspect("outliers", data.labels[c], names[t], f"{millimetres(off[c, t])} mm off")))
+            found.append((c, t, Suspect(OUTLIERS, data.labels[c], names[t], f"{millimetres(off[c, t])} mm off")))
     return found
 
 
@@ -248,6 +263,13 @@ def _places(points: Array) -> tuple[Array, Array, float]:
     usual = _nanmedian(points)
     off = np.linalg.norm(points - usual, axis=2)
     return usual, off, max(UNMOVED, DEVIATIONS * float(_nanmedian(off.reshape(-1))))
+
+
+REFERENCE_MOVED: Final = Rule(
+    "reference-moved",
+    "warning",
+    "reference points beside the robot that moved by more than 0.1 mm",
+)
 
 
 def _moved(data: Dataset) -> list[Notice]:
@@ -261,8 +283,7 @@ def _moved(data: Dataset) -> list[Notice]:
     where = np.flatnonzero(moved.any(axis=1))
     names = [n for n, is_moved in zip(data.references.targets, np.any(moved, axis=0).tolist(), strict=True) if is_moved]
     return [
-        Notice(
-            "reference-moved",
+        REFERENCE_MOVED(
             f"Reference points moved by up to {float(np.nanmax(off)) * 1e3:.2f} mm ({', '.join(names)}; "
             f"{counted(len(where), 'configuration')}: {_listed([data.labels[c] for c in where])}). The robot's table "
             "or the instrument moved: where three points moved together the motion is removed, elsewhere leave these "
@@ -300,6 +321,14 @@ def check_joints(robot: Robot, data: Dataset | Inclinations) -> None:
 # -- bookkeeping -------------------------------------------------------------------------------------------
 
 
+MISSING: Final = Rule(
+    "missing",
+    "warning",
+    "empty readings",
+    gravity=0,
+)
+
+
 def _missing(data: Dataset, excluded: Mapping[str, int]) -> list[Notice]:
     counts: dict[str, int] = {}
     for part in [data] if data.references is None else [data, data.references]:
@@ -322,7 +351,15 @@ def _missing(data: Dataset, excluded: Mapping[str, int]) -> list[Notice]:
         return []
     words = _listed([f"{count} of target {name}" for name, count in counts.items() if count])
     left = "is missing ({}). It is left out" if total == 1 else "are missing ({}). They are left out"
-    return [Notice("missing", f"{counted(total, 'reading')} {left.format(words)}; nothing needs to be done.")]
+    return [MISSING(f"{counted(total, 'reading')} {left.format(words)}; nothing needs to be done.")]
+
+
+TARGET_MISSPELT: Final = Rule(
+    "target-misspelt",
+    "error",
+    "a name of a target that stands where another one is missing; two names that differ in case, blanks, hyphens or "
+    "leading zeros, or are like each other at the same point of the flange, and are never read together",
+)
 
 
 def _misnamed(data: Dataset) -> list[Notice]:
@@ -365,11 +402,9 @@ def _misnamed(data: Dataset) -> list[Notice]:
     if not found:
         return []
     return [
-        Notice(
-            "target-misspelt",
+        TARGET_MISSPELT(
             f"Names of targets look like slips: {'; '.join(found[:_MOST_NAMED])}. A misspelt name is a target of its "
             "own. Correct the names.",
-            "error",
         )
     ]
 

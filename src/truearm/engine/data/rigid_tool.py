@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import Notice, counted, millimetres
+from truearm.engine.base.errors import Notice, Rule, counted, millimetres
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.robot.chain import Array
@@ -72,7 +72,7 @@ def lengths_noticed(data: Dataset, factor: Array) -> tuple[str, tuple[tuple[str,
 def length_notice(data: Dataset, factor: Array) -> Notice:
     """Return the error about readings in another unit than the others, as `lengths_noticed` takes them."""
     words, at = lengths_noticed(data, factor)
-    return Notice("unit-length", f"{words}.", "error", at=at)
+    return UNIT_LENGTH(f"{words}.", at=at)
 
 
 def _names(data: Dataset, mine: NDArray[np.bool_]) -> str:
@@ -183,7 +183,33 @@ def grouped_medians(groups: IntArray, values: Array) -> tuple[IntArray, Array]:
     return names, (ordered[first + (count - 1) // 2] + ordered[first + count // 2]) / 2
 
 
-Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
+UNIT_LENGTH: Final = Rule(
+    "unit-length",
+    "error",
+    "positions that fit when they are so many times larger or smaller, all of them, one column, or [those of some "
+    "rows](check.md#rows-in-another-unit-of-length); or that lie far beyond the reach, and no one unit makes them "
+    "fit",
+)
+OUTLIERS: Final = Rule(
+    "outliers",
+    "warning",
+    "a reading that does not keep its distances to the other targets, or lies far from where a robust fit puts it; "
+    "or 5 % of the readings and more that are six times farther off than half of all",
+)
+TARGETS_SWAPPED: Final = Rule(
+    "targets-swapped",
+    ("warning", "error"),
+    "two targets of a configuration that were exchanged (without a robot not told where distances are the same with "
+    "exchanged names, as on an equilateral triangle)",
+    gravity=2,
+)
+TARGET_MISTAKEN: Final = Rule(
+    "target-mistaken",
+    ("warning", "error"),
+    "a reading that is where another target or a reference point is, or where its target was before; an error where "
+    "it pulls the fit, with the losses `linear` and `huber`",
+    gravity=2,
+)
 
 #: A distance, or a place, that holds better than this is never doubted [m].
 UNMOVED: Final = 1e-4
@@ -211,7 +237,7 @@ _EXPLAINED: Final = 0.3
 class Suspect:
     """A reading that cannot be what it says."""
 
-    code: Suspicion  #: What it seems to be.
+    rule: Rule  #: What it seems to be.
     configuration: str  #: configuration, target: label and name.
     target: str
     words: str = ""  #: What it looks like, for example ``is target 2``.
@@ -312,7 +338,7 @@ def _blamed(data: Dataset, distances: _Distances, c: int, known: dict[str, Array
         usual = distances.usual_between(seen)
         swap = _swap(here, usual, allowed)
         if swap:
-            return [Suspect("targets-swapped", label, names[seen[a]], f"is target {names[seen[b]]}") for a, b in swap]
+            return [Suspect(TARGETS_SWAPPED, label, names[seen[a]], f"is target {names[seen[b]]}") for a, b in swap]
         alone = _off_without_each(here, usual) <= _EXPLAINED * allowed
     wrong: NDArray[np.bool_] = distances.share[mine] >= _WRONG_SHARE
     if len(seen) > 2 and wrong.sum() > 1:
@@ -346,8 +372,8 @@ def suspect(point: Array, label: str, target: str, size: float, known: dict[str,
     gaps = {name: float(np.linalg.norm(point - place)) for name, place in known.items() if np.isfinite(place).all()}
     nearest = min(gaps, key=lambda name: gaps[name]) if gaps else None
     if nearest is not None and gaps[nearest] < SAME_POINT < size:
-        return Suspect("target-mistaken", label, target, f"is {nearest}")
-    return Suspect("outliers", label, target, f"{millimetres(size)} mm off")
+        return Suspect(TARGET_MISTAKEN, label, target, f"is {nearest}")
+    return Suspect(OUTLIERS, label, target, f"{millimetres(size)} mm off")
 
 
 def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice, counted, listed
+from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.dataset_fields import drawn_from
 
@@ -18,6 +18,14 @@ _LARGEST_CHANGE: Final = 5e-3
 #: A joint comes back to a posture within this [rad or m]: a hundredth of a degree or of a millimetre.
 _SAME_ANGLE: Final = math.radians(0.01)
 _SAME_LENGTH: Final = 1e-5
+
+
+DUPLICATES: Final = Rule(
+    "duplicates",
+    "warning",
+    "readings that repeat another one to the last digit",
+    gravity=2,
+)
 
 
 def check_duplicates(data: Dataset) -> list[Notice]:
@@ -36,8 +44,7 @@ def check_duplicates(data: Dataset) -> list[Notice]:
     if not found:
         return []
     return [
-        Notice(
-            "duplicates",
+        DUPLICATES(
             f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
             f"(target at configurations): {listed(found)}. Rows were copied, or the instrument stood still: remove "
             f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
@@ -105,14 +112,20 @@ def repeated_joints(data: Dataset) -> list[tuple[str, str]]:
     return [(data.labels[a], data.labels[b]) for b, a in pairs.items()]
 
 
+JOINTS_REPEATED: Final = Rule(
+    "joints-repeated",
+    "warning",
+    "joint positions that repeat those of another configuration to the last digit, with readings more than 5 mm apart",
+)
+
+
 def repeated_joints_notices(data: Dataset, pairs: list[tuple[str, str]]) -> list[Notice]:
     """Say which joint positions were copied from another configuration."""
     if not pairs:
         return []
     words = [f"{b} (those of {a})" for a, b in pairs]
     return [
-        Notice(
-            "joints-repeated",
+        JOINTS_REPEATED(
             f"{counted(len(pairs), 'configuration')} of {data.source} {'has' if len(pairs) == 1 else 'have'} the joint "
             f"positions of another one to the last digit, and readings more than {_LARGEST_CHANGE * 1e3:g} mm from "
             f"its readings: {listed(words)}. The joint positions were copied: mend them, or leave these configurations "

@@ -6,8 +6,9 @@ import math
 from itertools import combinations
 from typing import Final
 
-from truearm.engine.base.errors import Notice, listed
+from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.diagnose.expected_error import ExpectedError
+from truearm.engine.diagnose.unmodelled import ANY_ERROR, PULLED_AWAY
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.conventions.parallel import parallel_joints_without_beta
 from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
@@ -25,24 +26,59 @@ _LEAST_INFORMED: Final = 0.5
 _LARGEST_UNINFORMED_SHARE: Final = 0.05
 
 
-def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> list[Notice]:
+NOT_CONVERGED: Final = Rule(
+    "not-converged",
+    "error",
+    "the status, with reasons or names",
+)
+RANK_LOSS: Final = Rule(
+    "rank-loss",
+    "error",
+    "the status, with reasons or names",
+)
+CLOSED_LOOP: Final = Rule(
+    "closed-loop",
+    "note",
+    "nothing says where the robot stands ([instruments](devices.md)): the unobservable parameters, and how accurate "
+    "predicted positions are; where no length was measured, also without errors of the scale",
+)
+AT_BOUND: Final = Rule(
+    "at-bound",
+    "warning",
+    "the status, with names",
+)
+REDUNDANT: Final = Rule(
+    "redundant",
+    "note",
+    "parameters were held; the combinations are named",
+)
+RESIDUALS_EXCEED_SIGMA: Final = Rule(
+    "residuals-exceed-sigma",
+    "warning",
+    "the robot does more than the model, or sigma is too small",
+    unless=frozenset({PULLED_AWAY}),
+)
+URDF_PARTIAL: Final = Rule(
+    "urdf-partial",
+    "note",
+    "what the URDF could not hold",
+)
+
+
+def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
     """Return what a fit says about its model, its data and its parameters.
 
     Args:
         expected: Of the fit, over the workspace.
-        doubted: Whether the data, or the robot, are known to be wrong: nothing is said of where its parameters went
-            then.
     """
     found = _parallel_axes(fit)
     if fit.status is Status.NOT_CONVERGED:
-        found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}", "error"))
+        found.append(NOT_CONVERGED(f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
     if fit.unobservable:
         found.append(
-            Notice(
-                "rank-loss",
+            RANK_LOSS(
                 f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend "
                 f"on them. {Status.RANK_LOSS.advice}",
-                "error",
             )
         )
     if fit.gauge_freedoms:
@@ -61,28 +97,24 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
         if fit.unobservable_combinations:
             held = "; ".join(fit.unobservable_combinations)
             words += f" Unobservable combinations of parameters, held at nominal values: {held}."
-        found.append(Notice("closed-loop", words, "note"))
+        found.append(CLOSED_LOOP(words))
     if fit.at_bound:
-        found.append(Notice("at-bound", f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
+        found.append(AT_BOUND(f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
     if fit.redundancies:
         combinations = "; ".join(f"{r.dropped} ({r.combination})" for r in fit.redundancies)
         alike = (
             "" if fit.unobservable else " At configurations like the measured ones predictions hardly depend on them."
         )
         found.append(
-            Notice(
-                "redundant",
+            REDUNDANT(
                 f"Redundant parameters are held at their nominal values: {combinations}. The readings hardly observe "
                 f"the combinations in brackets.{alike}",
-                "note",
             )
         )
-    found += [] if doubted else _far_from_nominal(fit)
     shared = fit.joint_error.any() and not fit.scattered
     if fit.excess > 1.0:
         found.append(
-            Notice(
-                "residuals-exceed-sigma",
+            RESIDUALS_EXCEED_SIGMA(
                 f"The residuals are {fit.excess:.1f} times what the declared deviations"
                 f"{', and errors of the joints that readings of a configuration share,' if shared else ''} allow. "
                 f"Either the robot does something that the {fit.model.name} model cannot express, or sigma is too "
@@ -94,15 +126,20 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
         effects = ", ".join(fit.robot.effect_names)
         own = [p.name for effect in fit.robot.effects for p in effect.parameters]
         found.append(
-            Notice(
-                "urdf-partial",
+            URDF_PARTIAL(
                 f"calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold {effects} "
                 f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
                 "and the targets in the instrument's frame. calibrated.yaml holds everything.",
-                "note",
             )
         )
     return found
+
+
+PARALLEL_AXES: Final = Rule(
+    "parallel-axes",
+    "warning",
+    "the convention cannot tilt parallel axes: give `beta`, or convert an S-model",
+)
 
 
 def _parallel_axes(fit: Fit) -> list[Notice]:
@@ -121,15 +158,25 @@ def _parallel_axes(fit: Fit) -> list[Notice]:
         else f"Write 'convention: {better}' in the robot file and 'beta: 0' at the link between them."
     )
     return [
-        Notice(
-            "parallel-axes",
+        PARALLEL_AXES(
             f"Joints {names} are parallel. The model has no beta that lets them tilt against each other, so it "
             f"cannot follow the real robot. {cure}",
         )
     ]
 
 
-def _far_from_nominal(fit: Fit) -> list[Notice]:
+FAR_FROM_NOMINAL: Final = Rule(
+    "far-from-nominal",
+    "note",
+    "an angle, a joint zero or a gain moved by more than six standard deviations of its prior: a robot that was "
+    "mastered badly, or not the nominal values of its controller; `compensate`, `ik` and `export` repeat it",
+    cure="Check that the nominal values are those of its controller: corrections of programs are wrong by what they "
+    "differ. If they are, enter wider priors in the robot file.",
+    unless=frozenset({ANY_ERROR}),
+)
+
+
+def check_far_from_nominal(fit: Fit) -> list[Notice]:
     """Say which parameters, lengths apart, are farther from their nominal values than their priors let expect."""
     far = [
         p.name
@@ -141,15 +188,48 @@ def _far_from_nominal(fit: Fit) -> list[Notice]:
     if not far:
         return []
     return [
-        Notice(
-            "far-from-nominal",
+        FAR_FROM_NOMINAL(
             f"{listed(far)} moved by more than {_LARGEST_MOVE:g} standard deviations of "
-            f"{'its prior' if len(far) == 1 else 'their priors'}. A robot that was never mastered well is so far off. "
-            "Check that the nominal values are those of its controller: corrections of programs are wrong by what they "
-            "differ. If they are, enter wider priors in the robot file.",
-            "note",
+            f"{'its prior' if len(far) == 1 else 'their priors'}. A robot that was never mastered well is so far off.",
         )
     ]
+
+
+EFFECTS_IDLE: Final = Rule(
+    "effects-idle",
+    "warning",
+    "joint effects of the robot file that are zero and that the model does not free",
+    gravity=0,
+)
+NO_LOADS: Final = Rule(
+    "no-loads",
+    "warning",
+    "a model with compliance, and a robot without masses and payload",
+    cure="Give masses in the robot file, or `payload`.",
+)
+BEARING_ASSUMED: Final = Rule(
+    "bearing-assumed",
+    "warning",
+    "the robot file does not say where bearings of joints that tilt lie; they are [taken at the joints' "
+    "origins](models.md#bearings)",
+    gravity=0,
+)
+TOO_MANY_EFFECTS: Final = Rule(
+    "too-many-effects",
+    "warning",
+    "the data inform too many of them by less than half: take fewer effects, or more configurations",
+)
+NEGATIVE_EFFECT: Final = Rule(
+    "negative-effect",
+    "warning",
+    "a compliance, a backlash or a clearance came out negative: masses, payload or gravity may be wrong",
+)
+EFFECTS_UNINFORMED: Final = Rule(
+    "effects-uninformed",
+    "warning",
+    "parameters of joint effects that the data do not inform, by name",
+    gravity=0,
+)
 
 
 def _check_effects(fit: Fit) -> list[Notice]:
@@ -165,8 +245,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
     ]
     if idle:
         found.append(
-            Notice(
-                "effects-idle",
+            EFFECTS_IDLE(
                 f"The robot file has the joint effects {', '.join(idle)} with all values zero, and the model "
                 f"{fit.model.name} does not free them. Add `effects={idle[0]}`, or take them out of the file.",
             )
@@ -178,16 +257,13 @@ def _check_effects(fit: Fit) -> list[Notice]:
     unknown += [r.dropped for r in fit.redundancies if r.dropped in effects]
     if any(effect.loaded for effect in robot.effects) and not has_weight(robot):
         found.append(
-            Notice(
-                "no-loads",
-                "The robot has no link masses and no payload, so nothing loads its joints. Compliance cannot be found. "
-                "Give masses in the robot file, or `payload`.",
+            NO_LOADS(
+                "The robot has no link masses and no payload, so nothing loads its joints. Compliance cannot be found.",
             )
         )
     elif unknown:
         found.append(
-            Notice(
-                "effects-uninformed",
+            EFFECTS_UNINFORMED(
                 f"The data say nothing about {', '.join(unknown)}. Either nothing loads these joints that way (gravity "
                 "does not turn a vertical axis), or there are too few configurations for so many effects. The values "
                 "stay near zero.",
@@ -201,8 +277,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
     ]
     if assumed:
         found.append(
-            Notice(
-                "bearing-assumed",
+            BEARING_ASSUMED(
                 f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are "
                 "taken at the joints' origins, and so are the moments that tilt them. If drawings tell, enter "
                 "the entry bearing of these joints in the robot file.",
@@ -211,8 +286,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
     vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _LEAST_INFORMED]
     if len(vague) > _LARGEST_UNINFORMED_SHARE * len(own):
         found.append(
-            Notice(
-                "too-many-effects",
+            TOO_MANY_EFFECTS(
                 f"Of {len(own)} parameters of joint effects, {len(vague)} rest more on their priors than on the data: "
                 f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}. There are too few configurations "
                 f"for so many effects. Measure more{'' if fit.model.tried else ', or let `model=auto` choose'}.",
@@ -221,8 +295,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
     soft = _negative(fit)
     if soft:
         found.append(
-            Notice(
-                "negative-effect",
+            NEGATIVE_EFFECT(
                 f"{', '.join(soft)} came out negative, as no spring and no play is: masses, payload or gravity may be "
                 "wrong, or the parameter stands for something else that the model lacks.",
             )

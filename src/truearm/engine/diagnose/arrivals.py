@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import Notice
+from truearm.engine.base.errors import Notice, Rule
 from truearm.engine.base.units import from_si
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
+from truearm.engine.diagnose.unmodelled import ANY_ERROR, LeftOver, chi_squared_tail
 from truearm.engine.fit.likelihood import Arrivals, Linearised
 from truearm.engine.fit.rounds import DECLARED, factors_of
 from truearm.engine.fit.variance_components import Variances, largest_likelihood
@@ -208,6 +208,13 @@ def _last_moves(data: Dataset, number: Array) -> Array:
     return moves
 
 
+JOINTS_NOT_SETTLED: Final = Rule(
+    "joints-not-settled",
+    "warning",
+    "residuals that depend on the direction from which each joint arrived",
+)
+
+
 def check_arrival_lag(left_over: LeftOver) -> list[Notice]:
     """Return a notice if the joints were not at rest."""
     found = arrival_lag(left_over)
@@ -216,8 +223,7 @@ def check_arrival_lag(left_over: LeftOver) -> list[Notice]:
     units = ["deg" if kind == "revolute" else "mm" for kind in left_over.problem.data.joint_kinds]
     shown = ", ".join(f"{from_si(lag, unit):+.3f} {unit}" for lag, unit in zip(found.lags.tolist(), units, strict=True))
     return [
-        Notice(
-            "joints-not-settled",
+        JOINTS_NOT_SETTLED(
             f"The direction from which each joint arrived explains {found.share:.0%} of the residuals. The true joint "
             f"positions differ from the recorded ones by {shown}, times the sign of the last move. Either the joints "
             "were read before the robot had settled: use the commanded joints, or read later. Or the joints have "
@@ -242,6 +248,16 @@ _LEAST_SHARE: Final = 0.5
 _LEAST_SHARED: Final = 8
 
 
+SEPARATE_VISITS: Final = Rule(
+    "separate-visits",
+    "warning",
+    "readings of a configuration err as joints err, but each by itself: give the column `visit`",
+    cure="Add the column `visit`, with the number of the visit on which each reading was taken; without it the "
+    "expected error and all intervals are too small.",
+    unless=frozenset({ANY_ERROR}),
+)
+
+
 def check_separate_visits(left: LeftOver) -> list[Notice]:
     """Return a notice if the readings of a configuration do not share the errors of the joints that they show."""
     data = left.problem.data
@@ -256,12 +272,10 @@ def check_separate_visits(left: LeftOver) -> list[Notice]:
     if 2.0 * (each - shared) < _LEAST_GAIN:
         return []
     return [
-        Notice(
-            "separate-visits",
+        SEPARATE_VISITS(
             "The readings of a configuration err as joints err, but each by itself, where readings of one arrival "
             "share the errors of the joints. So the targets were read on separate visits: the robot left and came back "
-            "between them. Add the column `visit`, with the number of the visit on which each reading was taken; "
-            "without it the expected error and all intervals are too small.",
+            "between them.",
         )
     ]
 
@@ -285,6 +299,15 @@ _LEAST_MOVED: Final = 0.1
 #: One target hardly tells noise from errors of the joints: beyond so many times no number is given.
 _MOST_TOLD: Final = 10.0
 _SMALLEST_RATIO: Final = 1e-7
+
+
+SIGMA_TOO_LARGE: Final = Rule(
+    "sigma-too-large",
+    ("warning", "error"),
+    "the declared deviations are more than twice what the readings scatter by, or 1.5 times the noise that they show "
+    "beside errors of the joints: [more](results.md#standard-deviations)",
+    gravity=2,
+)
 
 
 # Residuals alone may not show a sigma that is too large. Where sigma is so large that the priors hold the parameters
@@ -329,8 +352,7 @@ def check_sigma(left: LeftOver) -> list[Notice]:
     words = f"The declared deviations{size} are about {_rounded(times)} times larger than what the readings scatter by"
     if declared > _PRIORS_WIN * found:
         return [
-            Notice(
-                "sigma-too-large",
+            SIGMA_TOO_LARGE(
                 f"{words}. So the priors hold the robot near its nominal values, and it is "
                 f"{_rounded(declared / found)} times farther from the readings than it need be. Mend sigma or its "
                 "unit, or leave it out: the noise is then estimated.",
@@ -338,8 +360,7 @@ def check_sigma(left: LeftOver) -> list[Notice]:
             )
         ]
     return [
-        Notice(
-            "sigma-too-large",
+        SIGMA_TOO_LARGE(
             f"{words}. The deviations of the parameters are too large by about as much. Mend sigma or its unit, or "
             "leave it out: the noise is then estimated.",
         )
@@ -364,8 +385,7 @@ def check_sigma_beside_joints(left: LeftOver) -> list[Notice]:
     part = f"{_rounded(100.0 * smaller)} %" if smaller > 0.0 else "none"
     times = f"about {_rounded(1.0 / share)}" if share > 1.0 / _MOST_TOLD else f"more than {_MOST_TOLD:g}"
     return [
-        Notice(
-            "sigma-too-large",
+        SIGMA_TOO_LARGE(
             f"The declared deviations{_size(left)} are {times} times larger than the noise that the readings show "
             f"beside errors of the joints. So the fit takes errors of the joints for noise: it finds {part} of them, "
             "and the expected error and the intervals may be too small. Declare one standard deviation "

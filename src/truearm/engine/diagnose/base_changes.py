@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice, counted, did_you_mean
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, did_you_mean
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.observations import OBSERVATIONS
@@ -191,6 +191,13 @@ def _moved(data: Dataset, part: NDArray[np.intp], motions: Sequence[Motion]) -> 
     return replace(data, position=position, quaternion=quaternion)
 
 
+BASE_CHANGED: Final = Rule(
+    "base-changed",
+    "note",
+    "readings were moved into the frame of the first base (`--base-changes`)",
+)
+
+
 def _told(before: Dataset, after: Dataset, part: NDArray[np.intp]) -> Notice:
     """Say how far the readings of each part were moved."""
     gaps = np.linalg.norm(after.position - before.position, axis=1)
@@ -200,10 +207,8 @@ def _told(before: Dataset, after: Dataset, part: NDArray[np.intp]) -> Notice:
         number_of = np.where(part == number, np.asarray(before.number), np.inf)
         label = before.labels[int(np.argmin(number_of))]
         words.append(f"from {label} on by {float(np.sqrt(np.mean(gaps[mine] ** 2))) * 1e3:.3g} mm")
-    return Notice(
-        "base-changed",
+    return BASE_CHANGED(
         f"Readings were moved into the frame of the first base: {', '.join(words)} (root mean square). The motion was "
         "found along with the model from the training configurations and counts as known: no deviation contains what "
         "is not known of it.",
-        "note",
     )

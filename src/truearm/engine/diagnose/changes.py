@@ -26,7 +26,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import Notice
+from truearm.engine.base.errors import Notice, Rule
+from truearm.engine.diagnose.off_configurations import Off
 from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
 from truearm.engine.robot.chain import Array
 
@@ -216,6 +217,50 @@ def check_changes(left: LeftOver) -> list[Notice]:
     return [] if change is None else notices_of_change(left, change)
 
 
+def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
+    """Return what a fit leaves without configurations that are off one by one, and what moved during the others.
+
+    A single configuration that is far off looks like something that moved. Nothing is returned where nothing moved.
+    """
+    rest = left.without(() if is_a_part(off) else off.indices)
+    change = find_change(rest)
+    return None if change is None else (rest, change)
+
+
+def is_a_part(off: Off) -> bool:
+    """Return whether what is off is a part of the campaign, so long that its beginning can be found."""
+    return off.in_a_row and len(off.configurations) >= LEAST_ARRIVALS
+
+
+INSTRUMENT_MOVED: Final = Rule(
+    "instrument-moved",
+    ("warning", "error"),
+    "all readings stand elsewhere from a configuration on: [what moved](check.md#what-moved-during-the-campaign)",
+    gravity=2,
+)
+TARGET_MOVED: Final = Rule(
+    "target-moved",
+    ("warning", "error"),
+    "one target stands elsewhere from a configuration on: [what moved](check.md#what-moved-during-the-campaign)",
+    gravity=2,
+)
+JOINT_ZERO_JUMPED: Final = Rule(
+    "joint-zero-jumped",
+    ("warning", "error"),
+    "a joint's zero is another from a configuration on: [what moved](check.md#what-moved-during-the-campaign)",
+    gravity=2,
+)
+DRIFT: Final = Rule(
+    "drift",
+    "warning",
+    "all readings moved evenly during the campaign: [what moved](check.md#what-moved-during-the-campaign)",
+    gravity=2,
+)
+#: Codes of what moved during a campaign.
+_RULES: Final = {rule.code: rule for rule in (INSTRUMENT_MOVED, TARGET_MOVED, JOINT_ZERO_JUMPED, DRIFT)}
+OF_CHANGES: Final = frozenset(_RULES)
+
+
 def notices_of_change(left: LeftOver, change: Change) -> list[Notice]:
     """Return a notice of what moved during the campaign."""
     data = left.problem.data
@@ -248,7 +293,7 @@ def notices_of_change(left: LeftOver, change: Change) -> list[Notice]:
         if change.by_file
         else ""
     )
-    return [Notice(change.kind, words[change.kind] + taken, level)]
+    return [_RULES[change.kind](words[change.kind] + taken, level)]
 
 
 def _size(left: LeftOver, change: Change) -> str:

@@ -10,10 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice, counted
+from truearm.engine.base.errors import Notice, Rule, counted
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.unmodelled import LeftOver
+from truearm.engine.diagnose.unmodelled import ANY_ERROR, LeftOver
 from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.compliance import Compliance
@@ -66,6 +66,24 @@ def about_curves(fit: Fit, configurations: int) -> str:
     return words[0].upper() + words[1:] + "."
 
 
+CURVE_LEFT_OUT: Final = Rule(
+    "curve-left-out",
+    "note",
+    "joints for which the data show no [curve](joint-curves.md), or that turned too little to tell one from geometry",
+)
+CURVES_AND_FOURIER: Final = Rule(
+    "curves-and-fourier",
+    "note",
+    "a model with `joint-curve` and `fourier`, which curves contain",
+    gravity=0,
+)
+CURVE_RANGE: Final = Rule(
+    "curve-range",
+    "note",
+    "curves of joints that were measured through a part of the turn only: known there, and uncertain elsewhere",
+)
+
+
 def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
     """Say which joints got no curve, and where the others are known.
 
@@ -94,30 +112,24 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
             words.append(f"{', '.join(little)} turned too little to tell such an error from geometry")
         sentence = "; ".join(words)
         found.append(
-            Notice(
-                "curve-left-out",
+            CURVE_LEFT_OUT(
                 f"Joints without a curve (in brackets how far each turned): {sentence}. More configurations, through "
                 "more of the turn, may show one.",
-                "note",
             )
         )
     if Fourier.name in fit.model.effects:
         found.append(
-            Notice(
-                "curves-and-fourier",
+            CURVES_AND_FOURIER(
                 "The model has curves of the joints and the effect fourier, whose one and two periods a turn curves "
                 "contain. The readings do not tell the two apart: leave fourier out.",
-                "note",
             )
         )
     if partly:
         found.append(
-            Notice(
-                "curve-range",
+            CURVE_RANGE(
                 f"Curves of joints are known where these were measured: {'; '.join(partly)}. Outside they are what "
                 "was found there, continued. The expected error over the workspace contains what that may be off by, "
                 "as far as other joints and ordinary encoders tell.",
-                "note",
             )
         )
     return found
@@ -132,6 +144,16 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
 _MOST: Final = 0.6
 
 
+CURVES_OF_LOADS: Final = Rule(
+    "curves-of-loads",
+    "warning",
+    "no `compliance` in the model, and it would do most of what the [curves](models.md#curves) do: they are right "
+    "for one payload only",
+    cure="Compare with `effects=compliance` beside them, or with `model=auto`.",
+    unless=frozenset({ANY_ERROR}),
+)
+
+
 def check_curves_of_loads(left: LeftOver) -> list[Notice]:
     """Say if joints that give way would do most of what the curves of a fit do.
 
@@ -141,12 +163,9 @@ def check_curves_of_loads(left: LeftOver) -> list[Notice]:
     if share < _MOST:
         return []
     return [
-        Notice(
-            "curves-of-loads",
+        CURVES_OF_LOADS(
             f"Joints that give way under their loads would do {share:.0%} of what the curves of the joints do, with "
-            "one number a joint. The curves are then right for this payload and mounting only. Compare with "
-            "`effects=compliance` beside them, or with `model=auto`.",
-            "warning",
+            "one number a joint. The curves are then right for this payload and mounting only.",
         )
     ]
 
@@ -185,6 +204,14 @@ _LEAST: Final = 8
 _BEYOND_CHANCE: Final = 21.1
 
 
+OUTLIERS_ONE_SIDED: Final = Rule(
+    "outliers-one-sided",
+    "warning",
+    "readings that a loss holds back lie to one side",
+    cure="Find the cause and leave these readings out.",
+)
+
+
 # Readings that a robust loss holds back, and that lie to one side.
 #
 # Losses such as Huber's are right on average where outliers scatter to all sides. Outliers that lie to one side pull
@@ -212,12 +239,10 @@ def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
         return []
     shift = ", ".join(f"{v * 1e3:+.2g}" for v in np.median(off, axis=0).tolist())
     return [
-        Notice(
-            "outliers-one-sided",
+        OUTLIERS_ONE_SIDED(
             f"{int(held.sum())} readings at {len(count)} configurations are held back as outliers, and they lie to one "
             f"side: by ({shift}) mm in the instrument's axes, in the median. Outliers to one side pull the fit along, "
-            "and the deviations of the parameters do not contain that bias. Find the cause and leave these readings "
-            "out.",
+            "and the deviations of the parameters do not contain that bias.",
         )
     ]
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
-from truearm.engine.base.errors import Notice, counted
+from truearm.engine.base.errors import Notice, Rule, counted
 from truearm.engine.base.limits import limit
 from truearm.engine.data.checks import check_data, check_range
 from truearm.engine.data.dataset import Dataset
@@ -58,20 +59,33 @@ def compared_with(
     return notices, against.fit, against.believed
 
 
+NOT_COMPARED: Final = Rule(
+    "not-compared",
+    "warning",
+    "no target was read at four configurations: a name of its own for every reading?",
+    cure="Readings of the same point on the tool have the same target.",
+    gravity=2,
+)
+
+
 def _too_seldom(data: Dataset) -> Notice:
-    return Notice(
-        "not-compared",
+    return NOT_COMPARED(
         f"{counted(len(data.targets), 'target')} of {counted(data.configurations, 'configuration')} were not compared "
         "with the robot: none was read at four configurations or more, so that nothing is said of the robot. Does "
-        "every reading have a name of its own? Readings of the same point on the tool have the same target.",
+        "every reading have a name of its own?",
     )
 
 
+COMPARED_IN_PART: Final = Rule(
+    "compared-in-part",
+    "note",
+    "the data are large, and a part of them was compared with the robot",
+)
+
+
 def _in_part(part: Dataset, data: Dataset) -> Notice:
-    return Notice(
-        "compared-in-part",
+    return COMPARED_IN_PART(
         f"The data are large: {part.configurations} of {counted(data.configurations, 'configuration')} and "
         f"{len(part.targets)} of {counted(len(data.targets), 'target')} were compared with the robot, evenly spaced "
         "and read most often. What is far off elsewhere was not looked for.",
-        "note",
     )

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice
+from truearm.engine.base.errors import Notice, Rule
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.loads import joint_efforts
 from truearm.engine.robot.parameters import Parameter
@@ -24,6 +24,15 @@ _MOST: Final = 450.0
 _PLACES: Final = 200
 
 
+PAYLOAD_UNLIKELY: Final = Rule(
+    "payload-unlikely",
+    "warning",
+    "the payload is ten times beyond what the strongest arms of this reach carry (450 kg times the cube of the reach "
+    "in metres): grams called kilograms?",
+    gravity=2,
+)
+
+
 def check_payload(robot: Robot) -> list[Notice]:
     """Return a notice if the payload is ten times beyond what the strongest arms of this reach carry."""
     mass = robot.payload.mass
@@ -34,8 +43,7 @@ def check_payload(robot: Robot) -> list[Notice]:
     if mass <= _MOST * reach**3:
         return []
     return [
-        Notice(
-            "payload-unlikely",
+        PAYLOAD_UNLIKELY(
             f"The payload is {mass:.4g} kg, and {robot.name} reaches {reach:.2g} m: no arm of that size carries more "
             f"than {_MOST * reach**3:.2g} kg. Were grams called kilograms? What loads the joints follows from it.",
         )
@@ -67,6 +75,20 @@ class _Bending:
     rigid: bool  #: Whether no joint gives way although the force loads some.
 
 
+FORCE_TAKEN: Final = Rule(
+    "force-taken",
+    "note",
+    "how far the force moves the tip at most, and how well that is known",
+)
+FORCE_ON_RIGID_MODEL: Final = Rule(
+    "force-on-rigid-model",
+    "warning",
+    "the model has no joints that give way, so the force changes nothing",
+    cure="Calibrate with a model that has compliance, for instance elastic.",
+    gravity=2,
+)
+
+
 # Gravity loads the joints of a calibration, and nothing else does: it never turns the upright axis of joint 1, so its
 # compliance stays what the prior said, and no prediction at rest depends on it. A sideways force at the tool turns that
 # joint. What each parameter of the joints' elasticity does to the tip is compared with and without the force; with the
@@ -87,10 +109,9 @@ def check_force(cases: Sequence[tuple[Robot, Array | Postures]]) -> list[Notice]
     made = [*_turned([arm for arm, _ in acting]), *_rated([arm for arm, _ in acting])]
     if all(one.rigid for one in bent):
         return [
-            Notice(
-                "force-on-rigid-model",
+            FORCE_ON_RIGID_MODEL(
                 "The model has no joints that give way, so the force at the tool changes nothing in it, and the real "
-                "arm bends. Calibrate with a model that has compliance, for instance elastic.",
+                "arm bends.",
             ),
             *made,
         ]
@@ -99,9 +120,7 @@ def check_force(cases: Sequence[tuple[Robot, Array | Postures]]) -> list[Notice]
     well = f", which is known to {max(known) * 1e3:.2g} mm (standard deviation)" if known else ""
     made.insert(
         0,
-        Notice(
-            "force-taken", f"The force at the tool moves its tip by up to {worst.moved * 1e3:.3g} mm{well}.", "note"
-        ),
+        FORCE_TAKEN(f"The force at the tool moves its tip by up to {worst.moved * 1e3:.3g} mm{well}."),
     )
     return [*_unseen(robot, bent), *_beyond(robot, bent), *made]
 
@@ -182,6 +201,15 @@ def _loaded_beyond(robot: Robot, q: Postures, tip: Array, efforts: Array) -> dic
     return {i: float(efforts[worst[i], i]) for i in range(count) if moved[worst[i], i] > _NOTHING}
 
 
+COMPLIANCE_UNSEEN: Final = Rule(
+    "compliance-unseen",
+    "warning",
+    "the force leans on parameters of which the data told less than half; so much is the tip uncertain by each",
+    cure="Measure with a force across it as well (columns force_x to moment_z), or with the robot mounted another "
+    "way, and calibrate again.",
+)
+
+
 def _unseen(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
     found: dict[str, float] = {}
     for one in bent:
@@ -197,14 +225,20 @@ def _unseen(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
     carried = ", ".join(_load(robot, i, float(loads[i])) for i in joints)
     on_joints = f" It loads {carried}." if carried else ""
     return [
-        Notice(
-            "compliance-unseen",
+        COMPLIANCE_UNSEEN(
             f"The force leans on what the calibration's data did not determine: {words}{more}; so uncertain is the tip "
-            f"by it (standard deviation).{on_joints} Gravity does not load a joint whose axis is upright. Measure with "
-            "a force across it as well (columns force_x to moment_z), or with the robot mounted another way, and "
-            "calibrate again.",
+            f"by it (standard deviation).{on_joints} Gravity does not load a joint whose axis is upright.",
         )
     ]
+
+
+LOADS_BEYOND_DATA: Final = Rule(
+    "loads-beyond-data",
+    "warning",
+    "joints are loaded farther beyond what they carried in calibration than half of that range",
+    cure="Measure with a heavier payload or with a force to know it.",
+    gravity=2,
+)
 
 
 def _beyond(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
@@ -222,10 +256,9 @@ def _beyond(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
         for i, load in sorted(found.items())
     )
     return [
-        Notice(
-            "loads-beyond-data",
+        LOADS_BEYOND_DATA(
             f"The force loads joints beyond what they carried while they were measured: {words}. That they give way in "
-            "proportion up to there is assumed. Measure with a heavier payload or with a force to know it.",
+            "proportion up to there is assumed.",
         )
     ]
 
@@ -235,19 +268,38 @@ def _load(robot: Robot, joint: int, load: float) -> str:
     return f"{robot.joints[joint].name} with {load:.3g} {unit}"
 
 
+FORCE_IN_MODEL_BASE: Final = Rule(
+    "force-in-model-base",
+    "warning",
+    "the force was taken in the model's base frame, and the controller's is turned against it",
+)
+
+
 def _turned(arms: Sequence[Robot]) -> list[Notice]:
     """Say if a force was taken in the model's base frame, and the controller's has other axes."""
     own = arms[0].controller.base.quaternion == IDENTITY.quaternion
     if own or not any(arm.wrench is not None and arm.wrench.frame == "base" for arm in arms):
         return []
     return [
-        Notice(
-            "force-in-model-base",
+        FORCE_IN_MODEL_BASE(
             "The force was taken in the axes of the model's base frame, and the base of the controller is turned "
             "against it ('truearm show' says how): for a force in the axes of the pendant use "
             "`wrench_frame=controller`.",
         )
     ]
+
+
+RATED_LOAD_EXCEEDED: Final = Rule(
+    "rated-load-exceeded",
+    "warning",
+    "payload and force together are more than the rated load",
+)
+RATING_UNKNOWN: Final = Rule(
+    "rating-unknown",
+    "note",
+    "the flange carries something, and the robot file has no `rated_load`. Plans without a program say it, too",
+    gravity=0,
+)
 
 
 def _rated(arms: Sequence[Robot]) -> list[Notice]:
@@ -258,11 +310,9 @@ def _rated(arms: Sequence[Robot]) -> list[Notice]:
     robot = arms[0]
     if robot.rated_load is None:
         return [
-            Notice(
-                "rating-unknown",
+            RATING_UNKNOWN(
                 "The robot file does not say what the arm is rated for (rated_load), so nothing tells whether it may "
                 "be pushed so.",
-                "note",
             )
         ]
     sizes = [
@@ -272,8 +322,7 @@ def _rated(arms: Sequence[Robot]) -> list[Notice]:
     if max(sizes) <= weight * (1.0 + 1e-9):
         return []
     return [
-        Notice(
-            "rated-load-exceeded",
+        RATED_LOAD_EXCEEDED(
             f"Payload and force together make up to {max(sizes):.3g} N, and {robot.name} is rated for {weight:.3g} N "
             f"({robot.rated_load:g} kg). Makers count the forces of a process to the load.",
         )

@@ -10,12 +10,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import Notice, degrees, listed, millimetres
+from truearm.engine.base.errors import Notice, Rule, degrees, listed, millimetres
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.rigid_tool import (
+    OUTLIERS,
+    TARGET_MISTAKEN,
+    TARGETS_SWAPPED,
     Places,
     Suspect,
-    Suspicion,
     factors_of,
     fixed_points,
     length_notice,
@@ -24,7 +26,15 @@ from truearm.engine.data.rigid_tool import (
 )
 from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import repeated_joints
-from truearm.engine.diagnose.slip_trials import Slip, angle_slips, as_noted, sign_slips, slips_in_rows
+from truearm.engine.diagnose.slip_trials import (
+    ORIENTATION_SLIPS,
+    UNIT_ANGLE,
+    Slip,
+    angle_slips,
+    as_noted,
+    sign_slips,
+    slips_in_rows,
+)
 from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.chain import Array
 
@@ -77,7 +87,7 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
             continue
         mine = [r for r in doubted.tolist() if data.configuration[r] == c]
         of_this = [_doubted(data, r, predicted[c], points, known, float(off[r]), allowed) for r in mine]
-        if all(one.code == "outliers" for one in of_this) and _hang_together(data, c, mine, predicted, turned, allowed):
+        if all(one.rule == OUTLIERS for one in of_this) and _hang_together(data, c, mine, predicted, turned, allowed):
             unlike[c] = float(off[mine].max())
         else:
             suspects += of_this
@@ -100,8 +110,8 @@ def _doubted(
     if nearest != t and gaps[nearest] <= allowed:
         there = points.of(c, nearest)
         exchanged = there is not None and np.linalg.norm(there - predicted[t]) <= allowed
-        code: Suspicion = "targets-swapped" if exchanged else "target-mistaken"
-        return Suspect(code, label, name, f"is target {data.targets[nearest]}")
+        rule = TARGETS_SWAPPED if exchanged else TARGET_MISTAKEN
+        return Suspect(rule, label, name, f"is target {data.targets[nearest]}")
     before = points.of(c - 1, t)
     before_it = {} if before is None else {f"target {name} at the configuration before": before}
     return suspect(at, label, name, size, before_it | known)
@@ -156,11 +166,8 @@ def _in_another_unit(
         if new:
             found.setdefault(slip.words.partition(".")[0], []).extend(new)
     return explained, [
-        Notice(
-            "unit-angle",
-            f"{words}, at some configurations alone ({listed([data.labels[c] for c in sorted(cs)])}). Mend the numbers "
-            "of these rows.",
-            "error",
+        UNIT_ANGLE(
+            f"{words}, at some configurations alone ({listed([data.labels[c] for c in sorted(cs)])}).",
             at=tuple((data.labels[c], "") for c in sorted(cs)),
         )
         for words, cs in found.items()
@@ -204,6 +211,14 @@ def _explained_by(
         yield slip, [c for i, c in enumerate(some.tolist()) if gap[i] <= least[i]]
 
 
+JOINTS_MISTAKEN: Final = Rule(
+    "joints-mistaken",
+    "warning",
+    "joint positions of another configuration, with the wrong sign of one joint, or that [do not belong to their "
+    "readings](check.md#wrong-joint-positions)",
+)
+
+
 def _joints_mistaken(
     data: Dataset, others: dict[int, int], signs: dict[int, int], unlike: dict[int, float]
 ) -> list[Notice]:
@@ -238,7 +253,7 @@ def _joints_mistaken(
             "instrument was moved for it. Mend the joint positions, or leave these rows out."
         )
     at = tuple((data.labels[c], "") for c in (*others, *signs, *unlike))
-    return [Notice("joints-mistaken", " ".join(found), at=at)] if found else []
+    return [JOINTS_MISTAKEN(" ".join(found), at=at)] if found else []
 
 
 def allowed_off(off: Array) -> float:
@@ -260,13 +275,11 @@ def often_off(data: Dataset, off: Array) -> list[Notice]:
         return []
     at = tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in far.tolist())
     return [
-        Notice(
-            "outliers",
+        OUTLIERS(
             f"{len(far)} of {read} readings ({len(far) / read:.0%}) are more than {_OFTEN_RATIO:g} times farther off "
             f"than half of all, up to {float(size[far].max()) * 1e3:.2g} mm (configuration/target): "
             f"{listed(['/'.join(one) for one in at])}. "
-            "Errors of instruments and joints are not so uneven. Look for what these readings have in common; "
-            "`loss=cauchy` lets them count little.",
+            "Errors of instruments and joints are not so uneven.",
             at=at,
         )
     ]
@@ -293,7 +306,15 @@ def _joints_of_others(data: Dataset, predicted: Array, doubted: IntArray, allowe
 
 
 #: The code of the notice.
-ORIENTATION_OUTLIERS: Final = "orientation-outliers"
+ORIENTATION_OUTLIERS: Final = Rule(
+    "orientation-outliers",
+    "warning",
+    "[orientations far off](check.md#single-orientations-that-are-off) whose positions are not",
+)
+#: Codes of wrong readings that pull a fit away.
+PULLING: Final = frozenset(
+    rule.code for rule in (ORIENTATION_OUTLIERS, *ORIENTATION_SLIPS, JOINTS_MISTAKEN, UNIT_ANGLE)
+)
 #: An orientation is doubted if it is at least so far off [rad].
 _LEAST_TURNED: Final = math.radians(0.5)
 #: A joint turns a reading alike if the turn is about its axis but for this share, and hardly moves it if the target is
@@ -329,15 +350,14 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
     for t in np.unique(data.target[rows]).tolist():
         mine = data.target[rows] == t
         predicted[mine] = fit.robot.world_poses(data.postures, data.targets[t])[1][data.configuration[rows[mine]]]
-    mended, code, words = slips_in_rows(data.quaternion[rows], predicted)
+    mended, rule, words = slips_in_rows(data.quaternion[rows], predicted)
     at = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in rows.tolist()]
     where = ["/".join(one) for one in at]
     found = []
     if mended.any():
         some = listed([name for name, one in zip(where, mended.tolist(), strict=True) if one])
         found.append(
-            Notice(
-                code,
+            rule(
                 f"Some orientations do not turn as the robot does (configuration/target): {some}. They would if their "
                 f"numbers were read otherwise: {words}. Those of the other readings are right. Mend these rows.",
                 "error",
@@ -352,8 +372,7 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
         what, them = ("orientation is", "it") if one else ("orientations are", "them")
         quaternions = "its quaternion" if one else "their quaternions"
         found.append(
-            Notice(
-                ORIENTATION_OUTLIERS,
+            ORIENTATION_OUTLIERS(
                 f"{len(others)} {what} far off, and the positions are not (configuration/target): {listed(others)}. "
                 f"Measure {them} again, or leave {quaternions} empty; `loss=cauchy` lets {them} count little.",
                 at=tuple(at[i] for i in np.flatnonzero(~mended).tolist()),

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice, counted, millimetres
+from truearm.engine.base.errors import Notice, Rule, counted, millimetres
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
 from truearm.engine.robot.chain import Array
@@ -19,9 +19,20 @@ from truearm.engine.robot.chain import Array
 # pairs no result of it has a probability below 1 %, so that nothing is said of so few.
 
 #: The calibrated robot is no better than the nominal one, as far as unseen configurations tell.
-NO_GAIN: Final = "no-gain"
+NO_GAIN: Final = Rule(
+    "no-gain",
+    "warning",
+    "at unseen configurations the calibrated robot is not significantly better than the nominal one: "
+    "[more](results.md#better-than-nominal)",
+    gravity=2,
+)
 #: It is significantly worse.
-WORSE: Final = "worse-than-nominal"
+WORSE: Final = Rule(
+    "worse-than-nominal",
+    "error",
+    "at unseen configurations the calibrated robot is significantly worse than the nominal one: "
+    "[more](results.md#better-than-nominal)",
+)
 #: Probability of such differences, or larger ones, where there is no difference.
 _LEVEL: Final = 0.01
 #: Of fewer pairs even the most extreme order of signs is more probable than that.
@@ -33,6 +44,13 @@ _FACTOR: Final = 1.1
 _MANY: Final = 100
 #: Joint positions that differ by less are one posture [rad or m].
 _SAME: Final = math.radians(0.01)
+
+
+FEW_HELD_OUT: Final = Rule(
+    "few-held-out",
+    "note",
+    "fewer than seven postures are held out: whether it is better is not known",
+)
 
 
 def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = False) -> list[Notice]:
@@ -49,11 +67,9 @@ def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = 
     postures = counted(len(new), "posture")
     if len(new) < _FEWEST:
         return [
-            Notice(
-                "few-held-out",
+            FEW_HELD_OUT(
                 f"Only {postures} with readings {'is' if len(new) == 1 else 'are'} held out: whether the calibrated "
                 f"robot is better than the nominal one is not known. {_FEWEST} or more can tell.",
-                "note",
             )
         ]
     figures = (
@@ -63,8 +79,7 @@ def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = 
     )
     if signed_rank_probability(new - _FACTOR * old) <= _LEVEL:
         return [
-            Notice(
-                WORSE,
+            WORSE(
                 f"{figures} The calibrated robot is significantly worse (more than a tenth; signed-rank test in pairs, "
                 "1 %). Do not use it: readings are wrong, or too few for this model.",
                 "error",
@@ -73,8 +88,7 @@ def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = 
     if signed_rank_probability(old - new) <= _LEVEL:
         return []
     return [
-        Notice(
-            NO_GAIN,
+        NO_GAIN(
             f"{figures} That is no significant gain (signed-rank test in pairs, 1 %). The nominal robot is accurate "
             "already, or there are too few readings for this model, or something is wrong with them.",
         )

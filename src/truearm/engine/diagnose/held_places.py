@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, listed
+from truearm.engine.base.errors import InputError, Notice, Rule, listed
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.statistics import Errors, errors_of
@@ -39,6 +39,14 @@ _STRAINED, _AT_EASE = 2.5, 1.0
 #: Chance below which a place found is not the one held, and how far apart they are then at least [m, rad].
 _CHANCE: Final = 1e-6
 _APART: Final = (1e-3, math.radians(0.1))
+
+
+HOLD_CONTRADICTS: Final = Rule(
+    "hold-contradicts",
+    "error",
+    "places that are held do not fit the readings, or only with a robot that is none: [known "
+    "frames](models.md#known-frames)",
+)
 
 
 def check_held(
@@ -97,7 +105,16 @@ def check_held(
         ". Check the numbers, their units and what they refer to: the base is the frame of the robot's table, whose z "
         "axis is axis 1 in most conventions, and a tool is given in the flange's frame. Or do not hold them."
     )
-    return [Notice("hold-contradicts", message, "error")]
+    return [HOLD_CONTRADICTS(message)]
+
+
+HOLD_STRAINED: Final = Rule(
+    "hold-strained",
+    "warning",
+    "with the places held, a parameter is beyond 2.5 times its prior that is within it where they are found: it may "
+    "have taken up an error of the held numbers",
+    cure="Check them; what is expected of the robot takes them as exact.",
+)
 
 
 def _strained(fit: Fit, found: Fit) -> list[Notice]:
@@ -114,11 +131,9 @@ def _strained(fit: Fit, found: Fit) -> list[Notice]:
     if not strained:
         return []
     return [
-        Notice(
-            "hold-strained",
+        HOLD_STRAINED(
             f"With the places held, {listed(strained)} went far from nominal, and with all of them found not. That is "
-            "what an error of the held numbers does which the readings cannot show. Check them; what is expected of "
-            "the robot takes them as exact.",
+            "what an error of the held numbers does which the readings cannot show.",
         )
     ]
 

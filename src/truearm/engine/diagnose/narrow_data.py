@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice, counted
+from truearm.engine.base.errors import Notice, Rule, counted
 from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
@@ -21,13 +21,20 @@ from truearm.engine.diagnose.expected_error import (
     expected_error,
     expected_map,
 )
+from truearm.engine.diagnose.unmodelled import PULLED_AWAY
+from truearm.engine.diagnose.wrong_robot import IMPLAUSIBLE
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.losses import ABSOLUTE, Loss
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.parameters import PLACES
 
-FEW_READINGS: Final = "few-readings"
+FEW_READINGS: Final = Rule(
+    "few-readings",
+    ("warning", "error"),
+    "hardly more numbers were read than the parameters take up: [more](results.md#the-expected-error)",
+    gravity=2,
+)
 #: Numbers left by the parameters from which the noise is at most 1.6 times what they tell, 19 times in 20.
 _ENOUGH: Final = 10.0
 #: Share of the numbers that parameters must leave for losses that may meet as many readings exactly, and doubt others.
@@ -73,7 +80,7 @@ def check_few_readings(fit: Fit) -> list[Notice]:
             "they follow from what is left. Use the linear loss. "
         )
     declare = "" if fit.declared else " Declare the instrument's deviation in a column sigma."
-    return [Notice(FEW_READINGS, f"{words}{CURE}{declare}", "warning" if fit.loss == "linear" else "error")]
+    return [FEW_READINGS(f"{words}{CURE}{declare}", "warning" if fit.loss == "linear" else "error")]
 
 
 def _may_be(freedom: float) -> float:
@@ -92,8 +99,7 @@ def check_few_to_doubt(fit: Fit) -> list[Notice]:
     if fit.numbers >= _FEWEST_TO_DOUBT * parameters:
         return []
     return [
-        Notice(
-            FEW_READINGS,
+        FEW_READINGS(
             f"The readings are {counted(fit.numbers, 'number')}, for {counted(parameters, 'parameter')} of the "
             f"{fit.model.name} model. With fewer than {_FEWEST_TO_DOUBT:g} for each, a wrong reading cannot be told "
             f"from a right one. {CURE}",
@@ -161,6 +167,15 @@ def _apart(fit: Fit, other: Fit) -> float:
     return float(np.linalg.norm(np.array(places[0]) - np.array(places[1]), axis=2).mean())
 
 
+NARROW_DATA: Final = Rule(
+    "narrow-data",
+    ("warning", "error"),
+    "the workspace is known worse than the held-out error says: [more](results.md#the-expected-error)",
+    gravity=2,
+    unless=frozenset({PULLED_AWAY, IMPLAUSIBLE.code}),
+)
+
+
 def check_narrow_data(
     fit: Fit, expected: ExpectedError, measured: Dataset, judged: Errors, *, held_out: bool
 ) -> list[Notice]:
@@ -198,7 +213,7 @@ def check_narrow_data(
         words += f"Measure configurations in which these joints move further: {'; '.join(few)}."
     else:
         words += f"Measure more configurations, also {least_known(fit)}."
-    return [Notice("narrow-data", words, "error" if mean > _ERROR * known else "warning")]
+    return [NARROW_DATA(words, "error" if mean > _ERROR * known else "warning")]
 
 
 def _beyond_curves(fit: Fit, expected: ExpectedError, measured: Dataset, known: float, few: list[str]) -> list[Notice]:
@@ -218,13 +233,11 @@ def _beyond_curves(fit: Fit, expected: ExpectedError, measured: Dataset, known: 
     if mean <= _WARNING * there:
         return []
     return [
-        Notice(
-            "narrow-data",
+        NARROW_DATA(
             f"Over the workspace the targets are expected to be off by {_mm(mean)} mm on average (90 %: {_mm(low)} to "
             f"{_mm(high)}), at configurations like those measured by {_mm(there)} mm, both without the noise of a "
             "reading: curves of joints are known only where these were measured. Measure configurations in which these "
             f"joints move further: {'; '.join(few)}.",
-            "warning",
         )
     ]
 

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from truearm.engine.base.errors import Notice, counted, listed
-from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.changes import LEAST_ARRIVALS, Change, find_change
+from truearm.engine.diagnose.case import Case
+from truearm.engine.diagnose.changes import Change, is_a_part, what_moved
 from truearm.engine.diagnose.curves import about_curves, has_curves
-from truearm.engine.diagnose.expected_error import ExpectedError
 from truearm.engine.diagnose.far_off import ORIENTATION_OUTLIERS
 from truearm.engine.diagnose.gain import NO_GAIN, WORSE
 from truearm.engine.diagnose.narrow_data import (
@@ -168,7 +167,7 @@ _NAMED_NEXT_STEPS: Final = 3
 _OWN_STEP: Final = frozenset(
     {
         *("instrument-moved", "target-moved", "joint-zero-jumped"),
-        *("narrow-data", "rank-loss", "not-converged", FEW_READINGS, WORSE),
+        *("narrow-data", "rank-loss", "not-converged", FEW_READINGS.code, WORSE.code),
     }
 )
 #: Warnings whose cure comes before more configurations.
@@ -179,7 +178,7 @@ _CURED_FIRST: Final = (
     "targets-swapped",
     "target-mistaken",
     "joints-mistaken",
-    ORIENTATION_OUTLIERS,
+    ORIENTATION_OUTLIERS.code,
     "outliers",
     "joints-not-settled",
     "joints-rounded",
@@ -188,64 +187,47 @@ _CURED_FIRST: Final = (
     "sigma-too-large",
     "transmission-error",
     "large-remainder",
-    WORSE,
-    NO_GAIN,
+    WORSE.code,
+    NO_GAIN.code,
 )
 #: Those that any other step may explain.
-_EXPLAINED: Final = frozenset({WORSE, NO_GAIN, "large-remainder"})
+_EXPLAINED: Final = frozenset({WORSE.code, NO_GAIN.code, "large-remainder"})
 #: Those that configurations which are off explain.
 _OF_CONFIGURATIONS: Final = frozenset(
-    {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", WORSE, NO_GAIN}
+    {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", WORSE.code, NO_GAIN.code}
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """A fit and what is known of it."""
-
-    left: LeftOver  #: What it leaves of all readings.
-    status: Status  #: How it ended.
-    notices: Sequence[Notice]  #: What was noticed about data and fit.
-    off: Off  #: The configurations that are off one by one.
-    #: What it leaves of the others, and what moved during the campaign; None if nothing did.
-    moved: tuple[LeftOver, Change] | None
-    errors: Errors  #: Of the readings that judge it.
-    held_out: bool  #: Whether the fit has not seen these.
-    expected: ExpectedError  #: Error to expect over the workspace.
-    training: Dataset  #: The readings that the fit was made from.
-    bent: bool = False  #: Whether wrong readings, of which a notice says which, pulled the fit away.
-
-
-def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
+def steps_after_fit(case: Case, notices: Sequence[Notice]) -> tuple[NextStep, ...]:
     """Return at most three things to do after a fit, the most useful first; one at least."""
-    first = _to_mend(judged.notices)
-    if judged.status in (Status.NOT_CONVERGED, Status.IMPLAUSIBLE):
-        first = first or [NextStep("mend-data", judged.status.advice)]
-    if judged.bent and any(notice.code == ORIENTATION_OUTLIERS for notice in judged.notices):
-        first = first or _cures([n for n in judged.notices if n.code == ORIENTATION_OUTLIERS], [])
+    first = _to_mend(notices)
+    if case.status in (Status.NOT_CONVERGED, Status.IMPLAUSIBLE):
+        first = first or [NextStep("mend-data", case.status.advice)]
+    if case.bent and any(notice.code == ORIENTATION_OUTLIERS.code for notice in notices):
+        first = first or _cures([n for n in notices if n.code == ORIENTATION_OUTLIERS.code], [])
     if first:
         return tuple(first)
-    left, known = judged.left, _known(judged.errors)
-    steps, now = _of_left_over(left, judged.off, judged.moved, known, checked=False)
-    bound = _at_bound(judged, now)
+    left, known = case.left, _known(case.errors)
+    steps, now = _of_left_over(left, case.off, case.moved, known, checked=False)
+    bound = _at_bound(case, now)
     spoiled = (
-        judged.moved is not None
+        case.moved is not None
         or any(step.gain is not None for step in bound)
         or any(step.code == "measure-again" for step in steps)
     )
-    if judged.status is not Status.RANK_LOSS and not spoiled:
-        steps += _after(steps, _more(judged, now))
-    steps += _cures(judged.notices, steps)
+    if case.status is not Status.RANK_LOSS and not spoiled:
+        steps += _after(steps, _more(case, notices, now))
+    steps += _cures(notices, steps)
     steps += bound
-    if not judged.held_out:
+    if not case.held_out:
         steps.append(NextStep("hold-out", "Hold configurations out to judge the fit: leave `train=all` out."))
-    if judged.status is Status.RANK_LOSS:
-        more = NextStep("measure-more", _where(judged, f"determine {listed(left.fit.unobservable)}"))
+    if case.status is Status.RANK_LOSS:
+        more = NextStep("measure-more", _where(case, f"determine {listed(left.fit.unobservable)}"))
         return (more, *most_useful_first(steps))[:MOST]
-    if any(notice.code == FEW_READINGS for notice in judged.notices):
+    if any(notice.code == FEW_READINGS.code for notice in notices):
         more = NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters take up.")
         return (more, *most_useful_first(step for step in steps if step.code != more.code))[:MOST]
-    return most_useful_first(steps or [_end(left, judged.training.configurations)])
+    return most_useful_first(steps or [_end(left, case.training.configurations)])
 
 
 def steps_after_check(
@@ -266,7 +248,7 @@ def steps_after_check(
         off = off_configurations(left)
         steps, _ = _of_left_over(left, off, what_moved(left, off), _known(errors), checked=True)
     steps += _cures(notices, steps)
-    if any(notice.code == FEW_READINGS for notice in notices):
+    if any(notice.code == FEW_READINGS.code for notice in notices):
         steps.append(NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters are."))
     elif not robot:
         steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
@@ -275,21 +257,6 @@ def steps_after_check(
         also = ": no joint effect would explain more of the readings" if told else ""
         steps.append(NextStep("calibrate", f"Calibrate with `model=geometric`{also}."))
     return most_useful_first(steps)
-
-
-def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
-    """Return what a fit leaves without configurations that are off one by one, and what moved during the others.
-
-    A single configuration that is far off looks like something that moved. Nothing is returned where nothing moved.
-    """
-    rest = left.without(() if _is_a_part(off) else off.indices)
-    change = find_change(rest)
-    return None if change is None else (rest, change)
-
-
-def _is_a_part(off: Off) -> bool:
-    """Return whether what is off is a part of the campaign, so long that its beginning can be found."""
-    return off.in_a_row and len(off.configurations) >= LEAST_ARRIVALS
 
 
 def _of_left_over(
@@ -312,7 +279,7 @@ def _of_left_over(
             # Small changes are told by the next fit, which has what this one lacks.
             moved = None if moved is None or moved[1].share < _LEAST_SHARE else moved
             known_moved = known * found.left if found is not None else known
-    told = moved is not None and _is_a_part(off)
+    told = moved is not None and is_a_part(off)
     steps = [] if told else measured_again(left, off, known * share, checked=checked)
     now = known * off.left
     if moved is not None:
@@ -349,33 +316,33 @@ def _cures(notices: Sequence[Notice], steps: Sequence[NextStep]) -> list[NextSte
     return [NextStep("see-warning", f"Do what {what} {listed(codes)} below {'says' if len(codes) == 1 else 'say'}.")]
 
 
-def _at_bound(judged: Judged, known: float) -> list[NextStep]:
+def _at_bound(case: Case, known: float) -> list[NextStep]:
     """Return the step for values at bounds; without bounds the parameters would take what they can."""
-    if judged.status is not Status.AT_BOUND:
+    if case.status is not Status.AT_BOUND:
         return []
-    r = judged.left.residual
-    before, after = float(np.linalg.norm(r)), float(np.linalg.norm(judged.left.without_parameters(r)))
+    r = case.left.residual
+    before, after = float(np.linalg.norm(r)), float(np.linalg.norm(case.left.without_parameters(r)))
     gain = known * (1.0 - after / before) if before > 0.0 and 1.0 - after / before > _LEAST_GAIN else None
-    return [NextStep("widen-bound", f"Widen the bound of {listed(judged.left.fit.at_bound)} if it was a guess.", gain)]
+    return [NextStep("widen-bound", f"Widen the bound of {listed(case.left.fit.at_bound)} if it was a guess.", gain)]
 
 
-def _more(judged: Judged, known: float) -> list[NextStep]:
+def _more(case: Case, notices: Sequence[Notice], known: float) -> list[NextStep]:
     """Return the step for more configurations, if they would gain something."""
-    noise, parameters = _variances(judged)
-    narrow = any(notice.code == "narrow-data" for notice in judged.notices)
+    noise, parameters = _variances(case)
+    narrow = any(notice.code == "narrow-data" for notice in notices)
     before, after = (math.sqrt(noise + part * parameters) for part in (1.0, 0.5))
     if not narrow and (before == 0.0 or 1.0 - after / before < _LEAST_GAIN):
         return []
-    n = judged.training.configurations
-    if narrow and has_curves(judged.left.fit) and joints_that_moved_little(judged.left.fit, judged.training):
-        fit = replace(judged.left.fit, joint_error=judged.expected.joint_error)
-        over = judged.expected.overall.mean - expected_where_measured(fit, judged.training)
-        where = _where(judged, "know the whole workspace as well as where was measured")
+    n = case.training.configurations
+    if narrow and has_curves(case.left.fit) and joints_that_moved_little(case.left.fit, case.training):
+        fit = replace(case.left.fit, joint_error=case.expected.joint_error)
+        over = case.expected.overall.mean - expected_where_measured(fit, case.training)
+        where = _where(case, "know the whole workspace as well as where was measured")
         return [NextStep("measure-more", f"{where} The gain is over the workspace.", max(over, 0.0))]
     gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else _LENGTH * (before - after)
-    held_out = judged.left.problem.data.configurations - n
+    held_out = case.left.problem.data.configurations - n
     train = " Or train on more of them: `train`." if held_out >= n else ""
-    where = _where(judged, f"halve what {n} leave uncertain, as {n} more would")
+    where = _where(case, f"halve what {n} leave uncertain, as {n} more would")
     return [NextStep("measure-more", where + train, gain)]
 
 
@@ -393,24 +360,24 @@ def _after(steps: Sequence[NextStep], more: list[NextStep]) -> list[NextStep]:
     ]
 
 
-def _where(judged: Judged, purpose: str) -> str:
+def _where(case: Case, purpose: str) -> str:
     """Say where to measure more."""
-    few = joints_that_moved_little(judged.left.fit, judged.training)
+    few = joints_that_moved_little(case.left.fit, case.training)
     if few:
         where = f"in which these joints move further: {'; '.join(few[:_NAMED_NEXT_STEPS])}"
-    elif judged.status is Status.RANK_LOSS or judged.left.fit.gauge_freedoms:
+    elif case.status is Status.RANK_LOSS or case.left.fit.gauge_freedoms:
         where = "all over the workspace"
     else:
-        where = f"also {least_known(judged.left.fit)}"
+        where = f"also {least_known(case.left.fit)}"
     return f"Measure more configurations to {purpose}: {where}."
 
 
-def _variances(judged: Judged) -> tuple[float, float]:
+def _variances(case: Case) -> tuple[float, float]:
     """Return the variance of a coordinate by what the fit leaves, and by its parameters [m^2].
 
     The parameters' is that at the measured configurations, or that over the workspace if it is larger.
     """
-    left = judged.left
+    left = case.left
     metres = _metres(left)
     used = metres > 0.0
     if not used.any():
@@ -420,7 +387,7 @@ def _variances(judged: Judged) -> tuple[float, float]:
     r = left.without_parameters(left.residual)[used] * metres[used]
     noise = float(r @ r) / len(r) * len(left.residual) / max(left.freedom, 1)
     if not left.fit.joint_error.any() and not left.fit.gauge_freedoms:
-        parameters = max(parameters, (judged.expected.overall.mean / _LENGTH) ** 2)
+        parameters = max(parameters, (case.expected.overall.mean / _LENGTH) ** 2)
     return noise, parameters
 
 

@@ -11,11 +11,12 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.base.units import from_si
+from truearm.engine.data.checks import TARGET_MISSPELT
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
-from truearm.engine.data.rigid_tool import Suspect, places_of
+from truearm.engine.data.rigid_tool import OUTLIERS, TARGETS_SWAPPED, Suspect, places_of
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.diagnose.arrivals import ArrivalLikelihood, joints_as_far_off
 from truearm.engine.diagnose.far_off import (
@@ -28,7 +29,7 @@ from truearm.engine.diagnose.far_off import (
 )
 from truearm.engine.diagnose.narrow_data import check_few_to_doubt
 from truearm.engine.diagnose.slip_trials import ORIENTATION_SLIPS
-from truearm.engine.diagnose.slips import off_by, slips_by_fit, slips_in_lengths, slips_in_positions
+from truearm.engine.diagnose.slips import FIXTURES_UNLIKELY, off_by, slips_by_fit, slips_in_lengths, slips_in_positions
 from truearm.engine.diagnose.unmodelled import LeftOver
 from truearm.engine.diagnose.wrong_robot import check_plausible, check_robot, other_robot
 from truearm.engine.fit.fit import Fit, identify, place
@@ -77,7 +78,7 @@ def exchanged_names(fit: Fit, data: Dataset) -> list[Suspect]:
             if (c, a) not in suspects and (c, b) not in suspects:
                 for one, other in ((a, b), (b, a)):
                     word = f"is target {names[other]}"
-                    suspects[c, one] = Suspect("targets-swapped", data.labels[c], names[one], word)
+                    suspects[c, one] = Suspect(TARGETS_SWAPPED, data.labels[c], names[one], word)
     return [*suspects.values()]
 
 
@@ -144,6 +145,16 @@ def step_of(data: Dataset) -> tuple[float, str] | None:
     return None
 
 
+JOINTS_ROUNDED: Final = Rule(
+    "joints-rounded",
+    "warning",
+    "joint positions that are all multiples of 0.05 deg or 0.001 rad, or of a coarser step, and joints that err as "
+    "rounding to it makes them",
+    cure="Give them with all digits that the controller shows. If they were commanded like that, something else errs "
+    "by as much.",
+)
+
+
 def check_rounding(fit: Fit, data: Dataset) -> list[Notice]:
     """Return a notice if joint positions are multiples of a step and are off as rounding to it makes them.
 
@@ -165,12 +176,9 @@ def check_rounding(fit: Fit, data: Dataset) -> list[Notice]:
     if 2.0 * (rounded - readings.largest(joints=0.0 * turning)[1]) < _LEAST_GAIN:
         return []
     return [
-        Notice(
-            "joints-rounded",
+        JOINTS_ROUNDED(
             f"The joint positions are multiples of {step:g} {unit}, and the joints seem to err by "
-            f"{math.degrees(seeming):.2g} deg, where rounding to that step makes {math.degrees(by_rounding):.2g} deg. "
-            "Give them with all digits that the controller shows. If they were commanded like that, something else "
-            "errs by as much.",
+            f"{math.degrees(seeming):.2g} deg, where rounding to that step makes {math.degrees(by_rounding):.2g} deg.",
         )
     ]
 
@@ -214,7 +222,7 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
         try:
             start_from_readings(robot, data)
         except InputError as error:
-            return Comparison([Notice("fixtures-unlikely", str(error), "error"), *found])
+            return Comparison([FIXTURES_UNLIKELY(str(error)), *found])
         slips = slips_in_lengths(robot, data)
         if slips:
             return Comparison([*slips, *found])
@@ -224,7 +232,9 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
     if not data.has_position.any():
         return Comparison(found)
     slips = slips_in_positions(robot, data)
-    if slips and all(slip.code in ORIENTATION_SLIPS for slip in slips):  # the positions are this robot's
+    if slips and all(
+        slip.code in {rule.code for rule in ORIENTATION_SLIPS} for slip in slips
+    ):  # the positions are this robot's
         return Comparison([*slips, *found])
     if slips:
         return Comparison([*(other_robot(robot, data) or slips), *found])
@@ -258,6 +268,15 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
     )
 
 
+POSITIONS_COMPUTED: Final = Rule(
+    "positions-computed",
+    "warning",
+    "positions that the uncalibrated robot meets within 0.02 mm, as a controller computes them and no arm attains",
+    cure="Give what an instrument measured.",
+    gravity=2,
+)
+
+
 def _computed(robot: Robot, data: Dataset, off: Array) -> list[Notice]:
     """Return a notice if the uncalibrated robot fits better than any arm is: somebody computed the positions.
 
@@ -270,13 +289,19 @@ def _computed(robot: Robot, data: Dataset, off: Array) -> list[Notice]:
     if spread is None or spread.rms > _COMPUTED_WITHIN:
         return []
     return [
-        Notice(
-            "positions-computed",
+        POSITIONS_COMPUTED(
             f"{robot.name} misses the readings by {spread.rms * 1e3:.2g} mm before any calibration (root mean square). "
-            "No real arm and no instrument is as good: a controller computes such positions from its joints. Give "
-            "what an instrument measured.",
+            "No real arm and no instrument is as good: a controller computes such positions from its joints.",
         )
     ]
+
+
+BEYOND_LIMITS: Final = Rule(
+    "beyond-limits",
+    "warning",
+    "joint positions outside the robot's limits",
+    cure="Check units, joint order and the limits in the robot file.",
+)
 
 
 def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
@@ -298,10 +323,8 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
     if not words:
         return []
     return [
-        Notice(
-            "beyond-limits",
-            f"Joint positions are beyond the limits of {robot.name}: {'; '.join(words)}. Check units, joint order and "
-            "the limits in the robot file.",
+        BEYOND_LIMITS(
+            f"Joint positions are beyond the limits of {robot.name}: {'; '.join(words)}.",
             at=tuple((data.labels[c], "") for c in np.flatnonzero(beyond).tolist()),
         )
     ]
@@ -316,8 +339,17 @@ def _far_from_fixtures(fit: Fit, data: Dataset) -> tuple[list[Notice], list[Susp
     off = off_by(errors)
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed_off(off)).tolist()
     where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
-    suspects = [Suspect("outliers", *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, where, strict=True)]
+    suspects = [Suspect(OUTLIERS, *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, where, strict=True)]
     return _unlike_its_readings(fit, data), suspects
+
+
+FIXTURE_MISPLACED: Final = Rule(
+    "fixture-misplaced",
+    "warning",
+    "fixtures that are not where, or not as far apart, as the file says",
+    cure="Check the names, units and numbers of these rows.",
+    gravity=2,
+)
 
 
 def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
@@ -339,10 +371,8 @@ def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
     if not found:
         return []
     return [
-        Notice(
-            "fixture-misplaced",
-            f"Fixtures are not where, or not as far apart, as the file says: {', '.join(found)}. "
-            "Check the names, units and numbers of these rows.",
+        FIXTURE_MISPLACED(
+            f"Fixtures are not where, or not as far apart, as the file says: {', '.join(found)}.",
         )
     ]
 
@@ -362,11 +392,9 @@ def _one_point(fit: Fit, data: Dataset) -> list[Notice]:
     if not found:
         return []
     return [
-        Notice(
-            "target-misspelt",
+        TARGET_MISSPELT(
             f"Targets with like names are the same point on the flange: {'; '.join(found)}. If one name is misspelt, "
             "correct it: a misspelt name is a target of its own.",
-            "error",
         )
     ]
 

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import Notice, listed
+from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.base.limits import limit, refuse_beyond
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
@@ -256,17 +256,30 @@ def refuse_too_many(robot: Robot, training: Dataset, model: Model) -> None:
     refuse_beyond("derivatives", problem.rows * len(problem.free.names), where=training.source)
 
 
+TRIALS_LOST: Final = Rule(
+    "trials-lost",
+    "warning",
+    "more than 2 % of the simulated calibrations did not converge",
+    cure="Measure more configurations, or free fewer parameters.",
+)
+INTERVALS_TOO_NARROW: Final = Rule(
+    "intervals-too-narrow",
+    "warning",
+    "by Monte Carlo the deviations are wider than the linear ones: [more](results.md#by-monte-carlo)",
+    cure="Use the intervals by Monte Carlo.",
+    gravity=2,
+)
+
+
 def check_linear(fit: Fit, found: SimulatedCalibrations) -> list[Notice]:
     """Say where the linear intervals of a fit are not those of Monte Carlo, and if trials were lost."""
     told = []
     lost = found.asked - found.settled
     if lost > _MOST_LOST * found.asked:
         told.append(
-            Notice(
-                "trials-lost",
+            TRIALS_LOST(
                 f"{lost} of {found.asked} simulated calibrations did not converge, and the intervals by Monte Carlo "
-                "are of the rest: the data hardly determine this model. Measure more configurations, or free fewer "
-                "parameters.",
+                "are of the rest: the data hardly determine this model.",
             )
         )
     if found.settled < 2:
@@ -281,10 +294,9 @@ def check_linear(fit: Fit, found: SimulatedCalibrations) -> list[Notice]:
     wider = sorted((name for name in ratio if ratio[name] > _BENT + chance), key=lambda name: -ratio[name])
     if wider:
         told.append(
-            Notice(
-                "intervals-too-narrow",
+            INTERVALS_TOO_NARROW(
                 f"By Monte Carlo the deviations of {listed(wider)} are up to {ratio[wider[0]]:.2g} times the linear "
-                "ones: the model bends too much for these. Use the intervals by Monte Carlo.",
+                "ones: the model bends too much for these.",
             )
         )
     return told

@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import Notice
+from truearm.engine.base.errors import Notice, Rule
 from truearm.engine.data.controller_joints import in_controller_joints, in_model_joints
 from truearm.engine.data.dataset import Dataset, IntArray
-from truearm.engine.data.rigid_tool import FARTHEST, LENGTH_FACTORS
+from truearm.engine.data.rigid_tool import FARTHEST, LENGTH_FACTORS, UNIT_LENGTH
 from truearm.engine.fit.frames import initial_frames
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
@@ -36,11 +36,45 @@ _MOST_NAMED: Final = 5
 _MOST_TURNS: Final = 1.5
 
 
+UNIT_ANGLE: Final = Rule(
+    "unit-angle",
+    "error",
+    "joint positions that fit in the other unit of angle, of all joints or of one, at all configurations or [at "
+    "some](check.md#wrong-joint-positions)",
+)
+MIRRORED: Final = Rule(
+    "mirrored",
+    "error",
+    "positions that fit their mirror image: two columns exchanged, or a wrong sign",
+)
+JOINTS_OF_CONTROLLER: Final = Rule(
+    "joints-of-controller",
+    "error",
+    "joint positions that fit as what the [controller shows](robots.md#joint-positions-and-frames-of-the-pendant), "
+    "and came as the model's",
+)
+JOINTS_OF_MODEL: Final = Rule(
+    "joints-of-model",
+    "error",
+    "joint positions that fit as the model's, and came as what the controller shows",
+)
+JOINT_SIGN: Final = Rule(
+    "joint-sign",
+    "error",
+    "joint positions that fit with the opposite sign of up to three joints, or with two columns exchanged",
+)
+ROWS_SHIFTED: Final = Rule(
+    "rows-shifted",
+    "error",
+    "joint positions that fit one row earlier or later",
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Slip:
     """One slip, mended."""
 
-    code: str  #: Of the notice.
+    rule: Rule  #: Of the notice.
     words: str  #: What happened and what to do about it, without a full stop.
     data: Dataset  #: The data as they should be.
     #: Configuration and target of the readings that it is about; empty if it is about all.
@@ -49,7 +83,7 @@ class Slip:
     @property
     def notice(self) -> Notice:
         """What is said if it explains the data."""
-        return Notice(self.code, f"{self.words}.", "error", at=self.at)
+        return self.rule(f"{self.words}.", at=self.at)
 
 
 # -- lengths -----------------------------------------------------------------------------------------------
@@ -62,7 +96,7 @@ def length_slips(data: Dataset) -> Iterator[Slip]:
             continue
         what = "positions" if data.fixture is None else "lengths"
         words = f"The {what} are {words}. Mend the unit in the header"
-        yield Slip("unit-length", words, _scaled(data, factor))
+        yield Slip(UNIT_LENGTH, words, _scaled(data, factor))
 
 
 def _scaled(data: Dataset, factor: float) -> Dataset:
@@ -107,9 +141,7 @@ def scale_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
         return
     factor = float(np.prod(stretch)) ** (1 / 3)
     size = f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
-    yield Slip(
-        "unit-length", f"The positions are {size} for this robot. Mend them or their unit", _scaled(data, factor)
-    )
+    yield Slip(UNIT_LENGTH, f"The positions are {size} for this robot. Mend them or their unit", _scaled(data, factor))
 
 
 def _column_slips(data: Dataset, onto: Array) -> Iterator[Slip]:
@@ -123,7 +155,7 @@ def _column_slips(data: Dataset, onto: Array) -> Iterator[Slip]:
     words = " and ".join(f"the column {axis} of the positions is {sizes[i]}" for i, axis in enumerate("xyz") if off[i])
     mended = data.position * np.where(off, stretch, 1.0)
     words = f"For this robot {words}. Mend the unit in the header, or the numbers"
-    yield Slip("unit-length", words, replace(data, position=mended))
+    yield Slip(UNIT_LENGTH, words, replace(data, position=mended))
 
 
 def mirrored(data: Dataset) -> Iterator[Slip]:
@@ -132,7 +164,7 @@ def mirrored(data: Dataset) -> Iterator[Slip]:
         "The positions are mirrored: two of the columns x, y and z are exchanged, or the sign of one is wrong. The "
         "data fit with their mirror image. Mend the columns; an instrument's axes are right-handed"
     )
-    yield Slip("mirrored", words, replace(data, position=data.position * np.array([1.0, 1.0, -1.0])))
+    yield Slip(MIRRORED, words, replace(data, position=data.position * np.array([1.0, 1.0, -1.0])))
 
 
 # -- joints ------------------------------------------------------------------------------------------------
@@ -153,7 +185,7 @@ def angle_slips(data: Dataset) -> Iterator[Slip]:
             joints[:, group] *= factor
             which = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
             words_of = f"{which}: {words}. Mend the unit in the header"
-            yield Slip("unit-angle", words_of, replace(data, joints=joints))
+            yield Slip(UNIT_ANGLE, words_of, replace(data, joints=joints))
 
 
 def mixed_angle_slips(data: Dataset) -> Iterator[Slip]:
@@ -178,7 +210,7 @@ def mixed_angle_slips(data: Dataset) -> Iterator[Slip]:
         first = ", ".join(data.labels[c] for c in which[:_MOST_NAMED].tolist())
         some = f"{first} and others" if len(which) > _MOST_NAMED else first
         words_of = f"The joints: {words}, at some configurations alone ({some}). Mend the numbers of these rows"
-        yield Slip("unit-angle", words_of, replace(data, joints=joints))
+        yield Slip(UNIT_ANGLE, words_of, replace(data, joints=joints))
 
 
 def controller_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
@@ -191,13 +223,13 @@ def controller_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
             "The joints look like the controller's: the data fit with them as the robot file says that its controller "
             "counts. Name the columns axis_1, axis_2 and so on, or import them with `joints_are=controller`"
         )
-        yield Slip("joints-of-controller", words, replace(data, joints=controller.to_model(data.joints)))
+        yield Slip(JOINTS_OF_CONTROLLER, words, replace(data, joints=controller.to_model(data.joints)))
         return
     words = (
         "The joints look like the model's, and came as the controller's: the data fit with them as they are. Name the "
         "columns joint_1, joint_2 and so on, or import them with `joints_are=model`"
     )
-    yield Slip("joints-of-model", words, replace(data, joints=controller.from_model(data.joints)))
+    yield Slip(JOINTS_OF_MODEL, words, replace(data, joints=controller.from_model(data.joints)))
 
 
 def as_noted(robot: Robot, data: Dataset, slips: Callable[[Dataset], Iterator[Slip]]) -> Iterator[Slip]:
@@ -216,9 +248,7 @@ def sign_slips(data: Dataset, size: int = 1) -> Iterator[Slip]:
         joints[:, group] *= -1
         which = " and ".join(str(i + 1) for i in group)
         words = f"The sign of joint {which} is opposite to the robot's: the data fit with it changed. "
-        yield Slip(
-            "joint-sign", words + "Change it in the data, or correct the robot file", replace(data, joints=joints)
-        )
+        yield Slip(JOINT_SIGN, words + "Change it in the data, or correct the robot file", replace(data, joints=joints))
 
 
 def order_slips(data: Dataset) -> Iterator[Slip]:
@@ -227,7 +257,7 @@ def order_slips(data: Dataset) -> Iterator[Slip]:
         joints = data.joints.copy()
         joints[:, [a, b]] = joints[:, [b, a]]
         words = f"Joints {a + 1} and {b + 1} are in the wrong order: the data fit with the columns exchanged. "
-        yield Slip("joint-sign", words + "Exchange their columns", replace(data, joints=joints))
+        yield Slip(JOINT_SIGN, words + "Exchange their columns", replace(data, joints=joints))
 
 
 def shifted(data: Dataset) -> Iterator[Slip]:
@@ -235,7 +265,7 @@ def shifted(data: Dataset) -> Iterator[Slip]:
     for by, words in ((1, "before"), (-1, "after")):
         joints = np.roll(data.joints, by, axis=0)
         said = f"The readings of each configuration fit the joint positions of the one {words} it: the columns are "
-        yield Slip("rows-shifted", said + "shifted by one row. Shift them back", replace(data, joints=joints))
+        yield Slip(ROWS_SHIFTED, said + "shifted by one row. Shift them back", replace(data, joints=joints))
 
 
 # Slips with orientations: quaternions in another order, turns the other way round, angles of another convention.
@@ -246,8 +276,20 @@ def shifted(data: Dataset) -> Iterator[Slip]:
 # fixed axes (Craig, Introduction to Robotics, appendix B), and rotation vectors; in radians, and in radians that were
 # called degrees.
 
-#: Codes of what is told here.
-ORIENTATION_SLIPS: Final = frozenset({"quaternion-order", "orientation-order"})
+QUATERNION_ORDER: Final = Rule(
+    "quaternion-order",
+    "error",
+    "quaternions, all or some, that do not turn as the robot does: another order, or the inverse, as of transposed "
+    "matrices",
+)
+ORIENTATION_ORDER: Final = Rule(
+    "orientation-order",
+    "error",
+    "orientations, all or some, that would turn as the robot does [if their angles were read "
+    "otherwise](check.md#orientations-read-by-another-convention)",
+    cure="Mend the mapping, or whatever made quaternions of them.",
+)
+ORIENTATION_SLIPS: Final = frozenset({QUATERNION_ORDER, ORIENTATION_ORDER})
 #: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
 _TURNED_WITHIN: Final = 0.1
 #: A slip explains orientations that it leaves so near to the robot's [rad], and so many times nearer than they came.
@@ -292,7 +334,7 @@ def orientation_slips(robot: Robot, data: Dataset) -> list[Notice]:
         return []
     left, words = min((readings.left(rotation_from_quaternion(mended)), words) for words, mended in _of_numbers(read))
     if left * _LEAST_IMPROVEMENT <= given:
-        return [Notice("quaternion-order", f"The quaternions do not turn as the robot does: {words}.", "error")]
+        return [QUATERNION_ORDER(f"The quaternions do not turn as the robot does: {words}.")]
     if readings.rows < _FEWEST:
         return []
     return _of_angles(readings, rotation_from_quaternion(read), given)
@@ -374,17 +416,15 @@ def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]
     if not told:
         return []
     return [
-        Notice(
-            "orientation-order",
+        ORIENTATION_ORDER(
             "The orientations do not turn as the robot does, and would if their three numbers were read otherwise: "
-            f"{_first_of(told)}. Mend the mapping, or whatever made quaternions of them.",
-            "error",
+            f"{_first_of(told)}.",
         )
     ]
 
 
-def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], str, str]:
-    """Return which single orientations turn as they should when they are read otherwise, the code, and how in words.
+def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], Rule, str]:
+    """Return which single orientations turn as they should when they are read otherwise, the rule, and how in words.
 
     Of all ways the one is taken that explains most of them: it must explain two, or one by the order of a quaternion.
 
@@ -395,9 +435,9 @@ def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], str
     turned = rotation_from_quaternion(read)
     allowed = np.minimum(_EXPLAINED_WITHIN, _angles_between([turned], predicted) / _IMPROVEMENT_OF_ROWS)
     of_numbers = [(0, words, [rotation_from_quaternion(mended)]) for words, mended in _of_numbers(read)]
-    for code, fewest, ways in (
-        ("quaternion-order", 1, of_numbers),
-        ("orientation-order", _FEWEST_ROWS, _other_conventions(turned)),
+    for rule, fewest, ways in (
+        (QUATERNION_ORDER, 1, of_numbers),
+        (ORIENTATION_ORDER, _FEWEST_ROWS, _other_conventions(turned)),
     ):
         tried = []
         for rare, words, turns in ways:
@@ -411,8 +451,8 @@ def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], str
             least = min(left for _, _, left, _, _ in most)
             told = sorted((rare, left, words) for _, rare, left, words, _ in most if left <= _AS_GOOD * least)
             which = next(explained for *_, words, explained in most if words == told[0][2])
-            return which, code, _first_of([words for *_, words in told])
-    return np.zeros(len(read), dtype=bool), "", ""
+            return which, rule, _first_of([words for *_, words in told])
+    return np.zeros(len(read), dtype=bool), QUATERNION_ORDER, ""
 
 
 def _other_conventions(turned: Array) -> Iterator[tuple[int, str, list[Array]]]:

@@ -15,10 +15,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
-from truearm.engine.data.rigid_tool import FARTHEST, LENGTH_FACTORS, factors_of, lengths_noticed
+from truearm.engine.data.rigid_tool import FARTHEST, LENGTH_FACTORS, UNIT_LENGTH, factors_of, lengths_noticed
 from truearm.engine.data.statistics import Errors, errors_of
 from truearm.engine.diagnose.slip_trials import (
     Slip,
@@ -83,7 +83,7 @@ def mixed_length_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     if (factor == 1.0).all():
         return
     words, at = lengths_noticed(data, factor)
-    yield Slip("unit-length", words, replace(data, position=data.position * factor[:, None]), at)
+    yield Slip(UNIT_LENGTH, words, replace(data, position=data.position * factor[:, None]), at)
 
 
 def _placed(robot: Robot, data: Dataset) -> Robot | None:
@@ -304,7 +304,7 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
         only = _only(some, t)
         best = _best(robot, only, [*length_slips(only), *mirrored(only), *scale_slips(robot, only)])
         if best is not None:
-            found.append(Notice(best.code, f"Target {some.targets[t]}: {best.words}.", "error"))
+            found.append(best.rule(f"Target {some.targets[t]}: {best.words}."))
     return [*turned, *found] or _beyond_reach(robot, some)
 
 
@@ -369,6 +369,13 @@ def _shares(robot: Robot, slips: Sequence[Slip]) -> list[float]:
     return [float(np.median(off)) / _spread(slip.data) for off, slip in zip(errors, slips, strict=True)]
 
 
+FIXTURES_UNLIKELY: Final = Rule(
+    "fixtures-unlikely",
+    ("error", "warning"),
+    "[fixtures](devices.md) that the readings do not fit",
+)
+
+
 def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
     """Return the first slip that explains readings against fixtures: turned about, several may fit alike."""
     size = _misfit(robot, data)
@@ -394,11 +401,11 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
         ):
             return [slip.notice]
     return [
-        Notice(
-            "fixtures-unlikely",
+        FIXTURES_UNLIKELY(
             "The nominal robot does not fit the readings against fixtures. Half of them are off by more than "
             f"{size * 1e3:.3g} mm, with base, targets and fixtures where they fit best. Check that the rows name the "
             "right fixtures, and the places in the rows of the role fixture.",
+            "warning",
         )
     ]
 
@@ -460,12 +467,10 @@ def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:
     if _size_over_reach(robot, data) <= 1.0:
         return []
     return [
-        Notice(
-            "unit-length",
+        UNIT_LENGTH(
             f"The positions lie up to {_apart(data):.3g} m from the middle of all, where the arm reaches "
             f"{_reach(robot, data):.2g} m. No one unit makes them fit: some of their numbers are in another unit or "
             "lost their decimal point or comma, or more is wrong with the data than that.",
-            "error",
         )
     ]
 
@@ -484,6 +489,14 @@ def _reach(robot: Robot, data: Dataset) -> float:
     return float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
 
 
+ROWS_UNRELATED: Final = Rule(
+    "rows-unrelated",
+    "error",
+    "readings that do not follow the joint positions",
+    cure="Check that joint positions and readings are of the same campaign, and row by row of the same configuration.",
+)
+
+
 def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
     """Say if the readings fit the joints no better than in an order that is drawn."""
     given = _misfit(robot, data)
@@ -497,12 +510,9 @@ def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
     drawn = (replace(data, joints=rng.permutation(data.joints)) for _ in range(_ORDERS_DRAWN))
     if any(_ALIKE * _misfit(robot, other) <= given for other in drawn):
         return [
-            Notice(
-                "rows-unrelated",
+            ROWS_UNRELATED(
                 "The readings do not follow the joint positions: in an order drawn at random they fit the robot as "
-                "well. Check that joint positions and readings are of the same campaign, and row by row of the same "
-                "configuration.",
-                "error",
+                "well.",
             )
         ]
     return []

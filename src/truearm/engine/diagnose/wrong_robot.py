@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, listed
+from truearm.engine.base.errors import InputError, Notice, Rule, listed
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.statistics import errors_of
@@ -127,6 +127,13 @@ def _geometry_moved(fit: Fit, data: Dataset) -> float:
     return float(np.sqrt(np.mean(least**2)))
 
 
+IMPLAUSIBLE: Final = Rule(
+    "implausible",
+    "error",
+    "a robust fit that [cannot be this robot](results.md#status-and-warnings)",
+)
+
+
 def check_plausible(fit: Fit, data: Dataset, others: Iterable[Notice] = ()) -> list[Notice]:
     """Return a notice if a fit cannot be this robot.
 
@@ -143,7 +150,7 @@ def check_plausible(fit: Fit, data: Dataset, others: Iterable[Notice] = ()) -> l
         if cause is None
         else f"The cause is most likely what {cause} says; mend that and calibrate again."
     )
-    return [Notice("implausible", f"What was fitted cannot be this robot: {why}. {cure}", "error")]
+    return [IMPLAUSIBLE(f"What was fitted cannot be this robot: {why}. {cure}")]
 
 
 # Are the lengths that a fit found those of this robot: the rule behind `wrong-robot`.
@@ -157,8 +164,19 @@ def check_plausible(fit: Fit, data: Dataset, others: Iterable[Notice] = ()) -> l
 # are taken ten times as wide, so that what they do cannot pass for lengths.
 
 #: The code of the notice.
-WRONG_ROBOT: Final = "wrong-robot"
-LENGTHS_SCALED: Final = "lengths-scaled"
+WRONG_ROBOT: Final = Rule(
+    "wrong-robot",
+    "error",
+    "lengths that [are another robot's](results.md#is-it-this-robot), or a robot of the library that fits where a "
+    "slip would explain it too",
+)
+LENGTHS_SCALED: Final = Rule(
+    "lengths-scaled",
+    "error",
+    "all lengths of the robot came out too long, or too short, by one factor, four times farther than its priors let "
+    "expect: a length in the measurement is wrong (the instrument's scale, the distance between sockets or spheres, "
+    "the squares of a board)",
+)
 #: Deviations from which all lengths have grown together, and share of their growth that readings must see.
 _GROWN: Final = 4.0
 _LEAST_SEEN: Final = 0.25
@@ -313,8 +331,7 @@ def check_robot(fit: Fit, data: Dataset) -> list[Notice]:
         return _check_growth(fit.robot, lengths)
     better = _Better.of(fit.robot, data)
     return [
-        Notice(
-            WRONG_ROBOT,
+        WRONG_ROBOT(
             f"The readings are not of {fit.robot.name}, by its lengths: {listed(lengths.named())} off nominal. A robot "
             f"as good as its priors is so far off with a probability of {max(lengths.chance, 1e-16):.0e}."
             f"{'' if better is None else better.text} Take the file of the robot that was measured. If this is the "
@@ -332,8 +349,7 @@ def _check_growth(robot: Robot, lengths: Lengths) -> list[Notice]:
         return []
     way = f"{abs(growth) * 100:.2g} % too {'long' if growth > 0.0 else 'short'}"
     return [
-        Notice(
-            LENGTHS_SCALED,
+        LENGTHS_SCALED(
             f"All lengths of {robot.name} come out {way}, by one factor: {abs(deviations):.1f} times what its priors "
             "let expect. That is what a wrong length in the measurement does: the scale of the instrument, the "
             "distance between sockets or spheres, the squares of a board, units. Measure that again. What is expected "
@@ -353,8 +369,7 @@ def other_robot(robot: Robot, data: Dataset) -> list[Notice]:
     if better is None:
         return []
     return [
-        Notice(
-            WRONG_ROBOT,
+        WRONG_ROBOT(
             f"The readings are not of {robot.name}.{better.text} Take the file of the robot that was measured.",
             "error",
         )

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import Notice, listed
+from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.chain import Array
@@ -196,6 +196,13 @@ def _agreement(angle: Array, pull: Array) -> float:
     return float(total @ np.linalg.lstsq(waves @ waves.T, total, rcond=1e-10)[0])
 
 
+TRANSMISSION_ERROR: Final = Rule(
+    "transmission-error",
+    "warning",
+    "residuals repeat with a joint's angle",
+)
+
+
 def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
     """Return a notice if some joints err periodically."""
     found = periodic_errors(fit, data)
@@ -203,8 +210,7 @@ def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
         return []
     told = "; ".join(error.words for error in found)
     return [
-        Notice(
-            "transmission-error",
+        TRANSMISSION_ERROR(
             f"What is left over repeats with the joints' angles: {told}. Strain wave gears do that, twice in a turn "
             "of their wave generator. `model=auto` tries to take the error out; any other model does with the effect "
             "transmission-error, and transmission_periods of these joints in the robot file.",

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice
+from truearm.engine.base.errors import Notice, Rule
 from truearm.engine.motion.constraints import at_the_origin
 from truearm.engine.robot.chain import Array, ForwardKinematics
 from truearm.engine.robot.robot import Robot
@@ -103,6 +103,14 @@ def _centres(arm: Robot) -> list[list[Array]]:
     return found
 
 
+LINKS_BESIDE: Final = Rule(
+    "links-beside",
+    "note",
+    "the arm has parallel axes, and its links may lie beside the lines of the model: between which places along the "
+    "axis they are kept clear. Plans without a program say it, too, as they do the next three",
+)
+
+
 def beside_notices(robot: Robot) -> list[Notice]:
     """Return what to know of an arm whose links may lie beside the lines of the model."""
     notices = []
@@ -110,13 +118,11 @@ def beside_notices(robot: Robot) -> list[Notice]:
         numbers = f"{', '.join(str(j) for j in group.joints[:-1])} and {group.joints[-1]}"
         low, high = sorted(round(1e3 * group.side * at) for at in (group.low, group.high))
         notices.append(
-            Notice(
-                "links-beside",
+            LINKS_BESIDE(
                 f"The axes of joints {numbers} are parallel, and no model says where along them the links are. The arm "
                 f"keeps clear wherever they lie from {low} to {high} mm along the axis of joint {group.joints[0]} "
                 "from where the model has it. If a drawing has a link farther out, state a `clearance` larger "
                 "by that.",
-                "note",
             )
         )
     return notices

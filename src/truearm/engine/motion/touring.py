@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.motion.arm_capsules import beside_notices
 from truearm.engine.motion.collisions import CollisionCheck
 from truearm.engine.motion.tour import HOME, Stop, Tour
@@ -70,19 +70,33 @@ _NARROW: Final = {"revolute": math.radians(7.0), "prismatic": 5e-3}
 _SAME: Final = 1e-6
 
 
+NEVER_APART: Final = Rule(
+    "never-apart",
+    "note",
+    "in a stated cell, as [plans](planning.md#a-program-that-drives-the-plan) say them",
+)
+
+
 def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
     """Return what is to be known of what a check keeps clear of."""
     notices = [*_box_notices(check), *_frame_notices(check), *beside_notices(check.robot)]
     if check.left_out:
         notices.append(
-            Notice(
-                "never-apart",
+            NEVER_APART(
                 "Nearer to each other than the clearance whatever the joints do, and so not kept apart: "
                 f"{'; '.join(check.left_out)}.",
-                "note",
             )
         )
     return tuple(notices)
+
+
+LIMITS_TINY: Final = Rule(
+    "limits-tiny",
+    "warning",
+    "joints that have less than 7 deg or 5 mm between the limits of the constraints, or the robot's own: their unit "
+    "may be another one. Configurations that coincide are refused",
+    cure="Check the unit of the limits, rad or deg, m or mm.",
+)
 
 
 def limits_notices(robot: Robot, low: Array, high: Array) -> tuple[Notice, ...]:
@@ -95,7 +109,15 @@ def limits_notices(robot: Robot, low: Array, high: Array) -> tuple[Notice, ...]:
     if not narrow:
         return ()
     told = "Hardly any range is left to a joint" if len(narrow) == 1 else "Hardly any range is left to joints"
-    return (Notice("limits-tiny", f"{told}: {', '.join(narrow)}. Check the unit of the limits, rad or deg, m or mm."),)
+    return (LIMITS_TINY(f"{told}: {', '.join(narrow)}."),)
+
+
+OTHER_BASE_ON_PENDANT: Final = Rule(
+    "other-base-on-pendant",
+    "note",
+    "floor and boxes are in another base frame than that in which the pendant shows positions: where the origin of "
+    "that is. Plans without a program and of [tests by ISO 9283](iso9283.md) say it, too",
+)
 
 
 def _frame_notices(check: CollisionCheck) -> list[Notice]:
@@ -112,13 +134,25 @@ def _frame_notices(check: CollisionCheck) -> list[Notice]:
     at = ", ".join(f"{round(1e3 * v, 3) + 0.0:g}" for v in moved)
     also = f", turned by {np.degrees(turned):.4g} deg" if turned >= _SAME else ""
     return [
-        Notice(
-            "other-base-on-pendant",
+        OTHER_BASE_ON_PENDANT(
             f"{named[0].upper()}{named[1:]} {kept} kept in the base frame of the robot file. The pendant shows "
             f"positions in another one, with its origin at ({at}) mm in it{also}: add that to what it shows.",
-            "note",
         )
     ]
+
+
+BOX_TINY: Final = Rule(
+    "box-tiny",
+    "warning",
+    "no side of a box is 10 mm long: its unit is another one",
+    cure="Check the unit of the constraints.",
+)
+BOX_OUT_OF_REACH: Final = Rule(
+    "box-out-of-reach",
+    "warning",
+    "a box that the arm never comes near: its unit or its frame may be another one",
+    cure="Check its unit, and that it is in the base frame of the robot.",
+)
 
 
 def _box_notices(check: CollisionCheck) -> list[Notice]:
@@ -131,19 +165,15 @@ def _box_notices(check: CollisionCheck) -> list[Notice]:
         away = float(np.linalg.norm(np.clip(0.0, box.low, box.high)))
         if longest < _TINY:
             notices.append(
-                Notice(
-                    "box-tiny",
-                    f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm. Check the unit of the "
-                    "constraints.",
+                BOX_TINY(
+                    f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm.",
                 )
             )
         elif away - reach > check.need:
             notices.append(
-                Notice(
-                    "box-out-of-reach",
+                BOX_OUT_OF_REACH(
                     f"The box '{box.name}' begins {away * 1e3:.0f} mm from the base, and the arm reaches at most "
-                    f"{reach * 1e3:.0f} mm: nothing is kept clear by it. Check its unit, and that it is in the base "
-                    "frame of the robot.",
+                    f"{reach * 1e3:.0f} mm: nothing is kept clear by it.",
                 )
             )
     return notices

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.base.units import from_si
 from truearm.engine.programs.urscript.new import FASTEST
 from truearm.engine.robot.chain import Array
@@ -52,16 +52,23 @@ def refuse_unknown_counts(robot: Robot, language: str) -> None:
     )
 
 
+CONTROLLER_COUNTS_ASSUMED: Final = Rule(
+    "controller-counts-assumed",
+    "warning",
+    "the robot file does not say how the controller counts the joints: the program has the model's",
+    cure="Compare them with the pendant before anything moves, and say under controller in the robot file how it "
+    "counts.",
+)
+
+
 def counts_notices(robot: Robot) -> list[Notice]:
     """Return what is to be said of a program for a robot whose controller's counting is not known."""
     if robot.controller.counts_known:
         return []
     return [
-        Notice(
-            "controller-counts-assumed",
+        CONTROLLER_COUNTS_ASSUMED(
             f"It is not known how the controller of {robot.name} counts its joints: the program has the model's "
-            "joint positions. Compare them with the pendant before anything moves, and say under controller in "
-            "the robot file how it counts.",
+            "joint positions.",
         )
     ]
 
@@ -246,6 +253,15 @@ def speed_words(speeds: Sequence[float], robot: Robot) -> str:
     return f"{text} {units[0]}/s" if same else text
 
 
+JOINT_SPEED_ASSUMED: Final = Rule(
+    "joint-speed-assumed",
+    "note",
+    "the language says no share of the joints' speed, or that speed is not known; the message tells what joint "
+    "motions have instead",
+    gravity=0,
+)
+
+
 def speed_notices(robot: Robot, assumed: str) -> list[Notice]:
     """Return what is to be said of the joints' speed.
 
@@ -264,7 +280,7 @@ def speed_notices(robot: Robot, assumed: str) -> list[Notice]:
             " The velocities of the URDF are not relied on, as many stand for nothing: compare them with the maker's "
             "data sheet, and convert the robot into another convention."
         )
-    return [Notice("joint-speed-assumed", words, "note")]
+    return [JOINT_SPEED_ASSUMED(words)]
 
 
 def _leading_share(robot: Robot, most: Array, share: float) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
 
-from truearm.engine.base.errors import InputError, Notice, counted, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, refusals_of
 from truearm.engine.base.files import noted_reads
 from truearm.engine.base.manifest import written_differently
 from truearm.engine.base.writing import output_folder, write_files
@@ -282,17 +282,30 @@ _READERS: Final[Mapping[str, Callable[[Path], object]]] = {
 }
 
 
+BEST_FIT_ALIGNMENT: Final = Rule(
+    "best-fit-alignment",
+    "warning",
+    "the instrument's frame was fitted to the attained poses: AP and AT are too small",
+    cure="Tie the instrument to the base and give `alignment`.",
+    gravity=2,
+)
+INSTRUMENT_TOO_COARSE: Final = Rule(
+    "instrument-too-coarse",
+    "warning",
+    "what instrument and tie leave open is more than a quarter of some values",
+    gravity=2,
+)
+
+
 def _warnings(
     plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any], instrument: Instrument
 ) -> tuple[Notice, ...]:
     notices: list[Notice] = []
     if not found.alignment.is_standard:
         notices.append(
-            Notice(
-                "best-fit-alignment",
+            BEST_FIT_ALIGNMENT(
                 "The frame of the instrument was fitted to the attained poses. That hides a part of the error that "
-                "pose and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small. "
-                "Tie the instrument to the base and give `alignment`.",
+                "pose and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small.",
             )
         )
     notices += row_notices(found)
@@ -310,13 +323,19 @@ def _warnings(
             for name, components in coarse.items()
         ]
         notices.append(
-            Notice(
-                "instrument-too-coarse",
+            INSTRUMENT_TOO_COARSE(
                 f"What instrument and tie leave open is more than a quarter of some values of {', '.join(names)}. "
                 "They say more about the measurement than about the robot.",
             )
         )
     return (*notices, *said_of_streams(found), *said_of_rounding(found, instrument))
+
+
+PLAN_CHANGED: Final = Rule(
+    "plan-changed",
+    "note",
+    "`plan.yaml` was changed since truearm wrote it. Values are held against what it says now",
+)
 
 
 def _of_plan(path: Path) -> tuple[Notice, ...]:
@@ -327,13 +346,30 @@ def _of_plan(path: Path) -> tuple[Notice, ...]:
     except InputError:  # what stands beside it is no manifest of truearm
         return ()
     return (
-        Notice(
-            "plan-changed",
+        PLAN_CHANGED(
             f"{path.name} was changed since truearm wrote it, and programs and sheet beside it are not those of this "
             "plan. Values are held against what it says now.",
-            "note",
         ),
     )
+
+
+ALIGNMENT_DIFFERS: Final = Rule(
+    "alignment-differs",
+    "warning",
+    "the two results were tied to the base in different ways; AP and AT are not compared",
+)
+PLAN_DIFFERS: Final = Rule(
+    "plan-differs",
+    "warning",
+    "some values of the other result were planned or read otherwise, and are not compared",
+    gravity=2,
+)
+PLAN_UNKNOWN: Final = Rule(
+    "plan-unknown",
+    "warning",
+    "the other result does not say what was planned: it was written by an older version",
+    cure="Evaluate its files again.",
+)
 
 
 def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
@@ -343,21 +379,19 @@ def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
     notices = []
     if beside.left_out:
         notices.append(
-            Notice(
-                "alignment-differs",
+            ALIGNMENT_DIFFERS(
                 f"The two results were tied to the base in different ways: {', '.join(beside.left_out)} are not "
                 "compared.",
             )
         )
     if beside.unlike:
         told = "; ".join(f"{', '.join(ids)}: {why}" for why, ids in beside.unlike.items())
-        notices.append(Notice("plan-differs", f"Values that are not alike are not compared. {told}."))
+        notices.append(PLAN_DIFFERS(f"Values that are not alike are not compared. {told}."))
     if beside.unknown_plan:
         notices.append(
-            Notice(
-                "plan-unknown",
+            PLAN_UNKNOWN(
                 "The other result does not say what was planned, as it was written by an older version: whether poses, "
-                "paths, tip and limit band were the same cannot be told. Evaluate its files again.",
+                "paths, tip and limit band were the same cannot be told.",
             )
         )
     return tuple(notices)

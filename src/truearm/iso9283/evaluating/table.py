@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from truearm.engine.base.errors import Notice, counted
+from truearm.engine.base.errors import Notice, Rule, counted
 from truearm.iso9283.criteria.compliance import WildPush
 from truearm.iso9283.criteria.rows import Conditions, CopiedBlock, Cycles, Quantity, Value
 from truearm.iso9283.criteria.wild_rows import Kind, TwoPlaces, WildRow
@@ -204,6 +204,43 @@ _EACH_CYCLE: Final = ("AP", "AD", "AT", "AT-reorientation", "CR", "AV", "WS", "t
 _FAR_TURNED: Final = math.radians(2.0)
 
 
+WILD_ROW: Final = Rule(
+    "wild-row",
+    "warning",
+    "rows lie far from the other cycles of their pose; the values with and without them are said",
+    cure="Look at the record, and measure the pose again if the reading was at fault.",
+)
+WILD_PUSH: Final = Rule(
+    "wild-push",
+    "warning",
+    "readings under a push lie far from the line of the others; compliance with and without them is said",
+    cure="Look at the record, and push again if the reading was at fault.",
+)
+TWO_PLACES: Final = Rule(
+    "two-places",
+    "warning",
+    "the tip rests in two places at a pose: intervals of RP and RD may not hold",
+    cure="Look for play, or for something that changed during the test.",
+)
+CYCLES_ALIKE: Final = Rule(
+    "cycles-alike",
+    "warning",
+    "each cycle is like the one before it: intervals are too narrow. Warm up longer, look for what creeps",
+    cure="Let the robot warm up longer, and see whether robot or instrument creeps.",
+)
+ORIENTATION_FAR_OFF: Final = Rule(
+    "orientation-far-off",
+    "warning",
+    "orientations are off by more than 2 deg: those of another frame than the plan's tip",
+)
+PLACES_MISSING: Final = Rule(
+    "places-missing",
+    "warning",
+    "poses, approaches, robots, paths or velocities of the plan have no row",
+    cure="Measure them, or plan the test without them.",
+)
+
+
 def row_notices(found: Evaluation) -> tuple[Notice, ...]:
     """Return what is to be known about the rows of an evaluation."""
     notices = []
@@ -214,29 +251,24 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
             told += f" So do {counted(len(wild) - _TOLD, 'other row')}, on line "
             told += f"{', '.join(str(int(row.of.line[0])) for row in wild[_TOLD:])}."
         notices.append(
-            Notice(
-                "wild-row",
-                f"{told} The standard excludes no row, and none was left out. Look at the record, and measure the "
-                "pose again if the reading was at fault.",
+            WILD_ROW(
+                f"{told} The standard excludes no row, and none was left out.",
             )
         )
     if found.wild_pushes:
         told = " ".join(_push_words(one) for one in found.wild_pushes)
         notices.append(
-            Notice(
-                "wild-push",
-                f"{told} The standard excludes no reading, and none was left out. Look at the record, and push again "
-                "if the reading was at fault.",
+            WILD_PUSH(
+                f"{told} The standard excludes no reading, and none was left out.",
             )
         )
     if places:
         told = "; ".join(_places_words(one) for one in places[:_TOLD])
         more = f"; and {len(places) - _TOLD} more" if len(places) > _TOLD else ""
         notices.append(
-            Notice(
-                "two-places",
+            TWO_PLACES(
                 f"The tip comes to rest in two places: {told}{more}. The values stand, but the intervals of RP and RD "
-                "may not hold. Look for play, or for something that changed during the test.",
+                "may not hold.",
             )
         )
     if found.unusual.alike:
@@ -246,18 +278,16 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
             for one in found.unusual.alike[:_TOLD_PLACES]
         )
         notices.append(
-            Notice(
-                "cycles-alike",
+            CYCLES_ALIKE(
                 f"Each cycle is like the one before it: {told}. Intervals assume that cycles are independent, and are "
-                "too narrow here. Let the robot warm up longer, and see whether robot or instrument creeps.",
+                "too narrow here.",
             )
         )
     turned = [v for v in found.values if v.id == "AP" and v.quantity == "angle" and abs(v.value) > _FAR_TURNED]
     if turned:
         worst = max(turned, key=lambda value: abs(value.value))
         notices.append(
-            Notice(
-                "orientation-far-off",
+            ORIENTATION_FAR_OFF(
                 f"Orientations are off by up to {number_words(worst)} deg (AP {worst.component} of {worst.where}). "
                 "Robots are seldom off by a degree: check that they are those of the plan's tip, and the rotation of "
                 "the alignment.",
@@ -267,13 +297,23 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
         told = "; ".join(found.missing[:_TOLD_PLACES])
         more = f"; and {len(found.missing) - _TOLD_PLACES} more" if len(found.missing) > _TOLD_PLACES else ""
         notices.append(
-            Notice(
-                "places-missing",
-                f"Planned and without a row: {told}{more}. The worst of the others is not what the standard asks for. "
-                "Measure them, or plan the test without them.",
+            PLACES_MISSING(
+                f"Planned and without a row: {told}{more}. The worst of the others is not what the standard asks for.",
             )
         )
     return tuple(notices)
+
+
+TOO_FEW_CYCLES: Final = Rule(
+    "too-few-cycles",
+    "warning",
+    "fewer cycles than planned, with the place and how many of how many; the values stand",
+)
+MORE_CYCLES: Final = Rule(
+    "more-cycles",
+    "note",
+    "more cycles than planned: all are in the values. Check that none belongs to another test",
+)
 
 
 def cycle_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
@@ -290,19 +330,24 @@ def cycle_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
             more[words] = None
     notices = []
     if few:
-        notices.append(
-            Notice("too-few-cycles", f"Fewer cycles than planned were measured: {_some(few)}. Their values stand.")
-        )
+        notices.append(TOO_FEW_CYCLES(f"Fewer cycles than planned were measured: {_some(few)}. Their values stand."))
     if more:
         notices.append(
-            Notice(
-                "more-cycles",
+            MORE_CYCLES(
                 f"More cycles than planned were measured: {_some(more)}. All of them are in the values; check that "
                 "none belongs to another test.",
-                "note",
             )
         )
     return notices
+
+
+OTHER_CUBE: Final = Rule(
+    "other-cube",
+    "warning",
+    "all poses lie as those of a cube more than 1 % larger or smaller, or with its middle more than 5 % of its side "
+    "aside: measured for another plan",
+    cure="Give the plan.yaml that was measured.",
+)
 
 
 def cube_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
@@ -312,11 +357,10 @@ def cube_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
         return []
     side = 1e3 * plan.cube.side
     return [
-        Notice(
-            "other-cube",
+        OTHER_CUBE(
             f"The poses of {other.test} lie as those of a cube of {side * other.scale:.1f} mm, where the plan has "
             f"{side:.1f} mm, with its middle {1e3 * other.aside:.1f} mm aside. No robot is off like that: were they "
-            "measured for another plan, or is the tie to the base another one? Give the plan.yaml that was measured.",
+            "measured for another plan, or is the tie to the base another one?",
         )
     ]
 
@@ -327,6 +371,16 @@ def _some(words: Collection[str]) -> str:
     return "; ".join(told[:_TOLD_PLACES]) + more
 
 
+COPIED_SAMPLES: Final = Rule(
+    "copied-samples",
+    "warning",
+    "two cycles of a path, or ways to a pose, have ten samples in a row or more at the same places to the last "
+    "digit: one is a copy",
+    cure="Write what was measured, or remove the copy.",
+    gravity=2,
+)
+
+
 def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:
     """Return what is to be known about samples that two cycles share."""
     if not blocks:
@@ -334,11 +388,10 @@ def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:
     told = "; ".join(_copied_words(block) for block in blocks[:_TOLD])
     more = f"; and {len(blocks) - _TOLD} more" if len(blocks) > _TOLD else ""
     return [
-        Notice(
-            "copied-samples",
+        COPIED_SAMPLES(
             f"Cycles have samples at the same places to the last digit: {told}{more}. No robot does that: one was "
             "copied from the other, or the readings are simulated without noise. RT and what else says how cycles "
-            "differ is too small. Write what was measured, or remove the copy.",
+            "differ is too small.",
         )
     ]
 

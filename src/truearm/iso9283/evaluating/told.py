@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.base.errors import Notice, listed
+from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.compliance import GRAVITY, PushLine
 from truearm.iso9283.criteria.drift import DriftCourse
@@ -27,6 +27,18 @@ _SHORTEST: Final = 0.9
 _LONGEST: Final = 1.25
 #: Times in other units, by how many seconds they have.
 _UNITS: Final = {"minutes": 60.0, "hours": 3600.0, "milliseconds": 1e-3}
+
+
+SINGLE_DRIFT_GROUP: Final = Rule(
+    "single-drift-group",
+    "warning",
+    "all cycles of drift are one group, so that there is no change to be told",
+)
+DRIFT_TIME: Final = Rule(
+    "drift-time",
+    "warning",
+    "drift was watched over another time than planned, or without times; the hours and groups are said",
+)
 
 
 def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tuple[Notice, ...]:
@@ -50,8 +62,7 @@ def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tupl
     made = []
     if single:
         made.append(
-            Notice(
-                "single-drift-group",
+            SINGLE_DRIFT_GROUP(
                 f"All cycles of drift are one group at {'; '.join(single)}: there is no change to be told. A group "
                 "begins where the numbers of the cycles begin anew, or after a pause.",
             )
@@ -59,8 +70,7 @@ def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tupl
     if other or timeless:
         told = "; ".join(other) or "the rows of dAP have no times"
         made.append(
-            Notice(
-                "drift-time",
+            DRIFT_TIME(
                 f"Drift is planned over {plan.hours:g} h; measured: {told}. dAP and dRP tell the change over the time "
                 "that was measured, and are not those of the plan.",
             )
@@ -86,6 +96,13 @@ def said_of_pushes(plan: PerformancePlan, pushes: Sequence[PushLine], instrument
     return tuple(notice for notice in found if notice is not None)
 
 
+LOW_FORCES: Final = Rule(
+    "low-forces",
+    "warning",
+    "the largest forces are well below the weight of the rated load. Push further, or check the unit",
+)
+
+
 def _low(plan: PerformancePlan, pushes: Sequence[PushLine]) -> Notice | None:
     test = plan.test("compliance")
     if test is None or not plan.rated_load > 0:
@@ -105,9 +122,15 @@ def _low(plan: PerformancePlan, pushes: Sequence[PushLine]) -> Notice | None:
         else " Push up to the rated load, or check the unit."
     )
     told = ", ".join(f"{name} {largest[name]:.4g} N" for name in low)
-    return Notice(
-        "low-forces", f"The largest forces are well below the weight of the rated load, {most:.4g} N: {told}.{asked}"
-    )
+    return LOW_FORCES(f"The largest forces are well below the weight of the rated load, {most:.4g} N: {told}.{asked}")
+
+
+SIDEWAYS_PUSH: Final = Rule(
+    "sideways-push",
+    "warning",
+    "the tip moves more at right angles to the force than along it",
+    cure="Check that the directions are axes of the robot's base, not of the instrument, and that none are exchanged.",
+)
 
 
 def _sideways(pushes: Sequence[PushLine], instrument: Instrument) -> Notice | None:
@@ -138,10 +161,8 @@ def _sideways(pushes: Sequence[PushLine], instrument: Instrument) -> Notice | No
             told.append(f"{name} ({1e3 * sideways:.3g} mm/N, most along {most}; along it {1e3 * along:.3g})")
     if not told:
         return None
-    return Notice(
-        "sideways-push",
-        f"The tip moves more at right angles to the force than along it: {listed(told)}. Check that the directions "
-        "are axes of the robot's base, not of the instrument, and that none are exchanged.",
+    return SIDEWAYS_PUSH(
+        f"The tip moves more at right angles to the force than along it: {listed(told)}.",
     )
 
 
@@ -168,6 +189,14 @@ def said_of_rounding(found: Evaluation, instrument: Instrument) -> tuple[Notice,
     return tuple(notice for notice in notices if notice is not None)
 
 
+READINGS_ROUNDED: Final = Rule(
+    "readings-rounded",
+    "note",
+    "readings in the file are rounded more coarsely than the instrument reads; rounding stands in place of its noise",
+    cure="Write more decimals.",
+)
+
+
 def _readings(found: Evaluation, instrument: Instrument) -> Notice | None:
     told = []
     for name, reading in found.readings.items():
@@ -179,12 +208,19 @@ def _readings(found: Evaluation, instrument: Instrument) -> Notice | None:
             told.append(f"quaternions of {name} to {step:.2g} ({math.degrees(reading.rounding_rot):.2g} deg)")
     if not told:
         return None
-    return Notice(
-        "readings-rounded",
+    return READINGS_ROUNDED(
         f"Readings are rounded more coarsely than the instrument reads: {', '.join(told)}. What that leaves open "
-        "as a standard deviation, in brackets, stands in place of the instrument's. Write more decimals.",
-        "note",
+        "as a standard deviation, in brackets, stands in place of the instrument's.",
     )
+
+
+TIMES_ROUNDED: Final = Rule(
+    "times-rounded",
+    "note",
+    "times are rounded to more than the tip is known to move in; the message says where an even clock was found",
+    cure="Samples that an even clock fits were placed on it; where none does, rounding counts as noise, and what it "
+    "leaves open is marked. Write the times with more decimals.",
+)
 
 
 def _times(found: Evaluation, instrument: Instrument) -> Notice | None:
@@ -197,12 +233,8 @@ def _times(found: Evaluation, instrument: Instrument) -> Notice | None:
     if not told:
         return None
     more = f", and {len(told) - _NAMED} more" if len(told) > _NAMED else ""
-    return Notice(
-        "times-rounded",
-        f"Times are rounded to more than the tip is known to move in: {', '.join(list(told.values())[:_NAMED])}{more}. "
-        "Samples that an even clock fits were placed on it; where none does, rounding counts as noise, and what it "
-        "leaves open is marked. Write the times with more decimals.",
-        "note",
+    return TIMES_ROUNDED(
+        f"Times are rounded to more than the tip is known to move in: {', '.join(list(told.values())[:_NAMED])}{more}.",
     )
 
 
@@ -309,6 +341,14 @@ def _moving(along: Array, length: float) -> int:
     return int(((along > _END * length) & (along < (1 - _END) * length)).sum())
 
 
+UNUSUAL_SAMPLES: Final = Rule(
+    "unusual-samples",
+    "warning",
+    "samples lie apart from those about them, as in no other cycle. Look at the paths in the report; remove the "
+    "lines if it was the instrument",
+)
+
+
 def _unusual(records: Sequence[_Record]) -> Notice | None:
     named = []
     for record in records:
@@ -318,8 +358,7 @@ def _unusual(records: Sequence[_Record]) -> Notice | None:
             named.append((one.distance, text))
     if not named:
         return None
-    return Notice(
-        "unusual-samples",
+    return UNUSUAL_SAMPLES(
         f"Samples lie apart from those about them, as in no other cycle there: {_worst(named)}. If it was the "
         "instrument, remove these lines: samples may be missing. If it was the robot, they belong into the figures.",
     )
@@ -335,6 +374,13 @@ def _called(run: Run) -> str:
     return f"{run.test} on {run.path.path.name}"
 
 
+SLOW_PATH: Final = Rule(
+    "slow-path",
+    "warning",
+    "paths were run much slower than commanded. Check `velocity [%]` and the rated velocity",
+)
+
+
 def _slow(runs: Sequence[Run]) -> Notice | None:
     told = []
     for run in runs:
@@ -344,11 +390,17 @@ def _slow(runs: Sequence[Run]) -> Notice | None:
     if not told:
         return None
     more = f", and {len(told) - _NAMED_PATHS} more" if len(told) > _NAMED_PATHS else ""
-    return Notice(
-        "slow-path",
+    return SLOW_PATH(
         f"Paths were run much slower than commanded: {', '.join(told[:_NAMED_PATHS])}{more}. If the robot cannot, that "
         "is what AV says; otherwise check velocity [%] and the rated velocity of the plan.",
     )
+
+
+SAMPLED_TOO_SLOWLY: Final = Rule(
+    "sampled-too-slowly",
+    "warning",
+    "samples are too far apart for some values, which are marked. Sample faster",
+)
 
 
 def _sparse(found: Evaluation) -> Notice | None:
@@ -363,11 +415,18 @@ def _sparse(found: Evaluation) -> Notice | None:
         told |= dict.fromkeys(id_ for id_, far in zip(ids, curve.sparse, strict=False) if far)
     if not told:
         return None
-    return Notice(
-        "sampled-too-slowly",
+    return SAMPLED_TOO_SLOWLY(
         f"Samples are too far apart for some values of {listed(tuple(told))}: what lies between two of them is not "
         "seen. Those values are marked; sample faster.",
     )
+
+
+WILD_CYCLE: Final = Rule(
+    "wild-cycle",
+    "warning",
+    "cycles lie apart from the others of their path as a whole; AT and RT with and without them are said",
+    cure="Look at the record, and measure the cycle again if the instrument or its mount moved.",
+)
 
 
 def _wild(found: Evaluation) -> Notice | None:
@@ -383,11 +442,18 @@ def _wild(found: Evaluation) -> Notice | None:
         named.append((far, f"cycle {number} of {_called(path.run)} by {1e3 * far:.4f} mm ({now})"))
     if not named:
         return None
-    return Notice(
-        "wild-cycle",
+    return WILD_CYCLE(
         f"Cycles lie apart from the others of their path as a whole: {_worst(named)}. The standard excludes no cycle, "
-        "and none was left out. Look at the record, and measure the cycle again if the instrument or its mount moved.",
+        "and none was left out.",
     )
+
+
+GAP_IN_PATH: Final = Rule(
+    "gap-in-path",
+    "warning",
+    "samples are missing on a part of the way",
+    cure="Measure these cycles again, or leave them out.",
+)
 
 
 def _gaps(runs: Sequence[Run]) -> Notice | None:
@@ -406,11 +472,18 @@ def _gaps(runs: Sequence[Run]) -> Notice | None:
                 named.append((float(gap[worst]), text))
     if not named:
         return None
-    return Notice(
-        "gap-in-path",
+    return GAP_IN_PATH(
         f"Samples are missing on a part of the way: {_worst(named)}. Values there come from straight lines between the "
-        "samples before and behind. Measure these cycles again, or leave them out.",
+        "samples before and behind.",
     )
+
+
+VELOCITY_BANDWIDTH: Final = Rule(
+    "velocity-bandwidth",
+    "note",
+    "up to which frequency FV tells fluctuation",
+    cure="Compare robots at the same bandwidth.",
+)
 
 
 def _bandwidth(found: Evaluation) -> Notice | None:
@@ -419,12 +492,17 @@ def _bandwidth(found: Evaluation) -> Notice | None:
         return None
     low, high = min(bandwidths), max(bandwidths)
     upto = f"{high:.2g} Hz" if high < 1.1 * low else f"{low:.2g} to {high:.2g} Hz"
-    return Notice(
-        "velocity-bandwidth",
+    return VELOCITY_BANDWIDTH(
         f"FV and its interval tell what fluctuates with up to {upto}: faster fluctuation is smoothed away together "
-        "with the instrument's noise. Compare robots at the same bandwidth.",
-        "note",
+        "with the instrument's noise.",
     )
+
+
+CORNER_OFFSET: Final = Rule(
+    "corner-offset",
+    "note",
+    "most of CR is that the path as a whole lies beside its command; CR from its own corner is said",
+)
 
 
 def _aside(found: Evaluation) -> Notice | None:
@@ -432,11 +510,9 @@ def _aside(found: Evaluation) -> Notice | None:
     if not there:
         return None
     worst = max(there, key=lambda corner: corner.offset)
-    return Notice(
-        "corner-offset",
+    return CORNER_OFFSET(
         f"At {len(there)} of {len(found.corners)} corners the path as a whole lies beside its command by more than "
         f"half of CR, which CR and CO contain. At {worst.where} it lies {1e3 * worst.offset:.3f} mm beside, and CR of "
         f"{1e3 * float(worst.rounding.mean()):.3f} mm would be {1e3 * float(worst.own.mean()):.3f} mm from its own "
         "corner.",
-        "note",
     )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from truearm.engine.base.errors import InputError, Notice, refusals_of
+from truearm.engine.base.errors import InputError, Rule, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.command.arguments import (
     files_of,
@@ -33,6 +33,14 @@ if TYPE_CHECKING:
 _ASSUMED_VELOCITY = 1.0
 
 
+RATED_VELOCITY_ASSUMED: Final = Rule(
+    "rated-velocity-assumed",
+    "note",
+    "100 % was taken for 1000 mm/s along a path",
+    cure="State the rated velocity of your robot with `velocity`.",
+)
+
+
 def planned(asked: PlanTests) -> Iso9283Plan:
     """Plan the tests, and write what they are done with."""
     given_cube = None if asked.cube == "auto" else path_argument(asked.cube, "cube")
@@ -45,11 +53,8 @@ def planned(asked: PlanTests) -> Iso9283Plan:
     rated = _rated_load(arm, asked.load)
     if asked.velocity is None:
         warnings.append(
-            Notice(
-                "rated-velocity-assumed",
-                f"100 % is taken for {_ASSUMED_VELOCITY * 1e3:g} mm/s along a path. State the rated velocity of your "
-                "robot with `velocity`.",
-                "note",
+            RATED_VELOCITY_ASSUMED(
+                f"100 % is taken for {_ASSUMED_VELOCITY * 1e3:g} mm/s along a path.",
             )
         )
     where = str(asked.constraints) if isinstance(asked.constraints, str | Path) else "constraints"

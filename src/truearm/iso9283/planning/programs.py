@@ -11,12 +11,13 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, refusals_of
 from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.units import IN_PROGRAMS
 from truearm.engine.base.writing import same_place
 from truearm.engine.command.driving import cell_argument
+from truearm.engine.command.split import MAKER
 from truearm.engine.motion.cell import Cell
 from truearm.engine.motion.collisions import CollisionCheck
 from truearm.engine.motion.constraints import Constraints, allowed, joint_window, limits_of, refuse_clearance_of
@@ -24,6 +25,7 @@ from truearm.engine.motion.tour import distance_words
 from truearm.engine.motion.touring import nearest_on
 from truearm.engine.programs.fake_targets import nominal_robot
 from truearm.engine.programs.joint_speeds import (
+    JOINT_SPEED_ASSUMED,
     counts_comments,
     counts_notices,
     first_share,
@@ -478,9 +480,7 @@ def written_programs(
             check_slow_run(slow_run, text, slow, datetime.date.today())
     robot = plan.robot
     if robot.maker and not language.runs_on(robot.maker):
-        warnings.append(
-            Notice("maker", f"{robot.name} is of {robot.maker}, and programs were written in {language.name}.")
-        )
+        warnings.append(MAKER(f"{robot.name} is of {robot.maker}, and programs were written in {language.name}."))
     warnings += [*counts_notices(robot), *_speed_notices(robot, language)]
     if cell_unknown:
         warnings += _near(plan.robot, found.ways)
@@ -493,7 +493,7 @@ def _speed_notices(robot: Robot, language: Language) -> list[Notice]:
     found = []
     if language.name in _JOINT_SPEEDS:
         words = f"{language.name} says no share of the joints' speed: {_JOINT_SPEEDS[language.name]}."
-        found.append(Notice("joint-speed-assumed", words, "note"))
+        found.append(JOINT_SPEED_ASSUMED(words))
     if language.name == "RAPID":
         return found
     assumed = "in the slow run joint motions are so slow that the tip keeps to 250 mm/s with the joints of fast arms"
@@ -505,6 +505,15 @@ def _speed_notices(robot: Robot, language: Language) -> list[Notice]:
 def _texts(programs: Sequence[MotionProgram], language: Language) -> dict[str, str]:
     assert language.motion is not None
     return {f"{_FOLDER}/{name}": text for one in programs for name, text in language.motion(one).items()}
+
+
+WAYS_NEAR: Final = Rule(
+    "ways-near",
+    "warning",
+    "on some ways of the measuring programs the arm comes within 50 mm of a floor at the height of its base, or of "
+    "its own links; the message names the nearest",
+    cure="Look at these ways first, or state `constraints` or `clearance`: then they are kept clear.",
+)
 
 
 def _near(robot: Robot, ways: Mapping[str, Array]) -> list[Notice]:
@@ -519,11 +528,9 @@ def _near(robot: Robot, ways: Mapping[str, Array]) -> list[Notice]:
     at = int(np.argmin(near[worst].room))
     room = max(float(near[worst].room[at]), 0.0)
     return [
-        Notice(
-            "ways-near",
+        WAYS_NEAR(
             f"On {len(near)} of {len(looked)} ways the arm comes within {cell.clearance * 1e3:g} mm of the floor or of "
-            f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {room * 1e3:.0f} mm. Look at "
-            "these ways first, or state `constraints` or `clearance`: then they are kept clear.",
+            f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {room * 1e3:.0f} mm.",
         )
     ]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted, refusals_of, wrong_kind
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, refusals_of, wrong_kind
 from truearm.engine.base.files import path_argument
 from truearm.engine.base.units import Marked, from_si
 from truearm.engine.base.writing import output_folder, write_files
@@ -352,12 +352,19 @@ def _correction(
     return corrected, [] if off <= max(_NO_BETTER * nominal, 3.0 * tracker.sigma) else [_of_another(off, nominal)]
 
 
+ANOTHER_TRUTH: Final = Rule(
+    "another-truth",
+    "warning",
+    "`simulate --corrected`: the calibrated robot misses the twin by more than half of what the nominal one does",
+    cure="Correcting with it tells nothing of the robot that was measured. Give the truth, and its seed, that the "
+    "measurements are of.",
+)
+
+
 def _of_another(off: float, nominal: float) -> Notice:
-    return Notice(
-        "another-truth",
+    return ANOTHER_TRUTH(
         f"The calibrated robot misses this twin by {1e3 * off:.2g} mm, the nominal one by {1e3 * nominal:.2g} mm (root "
-        f"mean square at {_LOCATED} configurations): it was calibrated on another truth, or badly. Correcting with it "
-        "tells nothing of the robot that was measured. Give the truth, and its seed, that the measurements are of.",
+        f"mean square at {_LOCATED} configurations): it was calibrated on another truth, or badly.",
     )
 
 

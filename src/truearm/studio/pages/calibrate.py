@@ -6,12 +6,13 @@ import time
 from typing import Any, ClassVar, Final
 
 from truearm.calibration.calibrating import FitStep
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import exists, read_text
 from truearm.engine.choosing.selection import AUTO
 from truearm.engine.fit.losses import LOSSES
 from truearm.engine.fit.models import FRAMES, MODELS
 from truearm.studio import words
+from truearm.studio.evaluated_with import OTHER_SETTINGS
 from truearm.studio.fit_course import fit_course
 from truearm.studio.pages.check import choose_measurements, data_of
 from truearm.studio.pages.choices import NONE, chosen, offer
@@ -23,8 +24,7 @@ from truearm.studio.window import Window
 #: The course of a fit is drawn so often at most [s].
 _PAUSE: Final = 0.5
 _MODELS: Final = (*(model.name for model in MODELS), AUTO, FRAMES.name)
-_STALE: Final = Notice(
-    "other-settings",
+_STALE: Final = OTHER_SETTINGS(
     "The figures below were made with another robot, measurements, payload, exclusions or settings than are chosen "
     "now. Calibrate again, or look at the page Proof: it says what the result is of, and what differs.",
 )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Rule
 from truearm.engine.robot.library import library
 from truearm.engine.robot.parts import Payload
 from truearm.planning.programs import load_notices
@@ -19,6 +19,12 @@ from truearm.studio.pages.jog import JogPage
 from truearm.studio.scene import Scene
 from truearm.studio.uploads import Upload
 from truearm.studio.window import Window
+
+PAYLOAD_FAR: Final = Rule(
+    "payload-far",
+    "warning",
+    "the centre of the payload is farther from the flange than the arm is long",
+)
 
 
 class CellPage:
@@ -83,7 +89,7 @@ class CellPage:
                 f"The centre of the payload is {away * 1e3:.0f} mm from the flange, and {robot.name} is "
                 f"{length * 1e3:.0f} mm long: check the units."
             )
-            window.tell(Notice("payload-far", text, "warning"))
+            window.tell(PAYLOAD_FAR(text))
 
     def _draw_boxes(self, rules: CellRules | None) -> None:
         self._scene().show_boxes({} if rules is None else rules.corners)

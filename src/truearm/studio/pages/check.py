@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted
+from truearm.engine.base.errors import InputError, Notice, Rule, counted
 from truearm.engine.base.files import exists, read_text
 from truearm.engine.data.excluded import Exclusion, exclusions_text, read_exclusions
 from truearm.engine.robot.chain import Array
@@ -236,6 +236,13 @@ class CheckPage:
         return (project.settings.robot, stamp_of(project.robot_file())), data, self._excluded
 
 
+NOTHING_EXCLUDED: Final = Rule(
+    "nothing-excluded",
+    "warning",
+    "other measurements are chosen, so that the readings excluded from the former ones are no longer",
+)
+
+
 def choose_measurements(window: Window, name: str | None) -> None:
     """Choose measurements; what was excluded from other ones is no longer, for it is said of readings by their names.
 
@@ -254,7 +261,7 @@ def choose_measurements(window: Window, name: str | None) -> None:
         f"{settings.exclude} excludes readings of {settings.data}. Other measurements are chosen, so nothing is "
         "excluded now. Undo brings both back; if its readings are among these too, choose it again on the page Check."
     )
-    window.tell(Notice("nothing-excluded", text, "warning"))
+    window.tell(NOTHING_EXCLUDED(text))
 
 
 def _excludes(window: Window, name: str) -> bool:

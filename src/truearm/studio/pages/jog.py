@@ -11,12 +11,13 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Notice, Rule
 from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_quaternion
 from truearm.studio import words
+from truearm.studio.evaluated_with import OTHER_ROBOT
 from truearm.studio.jogging import Branch, JogFrame, Jogging
 from truearm.studio.pages.jog_path import JogPath
 from truearm.studio.pages.jog_views import JogViews
@@ -403,8 +404,15 @@ def _shown_range(low: float, high: float) -> tuple[float, float]:
 
 def _other_robot(other: str, robot: Robot) -> Notice:
     text = f"The result is of {other} and not of {robot.name}: the calibrated arm is not drawn, and cannot be moved."
-    return Notice("other-robot", text, "warning")
+    return OTHER_ROBOT(text)
+
+
+NO_REAL_ROBOT: Final = Rule(
+    "no-real-robot",
+    "note",
+    "jogging moves a drawing",
+)
 
 
 def _no_robot() -> Notice:
-    return Notice("no-real-robot", _SAFE, "note")
+    return NO_REAL_ROBOT(_SAFE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import Any, ClassVar, Final
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Rule
 from truearm.engine.base.files import confined_reads, exists
 from truearm.measuring.reading_log import LOG
 from truearm.measuring.report import drift_figure, quality_figure
@@ -40,6 +40,18 @@ _ALL: Final = (
     "reading can be set aside, and is then asked for again; and the air can be read."
 )
 _DONE: Final = "Measured: the page Check tells whether the measurements can be believed."
+
+
+NOT_TAKEN: Final = Rule(
+    "not-taken",
+    "warning",
+    "rows or lines of an instrument that could not be read, by file and line",
+)
+MEASURED: Final = Rule(
+    "measured",
+    "note",
+    "the measurements are written and chosen",
+)
 
 
 class MeasurePage:
@@ -205,7 +217,7 @@ class MeasurePage:
         entries, told = measuring.step(most)
         if told:
             more = f" and {len(told) - _TOLD} more" if len(told) > _TOLD else ""
-            self._window.tell(Notice("not-taken", f"{' '.join(told[:_TOLD])}{more}", "warning"))
+            self._window.tell(NOT_TAKEN(f"{' '.join(told[:_TOLD])}{more}"))
         if not measuring.is_virtual or entries:
             self._noted()
         self._turn += 1
@@ -253,7 +265,7 @@ class MeasurePage:
             )
         choose_measurements(self._window, measuring.data)
         if outcome != before:
-            self._window.tell(Notice("measured", _DONE, "note"))
+            self._window.tell(MEASURED(_DONE))
         self._window.refresh()
 
     def _close(self) -> None:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 
 from truearm.calibration.result import RESULT_FILES
 from truearm.compensation.result import REPORT
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError, Rule
 from truearm.engine.base.files import exists
 from truearm.engine.base.manifest import MANIFEST
 from truearm.engine.programs.cell import read_wrenches
@@ -38,6 +38,13 @@ _CORRECTED: Final = (*_DRAWN, "result", "corrected", *_ASKED)
 _TAUGHT: Final = (
     *("none", "points", "tools", "frames"),
     *("points, tools", "points, frames", "tools, frames", "points, tools, frames"),
+)
+
+
+OTHER_PROGRAM: Final = Rule(
+    "other-program",
+    "warning",
+    "the corrected program is of another state of the project, and is not handed out",
 )
 
 
@@ -116,7 +123,7 @@ class ProgramsPage:
         self._stands.content = ""
         if corrected is not None and corrected.changed:
             told = f"{corrected.told} It is not handed out: correct the program again."
-            self._stands.content = words.notices([Notice("other-program", told, "warning")])
+            self._stands.content = words.notices([OTHER_PROGRAM(told)])
 
     def _push(self, name: str, value: Any) -> None:
         """Change what acts on the tool; a text that is no force and no file of forces is refused."""

@@ -13,6 +13,7 @@ from truearm.engine.base.files import exists, read_text
 from truearm.engine.base.units import said_of
 from truearm.engine.data.excluded import read_exclusions
 from truearm.studio import words
+from truearm.studio.evaluated_with import OTHER_MEASUREMENTS, OTHER_ROBOT, OTHER_SETTINGS
 from truearm.studio.made_with import MadeWith, made_with
 from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.error_arrows import ErrorArrows
@@ -94,23 +95,23 @@ class ProofPage:
             name, source = self._window.robot().name, self._window.project.settings.robot
             chosen_now = name if source == name else f"{name} ({source})"
             text = f"This result is of the robot {other}, and {chosen_now} is chosen: calibrate again."
-            found.append(Notice("other-robot", text, "warning"))
+            found.append(OTHER_ROBOT(text))
         if differing := made.differing(self._window.project.settings, self._window.robot()):
             was, is_now = ("; ".join(f"{name} {pair[i]}" for name, pair in differing.items()) for i in (0, 1))
             text = f"This result was made with {was}. Chosen now: {is_now}. Calibrate again to see what that is worth."
-            found.append(Notice("other-settings", text, "warning"))
+            found.append(OTHER_SETTINGS(text))
         data = self._window.project.file("data")
         if data is not None and exists(data):
             digest = hashlib.sha256(data.read_bytes()).hexdigest()[:12]
             if f"sha256 {digest}" not in str(result.get("history", "")):
                 text = f"This result is of other measurements than {self._window.project.settings.data} as it is now."
-                found.append(Notice("other-measurements", text, "warning"))
+                found.append(OTHER_MEASUREMENTS(text))
         exclude = self._window.project.file("exclude")
         chosen = read_exclusions(exclude) if exclude is not None and exists(exclude) else ()
         excluded = [(one.configuration, one.target, one.reason) for one in chosen]
         if excluded != [(one["configuration"], one["target"], one["reason"]) for one in result.get("excluded", ())]:
             text = "This result is without other readings than those that are excluded now: calibrate again."
-            found.append(Notice("other-measurements", text, "warning"))
+            found.append(OTHER_MEASUREMENTS(text))
         return found
 
     def _draw(self) -> None:

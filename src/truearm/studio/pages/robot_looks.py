@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any, Final
 
-from truearm.engine.base.errors import InputError, Notice, shortened
+from truearm.engine.base.errors import InputError, Rule, shortened
 from truearm.engine.base.files import exists
 from truearm.engine.robot.library import urdf_source
 from truearm.engine.robot.robot import Robot
@@ -18,6 +18,13 @@ from truearm.studio.window import Window
 _FILES: Final = (".urdf", ".stl", ".obj")
 #: So much is said of why links have no meshes.
 _LONGEST: Final = 600
+
+
+WITHOUT_MESHES: Final = Rule(
+    "without-meshes",
+    "note",
+    "links of a URDF are drawn without meshes, and why",
+)
 
 
 class RobotLooks:
@@ -57,4 +64,4 @@ class RobotLooks:
 
     def _tell(self, why: str) -> None:
         text = f"Links are drawn without meshes: {shortened(why, _LONGEST)}"
-        self._window.tell(Notice("without-meshes", text, "note"))
+        self._window.tell(WITHOUT_MESHES(text))

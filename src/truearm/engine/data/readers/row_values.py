@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, counted, nearest_names
+from truearm.engine.base.errors import InputError, Notice, Rule, counted, nearest_names
 from truearm.engine.base.units import as_number, sized_si
 from truearm.engine.data.dataset import IntArray
 from truearm.engine.data.readers.cells import Cells, column_letters
@@ -163,6 +163,15 @@ def deviations(cells: Cells, content: MappingFile, mapping: Path, name: Literal[
     return np.stack(parts, axis=1).reshape(-1)
 
 
+SIGMA_UNEVEN: Final = Rule(
+    "sigma-uneven",
+    "note",
+    "deviations of the three coordinates of a reading, or of its three angles, that are twice apart or more in half "
+    "of the readings: a tracker knows distances better than angles. Of their mean square the root is taken, so that "
+    "the variance of the whole stays; the best coordinate counts less than it could",
+)
+
+
 def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list[Notice]:
     """Say if deviations of the three coordinates of a reading are far apart: a reading has one for all of them."""
     found: list[Notice] = []
@@ -180,12 +189,10 @@ def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list
         if not len(apart) or np.median(apart) < _UNEVEN:
             continue
         found.append(
-            Notice(
-                "sigma-uneven",
+            SIGMA_UNEVEN(
                 f"The deviations of {whole} of one reading are {np.median(apart):.2g} times apart in half of the "
                 f"readings or more, and up to {apart.max():.2g} times. Data have one {name} for all three, the root of "
                 "their mean square: the best coordinate counts less than it could, and the worst one more.",
-                "note",
             )
         )
     return found
@@ -224,10 +231,19 @@ def unlikely_radians(
     return found
 
 
+RADIANS_UNLIKELY: Final = Rule(
+    "radians-unlikely",
+    "warning",
+    "angles of orientations beyond a full turn where the mapping says `rad`, or joints beyond one in half of the "
+    "rows: they look like degrees. Degrees that all are below 6 cannot be told from radians; [`truearm "
+    "check`](check.md) with the robot tries the units of the joints",
+    gravity=2,
+)
+
+
 def _of_radians(large: Array, what: str, entry: str) -> Notice:
     rows = int(np.sum(large > _FULL_TURN))
-    return Notice(
-        "radians-unlikely",
+    return RADIANS_UNLIKELY(
         f"The angles of {what} are read as radians and go beyond a full turn in {rows} of "
         f"{counted(len(large), 'row')}, up to {large.max():.4g}: they look like degrees. Correct {entry} in the "
         "mapping, if they are.",

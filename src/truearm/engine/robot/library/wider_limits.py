@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
-from truearm.engine.base.errors import Notice
+from truearm.engine.base.errors import Notice, Rule
 from truearm.engine.robot.library import library, load_robot
 from truearm.engine.robot.parts import Joint
 from truearm.engine.robot.robot import Robot
 
 #: Limits that differ by less were rounded [rad or m].
 _ROUNDED = math.radians(0.05)
+
+
+LIMITS_WIDER: Final = Rule(
+    "limits-wider",
+    "note",
+    "the robot file has the name of a robot of the library, and limits of joints beyond those of the library; the "
+    "message names both",
+    cure="See that this arm has these limits: its controller stops where it has others.",
+)
 
 
 def wider_limits_notices(robot: Robot) -> list[Notice]:
@@ -28,11 +38,9 @@ def wider_limits_notices(robot: Robot) -> list[Notice]:
     if not wider:
         return []
     return [
-        Notice(
-            "limits-wider",
+        LIMITS_WIDER(
             f"The robot is called {robot.name}, and its joints go further than those of {robot.name} in the library: "
-            f"{'; '.join(wider)}. See that this arm has these limits: its controller stops where it has others.",
-            "note",
+            f"{'; '.join(wider)}.",
         )
     ]
 

@@ -1,0 +1,130 @@
+"""What every check of a fit looks at: the fit, its data, and what follows from them once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+from truearm.engine.base.errors import Notice, has_error
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.rigid_tool import OUTLIERS, TARGET_MISTAKEN, TARGETS_SWAPPED
+from truearm.engine.data.statistics import Errors
+from truearm.engine.data.thinning import JOINTS_REPEATED
+from truearm.engine.diagnose.arrivals import check_sigma, check_sigma_beside_joints
+from truearm.engine.diagnose.changes import Change, notices_of_change, what_moved
+from truearm.engine.diagnose.expected_error import ExpectedError, as_residuals_allow, expected_error
+from truearm.engine.diagnose.far_off import PULLING
+from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
+from truearm.engine.diagnose.off_configurations import Off, off_configurations
+from truearm.engine.diagnose.unmodelled import ANY_ERROR, PULLED_AWAY, LeftOver
+from truearm.engine.diagnose.wrong_robot import (
+    IMPLAUSIBLE,
+    WRONG_ROBOT,
+    check_plausible,
+    check_robot,
+    judges_lengths,
+)
+from truearm.engine.fit.fit import Fit, Status
+
+#: The same, and single readings that are far off: what is left is not the robot's.
+_DOUBTING: Final = PULLING | {OUTLIERS.code}
+#: Readings under the name of another point. A fit that they pull must not be used, and their names can be put right.
+_MISNAMED: Final = frozenset({TARGETS_SWAPPED.code, TARGET_MISTAKEN.code})
+#: Readings that pull a fit, whatever is wrong with them.
+DOUBTED: Final = _DOUBTING | _MISNAMED | {JOINTS_REPEATED.code}
+#: Losses with which a fit is pulled.
+PULLED: Final = frozenset({"linear", "huber"})
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A fit, its data, and what follows from them: what every check looks at."""
+
+    fit: Fit
+    data: Dataset  #: All readings, training and held out.
+    training: Dataset
+    errors: Errors  #: By which it is judged: of what was held out, if `held_out`, of the training readings otherwise.
+    noticed: tuple[Notice, ...]  #: What was said of the data before they were fitted.
+    of_split: tuple[Notice, ...]  #: What speaks against the split.
+    held_out: bool
+
+    @cached_property
+    def left(self) -> LeftOver:
+        """What the fit leaves of all readings."""
+        return LeftOver.of(self.fit, self.data)
+
+    @cached_property
+    def off(self) -> Off:
+        """The configurations that are off one by one."""
+        return off_configurations(self.left)
+
+    @cached_property
+    def moved(self) -> tuple[LeftOver, Change] | None:
+        """What moved during the campaign."""
+        return what_moved(self.left, self.off)
+
+    @cached_property
+    def changes(self) -> list[Notice]:
+        """What is said of that."""
+        return [] if self.moved is None else notices_of_change(*self.moved)
+
+    @cached_property
+    def bent(self) -> bool:
+        """Whether wrong readings pulled the fit away: it leaves much and expects much, whatever the model."""
+        return self.fit.loss in PULLED and any(notice.code in PULLING for notice in self.noticed)
+
+    @cached_property
+    def of_data(self) -> list[Notice]:
+        """What was said of the data and still holds.
+
+        What the robust fit of the check could not explain, the fit itself may, and how many readings it is made from it
+        knows itself. Of its lengths the robust fit knows more where this one was pulled away, or had none to choose.
+        """
+        return [
+            replace(notice, level="error") if notice.code in _MISNAMED and self.fit.loss in PULLED else notice
+            for notice in self.noticed
+            if notice.code not in (IMPLAUSIBLE.code, FEW_READINGS.code, WRONG_ROBOT.code)
+        ]
+
+    @cached_property
+    def of_robot(self) -> tuple[list[Notice], list[Notice]]:
+        """Whether it can be this robot at all, and whether its lengths are this one's."""
+        told = [notice for notice in self.noticed if notice.code == WRONG_ROBOT.code]
+        other = check_robot(self.fit, self.training) if judges_lengths(self.fit) and not self.bent else told
+        if has_error([*self.of_data, *self.changes]):  # what is wrong with the data bends the robot too
+            other = []
+        unlike = check_plausible(self.fit, self.training, (*self.of_data, *other, *told))
+        return unlike, (other or told) if unlike else other
+
+    @cached_property
+    def expected(self) -> ExpectedError:
+        """How accurate the robot is where it was not measured."""
+        doubted = has_error([*self.of_data, *self.changes]) or any(n.code in _DOUBTING for n in self.of_data)
+        plausible = not self.of_robot[0]
+        return expected_error(as_residuals_allow(self.fit, self.training), plausible=plausible, doubted=doubted)
+
+    @property
+    def status(self) -> Status:
+        """How it ended: a fit that cannot be this robot is implausible, however well it converged."""
+        return Status.IMPLAUSIBLE if self.of_robot[0] else self.fit.status
+
+    @cached_property
+    def few(self) -> list[Notice]:
+        """Whether hardly more was read than the parameters take up."""
+        return check_few_readings(self.fit)
+
+    @cached_property
+    def sigma(self) -> tuple[list[Notice], list[Notice]]:
+        """Whether declared deviations are too large; and whether they hide errors of the joints."""
+        too_large = check_sigma(self.left)
+        unlike = self.of_robot[0]
+        return too_large, [] if unlike or has_error(too_large) else check_sigma_beside_joints(self.left)
+
+    def is_silent(self, notice: Notice, told: Sequence[Notice]) -> bool:
+        """Return whether a notice says nothing beside what was told before it."""
+        silencing = {one.code for one in told}
+        silencing |= {ANY_ERROR} if has_error(told) else set()
+        silencing |= {PULLED_AWAY} if self.bent else set()
+        return notice.rule is not None and not notice.rule.unless.isdisjoint(silencing)

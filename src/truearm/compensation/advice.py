@@ -60,7 +60,7 @@ POSTURE_GUESSED: Final = Rule(
 MOVES_NOT_DIVIDED: Final = Rule(
     "moves-not-divided",
     "warning",
-    "moves that `--split` left",
+    "moves that `split` left",
 )
 LOAD_CHANGES: Final = Rule(
     "load-changes",

@@ -84,7 +84,7 @@ TOOL_ASSUMED: Final = Rule(
     "tool-assumed",
     ("note", "warning"),
     "nobody said what the flange carries, or which targets are measured: the program tells the controller of what "
-    "the message names. Targets: those of the first of the robot file's `tools`; of a file of readings (`--from`) "
+    "the message names. Targets: those of the first of the robot file's `tools`; of a file of readings (`from`) "
     "where these have them; else three reflectors about 150 mm apart, as of no robot. Load: that of the same tool, "
     "else 0 kg; where the robot file has targets, always 0 kg. A wrong load can stop the robot or let it give way",
 )
@@ -269,7 +269,7 @@ FASTER_THAN_ASKED: Final = Rule(
     "faster-than-asked",
     "warning",
     "`krl` and `fanuc` say shares in whole percent, rounded down, and at 1 % the fastest arms go faster than "
-    "`--speed`; so may their first move (that of an LR Mate 251.6 mm/s instead of 250). Less than 1 % cannot be "
+    "`speed`; so may their first move (that of an LR Mate 251.6 mm/s instead of 250). Less than 1 % cannot be "
     "said, and a share is one of the joints' speed however short the way, so that parts of a move are no slower; the "
     "override of the pendant makes it slower. Head and sheet have that speed",
     cure="Set the override of the controller lower, or state a higher `speed`.",

@@ -255,7 +255,7 @@ def _left_with_both(robot: Robot, data: Dataset, readings: int) -> float:
 FRAMES_DIFFER: Final = Rule(
     "frames-differ",
     ("warning", "error"),
-    "they fit only with another base and other targets: find both with `--model frames`",
+    "they fit only with another base and other targets: find both with `model frames`",
     cure="Find them with 'truearm calibrate' and `model=frames`.",
     gravity=2,
 )

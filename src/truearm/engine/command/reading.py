@@ -109,7 +109,7 @@ def count_excluded(excluded: tuple[Excluded, ...]) -> dict[str, int]:
 EXCLUDED: Final = Rule(
     "excluded",
     "note",
-    "readings that [`--exclude`](results.md#excluding-readings) leaves out, with their reasons; they count as missing",
+    "readings that [`exclude`](results.md#excluding-readings) leaves out, with their reasons; they count as missing",
 )
 
 

@@ -153,7 +153,7 @@ class Ranged(Protocol):
 BEYOND_RANGE: Final = Rule(
     "beyond-range",
     "warning",
-    "readings outside the range of the instrument that `--device` names",
+    "readings outside the range of the instrument that `device` names",
     cure="Check the units, and that it was this device.",
 )
 

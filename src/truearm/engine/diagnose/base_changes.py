@@ -194,7 +194,7 @@ def _moved(data: Dataset, part: NDArray[np.intp], motions: Sequence[Motion]) -> 
 BASE_CHANGED: Final = Rule(
     "base-changed",
     "note",
-    "readings were moved into the frame of the first base (`--base-changes`)",
+    "readings were moved into the frame of the first base (`base_changes`)",
 )
 
 

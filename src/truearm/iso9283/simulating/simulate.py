@@ -355,7 +355,7 @@ def _correction(
 ANOTHER_TRUTH: Final = Rule(
     "another-truth",
     "warning",
-    "`simulate --corrected`: the calibrated robot misses the twin by more than half of what the nominal one does",
+    "`simulate corrected`: the calibrated robot misses the twin by more than half of what the nominal one does",
     cure="Correcting with it tells nothing of the robot that was measured. Give the truth, and its seed, that the "
     "measurements are of.",
 )

@@ -41,7 +41,7 @@ def page() -> str:
     for folder in sorted(tables, key=lambda name: (name != "engine", name)):
         text += f"\n## `{folder}`\n\n| code | level | what was noticed, and what to do |\n|---|---|---|\n"
         for rule in sorted(tables[folder], key=lambda rule: rule.code):
-            told = f"{rule.meaning}. {rule.cure}" if rule.cure else rule.meaning
+            told = f"{rule.meaning}. {rule.cure}".removesuffix(". ")
             text += f"| `{rule.code}` | {' or '.join(rule.levels)} | {told} |\n"
     return text
 

@@ -60,7 +60,7 @@ POSTURE_GUESSED: Final = Rule(
 MOVES_NOT_DIVIDED: Final = Rule(
     "moves-not-divided",
     "warning",
-    "moves that `split` left",
+    "moves that `split` could not divide",
 )
 LOAD_CHANGES: Final = Rule(
     "load-changes",
@@ -285,7 +285,8 @@ def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
 LOADS_TAKEN: Final = Rule(
     "loads-taken",
     ("warning", "note"),
-    "what the arm carries with each tool, by the program or as in calibration",
+    "what the arm carries with each tool, by the program or as in calibration (note); or that a tool weighs "
+    "otherwise than what the robot carried then (warning)",
 )
 
 

@@ -319,7 +319,7 @@ DRIFT_ALIKE: Final = Rule(
 ANOTHER_MACHINE: Final = Rule(
     "another-machine",
     "warning",
-    "most parameters of a machine changed as much as robots differ: is it the same machine?",
+    "most parameters of a machine changed as much as robots differ",
     cure="Check whether the entry 'of' names the same machine.",
 )
 DRIFT_UNDATED: Final = Rule(

@@ -114,7 +114,7 @@ class SolvedPose:
 ATTACHMENTS_NOT_COMPARED: Final = Rule(
     "attachments-not-compared",
     "warning",
-    "No configuration was measured with two attachments. The data declare no standard deviation then",
+    "no configuration was measured with two attachments, so the data declare no standard deviation",
     cure="Measure a few configurations again after the next attachment.",
 )
 

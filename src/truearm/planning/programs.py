@@ -53,7 +53,7 @@ _MOST_NAMED: Final = 6
 OVERLOAD: Final = Rule(
     "overload",
     "warning",
-    "the flange carries more than the `rated_load` of the robot file. Plans without a program say it, too",
+    "the flange carries more than the `rated_load` of the robot file",
     cure="Check the unit and the tool of `payload` before anything is driven.",
     gravity=2,
 )

@@ -36,7 +36,7 @@ _CLEARLY: Final = 5.0
 TYPE_NOT_TOLD: Final = Rule(
     "type-not-told",
     "note",
-    "the file fits other types of the library as well: read the type on the arm",
+    "the file fits other types of the library as well",
     cure="Read the type on the arm; with the wrong one lengths are off by what the data sheets differ.",
 )
 TYPE_DOUBTFUL: Final = Rule(

@@ -397,7 +397,7 @@ POSES_UNMET: Final = Rule(
 INFLUENCE_WORSE: Final = Rule(
     "influence-worse",
     "note",
-    "influence leaves more on the judging configurations than least squares over all poses",
+    "influence leaves more on the poses that judge than least squares over all poses",
     cure="Calibrate with 'truearm calibrate'.",
 )
 

@@ -169,7 +169,7 @@ def _rms(values: Array) -> float:
 TOOL_MOVED: Final = Rule(
     "tool-moved",
     ("warning", "error"),
-    "they fit with the tool, or single targets, elsewhere on the flange",
+    "the readings fit with the tool, or single targets, elsewhere on the flange",
     gravity=2,
 )
 BASE_MOVED: Final = Rule(
@@ -255,7 +255,7 @@ def _left_with_both(robot: Robot, data: Dataset, readings: int) -> float:
 FRAMES_DIFFER: Final = Rule(
     "frames-differ",
     ("warning", "error"),
-    "they fit only with another base and other targets: find both with `model frames`",
+    "the readings fit only with another base and other targets",
     cure="Find them with 'truearm calibrate' and `model=frames`.",
     gravity=2,
 )

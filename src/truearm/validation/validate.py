@@ -293,7 +293,7 @@ def _judged(asked: Validate, given: _Given) -> _Judged:
 OTHER_SESSION: Final = Rule(
     "other-session",
     "note",
-    "of `validate`: the robot warmed up in the session of its calibration, and is judged as in the middle of that",
+    "the robot warmed up in the session of its calibration, and is judged as in the middle of that",
 )
 
 

@@ -29,12 +29,12 @@ _LARGEST_UNINFORMED_SHARE: Final = 0.05
 NOT_CONVERGED: Final = Rule(
     "not-converged",
     "error",
-    "the status, with reasons or names",
+    "the solver's steps did not become small",
 )
 RANK_LOSS: Final = Rule(
     "rank-loss",
     "error",
-    "the status, with reasons or names",
+    "the training data do not determine some parameters, and predictions elsewhere depend on them",
 )
 CLOSED_LOOP: Final = Rule(
     "closed-loop",
@@ -45,12 +45,12 @@ CLOSED_LOOP: Final = Rule(
 AT_BOUND: Final = Rule(
     "at-bound",
     "warning",
-    "the status, with names",
+    "parameters ended at a bound, by name",
 )
 REDUNDANT: Final = Rule(
     "redundant",
     "note",
-    "parameters were held; the combinations are named",
+    "parameters that the readings hardly observe were held at their nominal values, by name and combination",
 )
 RESIDUALS_EXCEED_SIGMA: Final = Rule(
     "residuals-exceed-sigma",
@@ -217,7 +217,7 @@ BEARING_ASSUMED: Final = Rule(
 TOO_MANY_EFFECTS: Final = Rule(
     "too-many-effects",
     "warning",
-    "the data inform too many of them by less than half: take fewer effects, or more configurations",
+    "the data inform too many parameters of joint effects by less than half",
 )
 NEGATIVE_EFFECT: Final = Rule(
     "negative-effect",

@@ -251,7 +251,7 @@ _LEAST_SHARED: Final = 8
 SEPARATE_VISITS: Final = Rule(
     "separate-visits",
     "warning",
-    "readings of a configuration err as joints err, but each by itself: give the column `visit`",
+    "readings of a configuration err as joints err, but each by itself: the robot left and came back between them",
     cure="Add the column `visit`, with the number of the visit on which each reading was taken; without it the "
     "expected error and all intervals are too small.",
     unless=frozenset({ANY_ERROR}),

@@ -62,7 +62,7 @@ def compared_with(
 NOT_COMPARED: Final = Rule(
     "not-compared",
     "warning",
-    "no target was read at four configurations: a name of its own for every reading?",
+    "no target was read at four configurations, as where every reading has a name of its own",
     cure="Readings of the same point on the tool have the same target.",
     gravity=2,
 )

@@ -297,7 +297,7 @@ RATED_LOAD_EXCEEDED: Final = Rule(
 RATING_UNKNOWN: Final = Rule(
     "rating-unknown",
     "note",
-    "the flange carries something, and the robot file has no `rated_load`. Plans without a program say it, too",
+    "the flange carries something or is pushed, and the robot file has no `rated_load`",
     gravity=0,
 )
 

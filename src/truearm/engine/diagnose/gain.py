@@ -49,7 +49,7 @@ _SAME: Final = math.radians(0.01)
 FEW_HELD_OUT: Final = Rule(
     "few-held-out",
     "note",
-    "fewer than seven postures are held out: whether it is better is not known",
+    "fewer than seven postures are held out: whether the calibrated robot is better is not known",
 )
 
 

@@ -168,7 +168,7 @@ WRONG_ROBOT: Final = Rule(
     "wrong-robot",
     "error",
     "lengths that [are another robot's](results.md#is-it-this-robot), or a robot of the library that fits where a "
-    "slip would explain it too",
+    "data-entry error would explain it too",
 )
 LENGTHS_SCALED: Final = Rule(
     "lengths-scaled",

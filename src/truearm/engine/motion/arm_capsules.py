@@ -107,7 +107,7 @@ LINKS_BESIDE: Final = Rule(
     "links-beside",
     "note",
     "the arm has parallel axes, and its links may lie beside the lines of the model: between which places along the "
-    "axis they are kept clear. Plans without a program say it, too, as they do the next three",
+    "axis they are kept clear",
 )
 
 

@@ -73,7 +73,7 @@ _SAME: Final = 1e-6
 NEVER_APART: Final = Rule(
     "never-apart",
     "note",
-    "in a stated cell, as [plans](planning.md#a-program-that-drives-the-plan) say them",
+    "what no posture keeps apart by the clearance, and so is not looked at",
 )
 
 
@@ -116,7 +116,7 @@ OTHER_BASE_ON_PENDANT: Final = Rule(
     "other-base-on-pendant",
     "note",
     "floor and boxes are in another base frame than that in which the pendant shows positions: where the origin of "
-    "that is. Plans without a program and of [tests by ISO 9283](iso9283.md) say it, too",
+    "that is",
 )
 
 

@@ -225,7 +225,7 @@ TWO_PLACES: Final = Rule(
 CYCLES_ALIKE: Final = Rule(
     "cycles-alike",
     "warning",
-    "each cycle is like the one before it: intervals are too narrow. Warm up longer, look for what creeps",
+    "each cycle is like the one before it: intervals are too narrow",
     cure="Let the robot warm up longer, and see whether robot or instrument creeps.",
 )
 ORIENTATION_FAR_OFF: Final = Rule(

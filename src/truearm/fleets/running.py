@@ -16,7 +16,7 @@ from truearm.calibration.calibrating import ACCEPTED
 from truearm.calibration.result import RESULT_FILES
 from truearm.engine.base.errors import InputError, Words, counted, kind_of, refusals_of, with_parameters
 from truearm.engine.base.files import noted_reads, path_argument
-from truearm.engine.base.parts import done_parts
+from truearm.engine.base.parts import Cluster, done_parts
 from truearm.engine.base.version import __version__
 from truearm.engine.base.workers import Given, ThisProcess, Workers, processes, with_workers
 from truearm.engine.command.arguments import folder_for, robot_argument
@@ -181,8 +181,6 @@ def _workers(asked: CalibrateFleet, parts: int) -> Workers:
     if asked.executor is not None:
         return Given(asked.executor)
     if asked.scheduler is not None:
-        from truearm.engine.base.parts import Cluster
-
         return Cluster(asked.scheduler, insecure=asked.insecure)
     return processes(min(asked.workers or os.cpu_count() or 1, parts))
 

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -22,7 +20,7 @@ from pydantic_core import from_json
 from truearm.engine.base.errors import InputError, counted, listed
 from truearm.engine.base.files import exists, read_bytes, read_text, reason_of
 from truearm.engine.base.version import __version__
-from truearm.engine.base.writing import write_text
+from truearm.engine.base.writing import locked, write_text
 from truearm.fleets.manifest import Manifest
 from truearm.fleets.part_schema import head_of, rows_of, said_of
 from truearm.fleets.series import Row
@@ -198,29 +196,15 @@ class Recorded:
     @contextmanager
     def _locked(self) -> Iterator[None]:
         """Lock the folder of the parts, which is never replaced, as the record is that every run may write."""
-        if sys.platform == "win32":
-            yield
-            return
-        import fcntl
-
-        handle = os.open(self.folder / PARTS, os.O_RDONLY)
-        try:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
+        with locked(self.folder / PARTS, wait=False) as alone:
+            if not alone:
                 raise InputError(
                     "another run computes parts there",
                     parameter="out",
                     where=str(self.folder),
                     cure="Wait until it has finished, or choose another `out`.",
-                ) from error
-            except OSError:  # a file system without locks
-                pass
+                )
             yield
-            with suppress(OSError):  # by itself, as a copy of this process would hold on to it
-                fcntl.flock(handle, fcntl.LOCK_UN)
-        finally:
-            os.close(handle)
 
     def known(self) -> Known:
         """Return which parts are on disk.

@@ -14,8 +14,8 @@ from truearm.engine.base.units import said_of
 from truearm.engine.data.excluded import read_exclusions
 from truearm.studio import words
 from truearm.studio.made_with import MadeWith, made_with
-from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.error_arrows import ErrorArrows
+from truearm.studio.pages.fields import NONE, offer
 from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.project import stamp_of
 from truearm.studio.window import Window

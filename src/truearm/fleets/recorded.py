@@ -81,9 +81,6 @@ class Recorded:
             )
         return None
 
-    def _write_record(self) -> None:
-        write_text(self.folder / RECORD, json.dumps(self._record(), indent=1, default=str) + "\n")
-
     def _record(self) -> dict[str, Any]:
         asked = self.manifest
         return {
@@ -173,7 +170,7 @@ class Recorded:
             removed: tuple[str, ...] = ()
             if known is None or known.get("digest") != self.manifest.digest:
                 removed = self._remove_mended() if known is not None else ()
-                self._write_record()
+                write_text(self.folder / RECORD, json.dumps(self._record(), indent=1, default=str) + "\n")
             found = self.known()
             yield Known(found.done, (*removed, *found.again))
 

@@ -188,8 +188,6 @@ class _How(TypedDict):
 
 @dataclass(frozen=True, eq=False)
 class _Read:
-    """What was given, as it was read."""
-
     robot: Robot  #: The nominal one, with its loads.
     urdf: bytes | None  #: The user's own, if that is where the robot came from.
     model: Model | None  #: None chooses.

@@ -42,7 +42,6 @@ FILES: Final = tuple(name for name, one in OPTIONS.items() if metavar_of(one).en
 
 
 def _of_cell(kind: Kind, cell: str) -> Any:
-    """Return what the cell of a table says."""
     if isinstance(kind, Whole | NumberOr):
         return int(cell) if _WHOLE.fullmatch(cell) else cell
     if not isinstance(kind, Names | Gravity):

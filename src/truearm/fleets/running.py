@@ -177,7 +177,6 @@ def calibrated_fleet(asked: CalibrateFleet) -> Fleet:
 
 
 def _workers(asked: CalibrateFleet, parts: int) -> Workers:
-    """Return who does the parts."""
     if asked.executor is not None:
         return Given(asked.executor)
     if asked.scheduler is not None:

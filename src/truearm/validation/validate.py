@@ -166,8 +166,6 @@ class Validation(Record):
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """What was given, as it was read."""
-
     robot: Robot  #: With what it carried, and what acted on it.
     as_calibrated: Robot  #: With what acts on it, and the loads of its file.
     data: Dataset

@@ -7,7 +7,6 @@ or not at all.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -19,6 +18,7 @@ from pydantic_core import from_json
 
 from truearm.engine.base.errors import InputError, counted, listed
 from truearm.engine.base.files import exists, read_bytes, read_text, reason_of
+from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.version import __version__
 from truearm.engine.base.writing import locked, write_text
 from truearm.fleets.manifest import Manifest
@@ -33,6 +33,17 @@ _RECORD_SCHEMA: Final = "truearm-fleet-record/1"
 _PART_SCHEMA: Final = "truearm-fleet-part/1"
 #: Files of a folder at most.
 _TOGETHER: Final = 1000
+
+
+def refuse_link(folder: Path) -> None:
+    """Refuse a link where a folder of the fleet belongs."""
+    if folder.is_symlink():
+        raise InputError(
+            "this is a link, and the folder itself belongs here",
+            parameter="out",
+            where=str(folder),
+            cure="Remove the link, or choose another `out`.",
+        )
 
 
 @dataclass(frozen=True)
@@ -57,13 +68,7 @@ class Recorded:
 
     def _refuse_links(self) -> None:
         for name in (PARTS, ROBOTS):
-            if (self.folder / name).is_symlink():
-                raise InputError(
-                    "this is a link, and the folder itself belongs here",
-                    parameter="out",
-                    where=str(self.folder / name),
-                    cure="Remove the link, or choose another `out`.",
-                )
+            refuse_link(self.folder / name)
 
     def _recorded(self) -> dict[str, Any] | None:
         """Return what the record says; None where there is none, and no parts that it could be of."""
@@ -178,7 +183,7 @@ class Recorded:
         """Remove the parts with robots whose entries or files are others than they were computed from."""
         removed = []
         for part in self.on_disk():
-            head = self._head(self._content(part), part)
+            head = self._head(read_bytes(self.file(part)), part)
             if head.get("key") != self._key(part):
                 self.file(part).unlink()
                 removed.append(part)
@@ -266,7 +271,7 @@ class Recorded:
             **said,
         }
         whole = f"{json.dumps(head)}\n{rest.decode()}"
-        write_text(self.file(part), f"{whole}{json.dumps({'sha256': _hash_of(whole.encode())})}\n")
+        write_text(self.file(part), f"{whole}{json.dumps({'sha256': hash_of(whole.encode())})}\n")
 
     def rows(self) -> Iterator[Row]:
         """Read the robots of all parts that are on disk, in their order, a part at a time.
@@ -307,7 +312,7 @@ class Recorded:
 
     def _checked(self, part: int) -> tuple[dict[str, Any], bytes]:
         """Return the first line of a part and the lines of its robots, or refuse what is not as it was written."""
-        content = self._content(part)
+        content = read_bytes(self.file(part))
         whole, _, last = content.removesuffix(b"\n").rpartition(b"\n")
         head = self._head(content, part)
         try:
@@ -315,14 +320,11 @@ class Recorded:
             self._refuse_foreign(part, head)
         except (ValueError, KeyError, TypeError) as error:
             raise self._not_ours(part) from error
-        if told != _hash_of(whole + b"\n") or head["key"] != self._key(part):
+        if told != hash_of(whole + b"\n") or head["key"] != self._key(part):
             raise self._not_ours(part)
         if (head["part"], head["robots"]) != (part + 1, len(self.manifest.numbers(part))):
             raise self._not_ours(part)
         return head, (whole + b"\n").partition(b"\n")[2]
-
-    def _content(self, part: int) -> bytes:
-        return read_bytes(self.file(part))
 
     def _head(self, content: bytes, part: int) -> dict[str, Any]:
         try:
@@ -343,7 +345,3 @@ class Recorded:
             where=str(self.file(part)),
             cure="Remove it and run this again: it is computed anew.",
         )
-
-
-def _hash_of(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

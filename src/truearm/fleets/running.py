@@ -23,7 +23,7 @@ from truearm.engine.command.arguments import folder_for, robot_argument
 from truearm.fleets.entries import OPTIONS, RobotEntry
 from truearm.fleets.manifest import Manifest, experiment, read_manifest
 from truearm.fleets.parts import Finished, Task, finished
-from truearm.fleets.recorded import RECORD, ROBOTS, Known, Recorded
+from truearm.fleets.recorded import RECORD, ROBOTS, Known, Recorded, refuse_link
 from truearm.fleets.result import FLEET_FILES, Fleet, Run
 
 if TYPE_CHECKING:
@@ -122,13 +122,7 @@ def check_folders(asked: Manifest, folder: Path) -> None:
     within = folder / ROBOTS
     for robot in asked.robots:
         own = within / robot.name
-        if own.is_symlink():
-            raise InputError(
-                "this is a link, and the folder itself belongs here",
-                parameter="out",
-                where=str(own),
-                cure="Remove the link, or choose another `out`.",
-            )
+        refuse_link(own)
         if own.exists():
             folder_for(RESULT_FILES, own, ours=True)
     place = within.resolve()

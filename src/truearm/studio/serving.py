@@ -12,7 +12,8 @@ from typing import Any, Final
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import exists
-from truearm.studio.access import Access, is_loopback, listening_socket, new_token
+from truearm.engine.base.parts import is_loopback
+from truearm.studio.access import Access, listening_socket, new_token
 from truearm.studio.gate import Gate, start_server
 from truearm.studio.pages import PAGES
 from truearm.studio.project import Project, open_project

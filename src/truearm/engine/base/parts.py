@@ -223,7 +223,7 @@ def checked_address(address: str, *, insecure: bool) -> str:
             cure="A scheduler knows no users and passwords: leave them out." if "@" in address else None,
         )
     assert host is not None
-    if parts.scheme == "tcp" and not insecure and not _is_here(host):
+    if parts.scheme == "tcp" and not insecure and not is_loopback(host):
         raise InputError(
             "this scheduler is on another machine, and is reached without TLS",
             parameter="scheduler",
@@ -242,14 +242,13 @@ def _without_password(address: str) -> str:
     return f"{named}...@{rest.rpartition('@')[2]}" if "@" in address else address
 
 
-def _is_here(host: str) -> bool:
-    """Return whether a host is this machine by its name or number."""
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine reaches a host."""
     if host == "localhost":
         return True
-    try:
+    with suppress(ValueError):
         return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    return False
 
 
 def _within(seconds: float, work: Callable[[], R]) -> R:

@@ -123,7 +123,6 @@ class Cluster(Workers):
             raise self._refused("the scheduler does not answer any more") from error
 
     def _refuse_other_versions(self, workers: list[str]) -> None:
-        """Refuse workers whose results would not be those of this version."""
         if not workers:
             return
         version_of = "truearm.engine.base.version:__version__"

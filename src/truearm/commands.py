@@ -121,7 +121,6 @@ def program(*asked: str) -> Commands:
 
 
 def _function(words: str) -> Callable[..., None]:
-    """Return the function of a command."""
     first, *others = (_named(dotted) for dotted in (COMMANDS[words], *OF_DEVICES.get(words, ())))
     return command_of(first.request, *(one.request for one in others)) if hasattr(first, "request") else first
 

@@ -103,7 +103,8 @@ def test_where_nobody_listens_the_run_is_refused_and_nothing_written(tmp_path: P
 
 def test_something_else_that_listens_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "_GREETING", 0.2)
+    monkeypatch.setattr(cluster, "PATIENCE", 0.4)
+    monkeypatch.setattr(cluster, "_MARGIN", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as silent, pytest.raises(InputError, match="no Dask scheduler"):
         Cluster(f"127.0.0.1:{silent.getsockname()[1]}", insecure=False)
 
@@ -148,7 +149,6 @@ def test_odd_greetings_are_refused_in_seconds_and_in_one_line(
     words: bytes, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "_GREETING", 0.3)
     monkeypatch.setattr(cluster, "PATIENCE", 0.4)
     monkeypatch.setattr(cluster, "_MARGIN", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as odd:
@@ -176,7 +176,6 @@ def test_a_scheduler_with_another_dask_is_refused_with_the_cure(monkeypatch: pyt
     def refuse(*_: object, **__: object) -> None:
         raise ImportError("versions differ")
 
-    monkeypatch.setattr(Cluster, "_greeted", lambda *_: None)
     monkeypatch.setattr(distributed.Client, "__init__", refuse)
     with pytest.raises(InputError, match="another version of Dask") as caught:
         Cluster("127.0.0.1:1", insecure=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
+import os
 import re
 import shutil
 import time
@@ -19,7 +20,6 @@ import numpy as np
 import pytest
 
 import truearm
-from truearm.engine.base import writing as replacing
 from truearm.engine.base.errors import InputError
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
@@ -139,16 +139,15 @@ def test_a_full_disk_is_named_and_what_was_written_before_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file, out = manifest(tmp_path), tmp_path / "out"
-    write = replacing._write
+    right = os.fsync
 
-    def full(path: Path, content: bytes) -> None:
+    def full(handle: int) -> None:
         if len([*out.rglob("*.jsonl")]) == 1:
-            path.touch()
             raise OSError(errno.ENOSPC, "No space left on device")
-        write(path, content)
+        right(handle)
 
     with monkeypatch.context() as patch:
-        patch.setattr(replacing, "_write", full)
+        patch.setattr(os, "fsync", full)
         with pytest.raises(InputError, match="No space left on device"):
             truearm.fleet(file, out=out, workers=1)
     assert [path.name for path in out.rglob("*") if path.is_file()] == ["record.json", "0000001.jsonl"]

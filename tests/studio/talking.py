@@ -16,8 +16,8 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 from websockets.typing import Subprotocol
 
-from truearm.studio.page import Page
 from truearm.studio.serving import Studio
+from truearm.studio.window import Page
 
 #: Headers of a browser that asks for a connection.
 UPGRADE = {

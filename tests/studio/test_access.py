@@ -10,8 +10,9 @@ from tests.studio.talking import UPGRADE, alive, answer, get, own, window
 from websockets.exceptions import InvalidStatus
 
 from truearm.engine.base.errors import InputError
+from truearm.engine.base.parts import is_loopback
 from truearm.studio import access as module
-from truearm.studio.access import Access, is_loopback, listening_socket
+from truearm.studio.access import Access, listening_socket
 
 TOKEN = "a-token-that-nobody-guesses"
 

@@ -19,7 +19,7 @@ from truearm.iso9283.evaluating.table import conditions_summary, values_of, wors
 from truearm.iso9283.jobs import iso9283_evaluate, iso9283_simulate
 from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text, read_plan
 from truearm.studio.cube_in_space import cube_in_space
-from truearm.studio.pages.choices import NONE
+from truearm.studio.pages.fields import NONE
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pages.performance import PerformancePage
 from truearm.studio.window import Window

@@ -36,8 +36,6 @@ class _Topics(NamedFiles):
 
 
 class _JointNames(Names):
-    """Names of joints in their order."""
-
     def check(self, value: Any, name: str) -> Any:
         """Refuse no names, and one that comes twice."""
         names = super().check(value, name)

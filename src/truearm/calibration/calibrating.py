@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from truearm.calibration.result import RESULT_FILES, Calibration
 from truearm.calibration.zones import WantedZones, choose_zones, zone_file_names, zones_argument
 from truearm.engine.base.errors import InputError, Notice, Rule, listed, refusals_of
 from truearm.engine.base.files import path_argument, read_bytes
+from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.version import __version__
 from truearm.engine.choosing.candidates import (
     compared_with,
@@ -194,8 +194,6 @@ class _How(TypedDict):
 
 @dataclass(frozen=True, eq=False)
 class _Read:
-    """What was given, as it was read."""
-
     robot: Robot  #: The nominal one, with its loads.
     urdf: bytes | None  #: The user's own, if that is where the robot came from.
     model: Model | None  #: None chooses.
@@ -273,7 +271,7 @@ def _read(asked: Calibrate, zones: WantedZones | None) -> _Read:
     as_read = readings_argument(robot, asked.data)
     sha256 = None
     if isinstance(asked.data, str | Path):
-        sha256 = hashlib.sha256(read_bytes(path_argument(asked.data, "data"))).hexdigest()
+        sha256 = hash_of(read_bytes(path_argument(asked.data, "data")))
     readings, excluded = without_excluded(as_read, asked.exclude)
     readings = left_out(readings, asked.without)
     held = held_argument(asked.hold, asked.frames, robot, readings)

@@ -261,7 +261,6 @@ def follow(asked: FollowPath) -> FollowedPath:
 
 
 def _followed(asked: FollowPath, arm: Robot, joints_are: JointsOf) -> CorrectedPath:
-    """Follow the path, and correct it."""
     near = None
     if asked.seed_joints is not None:
         seed = positions_of(asked.seed_joints, arm, joints_are, "seed_joints")

@@ -7,7 +7,6 @@ of all. Files are named from the manifest's folder.
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ from truearm.calibration.calibrate import Calibrate
 from truearm.engine.base.errors import InputError, did_you_mean, is_one_line, nearest_names, refusals_at
 from truearm.engine.base.files import exists, noted_reads, read_bytes, read_text
 from truearm.engine.base.limits import refuse_beyond
+from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.schemas import validated
 from truearm.engine.command.kinds import Gravity, Kind, Names, NumberOr, PayloadKind, Whole
 from truearm.engine.command.request import Option, metavar_of
@@ -42,7 +42,6 @@ FILES: Final = tuple(name for name, one in OPTIONS.items() if metavar_of(one).en
 
 
 def _of_cell(kind: Kind, cell: str) -> Any:
-    """Return what the cell of a table says."""
     if isinstance(kind, Whole | NumberOr):
         return int(cell) if _WHOLE.fullmatch(cell) else cell
     if not isinstance(kind, Names | Gravity):
@@ -236,7 +235,7 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
         files |= _named_files({**options, **entry.options}, folder)
         for name, path in files.items():
             if name not in hashes:
-                hashes[name] = hashlib.sha256(read_bytes(path)).hexdigest()
+                hashes[name] = hash_of(read_bytes(path))
         _check_date(entry.date, one.place("date"))
         if entry.of is not None and not (entry.of and is_one_line(entry.of)):
             raise InputError("a serial number belongs here", where=one.place("of"), came=entry.of, allowed="one line")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ from truearm.calibration.calibrate import Calibrate
 from truearm.engine.base.errors import InputError, name_parameter, name_place, refusals_at
 from truearm.engine.base.files import read_bytes, read_yaml
 from truearm.engine.base.limits import refuse_beyond
+from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.units import sized_si
 from truearm.engine.data.controller_joints import in_model_joints
 from truearm.engine.data.readers.canonical import read_csv
@@ -175,7 +175,7 @@ class Manifest:
     def digest(self) -> str:
         """Hash of what is asked, and of the files that it names."""
         told = json.dumps([self.content, self.hashes], sort_keys=True, default=str)
-        return hashlib.sha256(told.encode()).hexdigest()
+        return hash_of(told.encode())
 
     def key(self, part: int) -> str:
         """Return the hash of what is asked of a part, counted from 0: robots beside it change nothing of it."""
@@ -183,7 +183,7 @@ class Manifest:
             return self.digest
         robots = [self.content["robots"][number] for number in self.numbers(part)]
         files = [[*self.robots[number].hashes.values()] for number in self.numbers(part)]
-        return hashlib.sha256(json.dumps([robots, files], sort_keys=True, default=str).encode()).hexdigest()
+        return hash_of(json.dumps([robots, files], sort_keys=True, default=str).encode())
 
     def numbers(self, part: int) -> range:
         """Return which robots are in a part; both are counted from 0."""
@@ -273,7 +273,7 @@ def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[s
 def _hash(name: str, manifest: Path, entry: str) -> str:
     """Return the SHA-256 of a file that an entry of the experiment names, or refuse it there."""
     try:
-        return hashlib.sha256(read_bytes(manifest.parent / name)).hexdigest()
+        return hash_of(read_bytes(manifest.parent / name))
     except InputError as error:
         error.came = name
         name_place(error, f"{manifest}, experiment.{entry}")

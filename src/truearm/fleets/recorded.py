@@ -7,12 +7,9 @@ or not at all.
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
-import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -21,8 +18,9 @@ from pydantic_core import from_json
 
 from truearm.engine.base.errors import InputError, counted, listed
 from truearm.engine.base.files import exists, read_bytes, read_text, reason_of
+from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.version import __version__
-from truearm.engine.base.writing import write_text
+from truearm.engine.base.writing import locked, write_text
 from truearm.fleets.manifest import Manifest
 from truearm.fleets.part_schema import head_of, rows_of, said_of
 from truearm.fleets.series import Row
@@ -35,6 +33,17 @@ _RECORD_SCHEMA: Final = "truearm-fleet-record/1"
 _PART_SCHEMA: Final = "truearm-fleet-part/1"
 #: Files of a folder at most.
 _TOGETHER: Final = 1000
+
+
+def refuse_link(folder: Path) -> None:
+    """Refuse a link where a folder of the fleet belongs."""
+    if folder.is_symlink():
+        raise InputError(
+            "this is a link, and the folder itself belongs here",
+            parameter="out",
+            where=str(folder),
+            cure="Remove the link, or choose another `out`.",
+        )
 
 
 @dataclass(frozen=True)
@@ -59,13 +68,7 @@ class Recorded:
 
     def _refuse_links(self) -> None:
         for name in (PARTS, ROBOTS):
-            if (self.folder / name).is_symlink():
-                raise InputError(
-                    "this is a link, and the folder itself belongs here",
-                    parameter="out",
-                    where=str(self.folder / name),
-                    cure="Remove the link, or choose another `out`.",
-                )
+            refuse_link(self.folder / name)
 
     def _recorded(self) -> dict[str, Any] | None:
         """Return what the record says; None where there is none, and no parts that it could be of."""
@@ -82,9 +85,6 @@ class Recorded:
                 cure="Choose another `out`.",
             )
         return None
-
-    def _write_record(self) -> None:
-        write_text(self.folder / RECORD, json.dumps(self._record(), indent=1, default=str) + "\n")
 
     def _record(self) -> dict[str, Any]:
         asked = self.manifest
@@ -175,7 +175,7 @@ class Recorded:
             removed: tuple[str, ...] = ()
             if known is None or known.get("digest") != self.manifest.digest:
                 removed = self._remove_mended() if known is not None else ()
-                self._write_record()
+                write_text(self.folder / RECORD, json.dumps(self._record(), indent=1, default=str) + "\n")
             found = self.known()
             yield Known(found.done, (*removed, *found.again))
 
@@ -183,7 +183,7 @@ class Recorded:
         """Remove the parts with robots whose entries or files are others than they were computed from."""
         removed = []
         for part in self.on_disk():
-            head = self._head(self._content(part), part)
+            head = self._head(read_bytes(self.file(part)), part)
             if head.get("key") != self._key(part):
                 self.file(part).unlink()
                 removed.append(part)
@@ -198,29 +198,15 @@ class Recorded:
     @contextmanager
     def _locked(self) -> Iterator[None]:
         """Lock the folder of the parts, which is never replaced, as the record is that every run may write."""
-        if sys.platform == "win32":
-            yield
-            return
-        import fcntl
-
-        handle = os.open(self.folder / PARTS, os.O_RDONLY)
-        try:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
+        with locked(self.folder / PARTS, wait=False) as alone:
+            if not alone:
                 raise InputError(
                     "another run computes parts there",
                     parameter="out",
                     where=str(self.folder),
                     cure="Wait until it has finished, or choose another `out`.",
-                ) from error
-            except OSError:  # a file system without locks
-                pass
+                )
             yield
-            with suppress(OSError):  # by itself, as a copy of this process would hold on to it
-                fcntl.flock(handle, fcntl.LOCK_UN)
-        finally:
-            os.close(handle)
 
     def known(self) -> Known:
         """Return which parts are on disk.
@@ -285,7 +271,7 @@ class Recorded:
             **said,
         }
         whole = f"{json.dumps(head)}\n{rest.decode()}"
-        write_text(self.file(part), f"{whole}{json.dumps({'sha256': _hash_of(whole.encode())})}\n")
+        write_text(self.file(part), f"{whole}{json.dumps({'sha256': hash_of(whole.encode())})}\n")
 
     def rows(self) -> Iterator[Row]:
         """Read the robots of all parts that are on disk, in their order, a part at a time.
@@ -326,7 +312,7 @@ class Recorded:
 
     def _checked(self, part: int) -> tuple[dict[str, Any], bytes]:
         """Return the first line of a part and the lines of its robots, or refuse what is not as it was written."""
-        content = self._content(part)
+        content = read_bytes(self.file(part))
         whole, _, last = content.removesuffix(b"\n").rpartition(b"\n")
         head = self._head(content, part)
         try:
@@ -334,14 +320,11 @@ class Recorded:
             self._refuse_foreign(part, head)
         except (ValueError, KeyError, TypeError) as error:
             raise self._not_ours(part) from error
-        if told != _hash_of(whole + b"\n") or head["key"] != self._key(part):
+        if told != hash_of(whole + b"\n") or head["key"] != self._key(part):
             raise self._not_ours(part)
         if (head["part"], head["robots"]) != (part + 1, len(self.manifest.numbers(part))):
             raise self._not_ours(part)
         return head, (whole + b"\n").partition(b"\n")[2]
-
-    def _content(self, part: int) -> bytes:
-        return read_bytes(self.file(part))
 
     def _head(self, content: bytes, part: int) -> dict[str, Any]:
         try:
@@ -362,7 +345,3 @@ class Recorded:
             where=str(self.file(part)),
             cure="Remove it and run this again: it is computed anew.",
         )
-
-
-def _hash_of(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

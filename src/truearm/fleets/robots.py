@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import noted_reads, read_bytes
+from truearm.engine.base.manifest import hash_of
 from truearm.engine.data.statistics import Errors
 from truearm.engine.robot.parameters import PLACES, SCALE_GROUP
 from truearm.fleets.entries import RobotEntry
@@ -85,7 +85,7 @@ def _changed(entry: RobotEntry, noted: Mapping[Path, Sequence[str]]) -> Path | N
     for path, known in entry.hashes.items():
         if not noted.get(path):
             try:
-                seen = [hashlib.sha256(read_bytes(path)).hexdigest()]
+                seen = [hash_of(read_bytes(path))]
             except InputError:
                 return path
         else:

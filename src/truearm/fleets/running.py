@@ -16,14 +16,14 @@ from truearm.calibration.calibrating import ACCEPTED
 from truearm.calibration.result import RESULT_FILES
 from truearm.engine.base.errors import InputError, Words, counted, kind_of, refusals_of, with_parameters
 from truearm.engine.base.files import noted_reads, path_argument
-from truearm.engine.base.parts import done_parts
+from truearm.engine.base.parts import Cluster, done_parts
 from truearm.engine.base.version import __version__
 from truearm.engine.base.workers import Given, ThisProcess, Workers, processes, with_workers
 from truearm.engine.command.arguments import folder_for, robot_argument
 from truearm.fleets.entries import OPTIONS, RobotEntry
 from truearm.fleets.manifest import Manifest, experiment, read_manifest
 from truearm.fleets.parts import Finished, Task, finished
-from truearm.fleets.recorded import RECORD, ROBOTS, Known, Recorded
+from truearm.fleets.recorded import RECORD, ROBOTS, Known, Recorded, refuse_link
 from truearm.fleets.result import FLEET_FILES, Fleet, Run
 
 if TYPE_CHECKING:
@@ -122,13 +122,7 @@ def check_folders(asked: Manifest, folder: Path) -> None:
     within = folder / ROBOTS
     for robot in asked.robots:
         own = within / robot.name
-        if own.is_symlink():
-            raise InputError(
-                "this is a link, and the folder itself belongs here",
-                parameter="out",
-                where=str(own),
-                cure="Remove the link, or choose another `out`.",
-            )
+        refuse_link(own)
         if own.exists():
             folder_for(RESULT_FILES, own, ours=True)
     place = within.resolve()
@@ -177,12 +171,9 @@ def calibrated_fleet(asked: CalibrateFleet) -> Fleet:
 
 
 def _workers(asked: CalibrateFleet, parts: int) -> Workers:
-    """Return who does the parts."""
     if asked.executor is not None:
         return Given(asked.executor)
     if asked.scheduler is not None:
-        from truearm.engine.base.parts import Cluster
-
         return Cluster(asked.scheduler, insecure=asked.insecure)
     return processes(min(asked.workers or os.cpu_count() or 1, parts))
 

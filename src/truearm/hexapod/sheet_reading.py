@@ -65,7 +65,8 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
         return cells.numbers(*columns[name], missing=True) if name in columns else np.full(len(labels), np.nan)
 
     legs = {name: lengths(name) for name in (*LEGS, *FOURTH_LEGS)}
-    first = _first_rows(places or labels[:1] * len(labels))
+    where = places or labels[:1] * len(labels)
+    first = np.array([where.index(place) for place in where])  # the first row of each row's place
     fixtures = {
         name: _held(cells, columns[name], lengths(name), first if name.startswith("B") else np.zeros_like(first))
         for name in FIXTURES
@@ -130,11 +131,6 @@ def _places(cells: Cells, columns: Columns) -> tuple[str, ...] | None:
                 "Else move the rows together.",
             )
     return places
-
-
-def _first_rows(places: Sequence[str]) -> Array:
-    """Return for each row the first row of its place."""
-    return np.array([places.index(place) for place in places])
 
 
 def _last_given(values: Array, first: Array) -> Array:

@@ -318,7 +318,6 @@ def _write_labels(
 def _write_label(
     text: MappingText, label: Column | None, target: Column | None, pattern: str | None, *, several: bool
 ) -> None:
-    """Write where the labels of configurations are."""
     if pattern is not None and label is not None:
         text.add(
             "names", "", "the names have parts between ::", f"names: {{column: {named(label)}, pattern: '{pattern}'}}"

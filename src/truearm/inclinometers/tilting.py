@@ -246,8 +246,6 @@ MODELS: Final = tuple(model.name for model in EVERY_MODEL if not set(model.effec
 
 @dataclass(frozen=True, eq=False)
 class _Read:
-    """What was given, as it was read."""
-
     robot: Robot  #: With its loads.
     urdf: bytes | None  #: The user's own, if that is where the robot came from.
     inclinations: Inclinations

@@ -70,8 +70,6 @@ class _Points(Names):
 
 
 class _Folder(File):
-    """A folder."""
-
     def check(self, value: Any, name: str) -> Any:
         """Refuse what is none."""
         if isinstance(value, str) and not value:  # a variable of the shell that is not set

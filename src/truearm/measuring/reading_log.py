@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import os
-import sys
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
@@ -19,6 +18,7 @@ from pydantic import BaseModel, Field, StringConstraints
 from truearm.engine.base.errors import InputError, Notice, Rule, is_one_line, printable
 from truearm.engine.base.files import read_bytes, read_yaml, reason_of
 from truearm.engine.base.units import as_number, sized_si, to_si, written
+from truearm.engine.base.writing import lock, synchronise
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot_file.entries import STRICT, Number
 from truearm.measuring.session import REASONS, Entry, Reading
@@ -290,7 +290,7 @@ class ReadingLog:
                 os.fsync(self._stream.fileno())
             if len(content) == self.torn:
                 self._put(_HEADER)
-                _synchronise(folder)
+                synchronise([self.path])
         except BaseException:
             self._stream.close()
             raise
@@ -309,20 +309,12 @@ class ReadingLog:
         self._stream.close()
 
     def _lock(self) -> None:
-        if sys.platform == "win32":
-            return
-        import fcntl
-
-        try:
-            fcntl.flock(self._stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not lock(self._stream.fileno(), wait=False):
             raise InputError(
                 "another process is measuring into this folder",
                 where=str(self.path.parent),
                 cure="End it, or choose another `out`.",
-            ) from None
-        except OSError:  # a file system without locks
-            pass
+            )
 
     def _put(self, line: str) -> None:
         whole = f"{line}\n".encode()
@@ -443,15 +435,6 @@ def _value(text: str, unit: str) -> float:
     if value is None:
         raise ValueError(text)
     return to_si(float(value), unit)
-
-
-def _synchronise(folder: Path) -> None:
-    with suppress(OSError):  # folders cannot be opened everywhere
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def _unwritable(path: Path, error: OSError) -> InputError:

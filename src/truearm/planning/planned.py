@@ -97,8 +97,6 @@ def plan_inputs(
 
 @dataclass(frozen=True, eq=False)
 class _Read:
-    """What was given, as it was read."""
-
     given: tuple[object, ...]  #: What may be files, none of which is overwritten.
     hashes: dict[str, str]  #: Of these files, by their parameters.
     table: Path | None  #: Where to write; the folder of a plan with a program.

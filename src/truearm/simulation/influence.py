@@ -222,8 +222,6 @@ _LEAST: Final = 5
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """What was given, as it was read."""
-
     robot: Robot  #: As it was given.
     nominal: Robot  #: With what it carried, and the effects of the model.
     model: Model

@@ -17,6 +17,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from truearm.engine.base.errors import InputError, printable, shortened
+from truearm.engine.base.parts import is_loopback
 
 #: So many windows are open at once.
 _WINDOWS: Final = 16
@@ -173,15 +174,6 @@ def _given(request: Request) -> list[str]:
     with suppress(ValueError):  # too many entries
         return parse_qs(query, max_num_fields=4).get("token", []) if len(query) < 1000 else []
     return []
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether only this machine reaches a host."""
-    if host == "localhost":
-        return True
-    with suppress(ValueError):
-        return ipaddress.ip_address(host).is_loopback
-    return False
 
 
 def new_token() -> str:

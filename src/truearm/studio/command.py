@@ -36,7 +36,7 @@ def studio(
             where="truearm studio",
             cure="Install it: pip install 'truearm[studio]'.",
         )
-    from truearm.studio.access import is_loopback
+    from truearm.engine.base.parts import is_loopback
     from truearm.studio.serving import serve
 
     tunnel = f"ssh -L {port}:127.0.0.1:{port} THIS-MACHINE"

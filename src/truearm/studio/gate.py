@@ -161,7 +161,9 @@ class Gate:
             checked(message, kind, closely=False)
             return True
         if kind not in _WORKING:
-            return self._block(connection, f"the message {_shown(str(kind))} is not taken from a window", {})
+            return self._block(
+                connection, f"the message {printable(shortened(str(kind), 100))} is not taken from a window", {}
+            )
         if not self.is_working(connection) and message.get("uuid") not in self.offers:
             if kind in _FILES and not self.uploads.turned_away(connection, message):
                 return False  # a part of a file of which that was said
@@ -274,7 +276,3 @@ def _quiet() -> logging.Logger:
     if not log.handlers:
         log.addHandler(logging.NullHandler())
     return log
-
-
-def _shown(text: str) -> str:
-    return printable(shortened(text, 100))

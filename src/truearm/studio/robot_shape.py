@@ -8,7 +8,7 @@ meshes serve a nominal and a calibrated robot, which differ by less than can be 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -171,9 +171,5 @@ def _carriage(plan: Layout, number: int) -> Mesh:
 def _tool(robot: Robot, plan: Layout) -> LinkShape:
     rod, size = _ROD * plan.length, min(_TARGET * plan.length, _LARGEST_TARGET)
     places = [np.array(robot.tool_place(target.name).translation) for target in robot.targets]
-    rods = [tube([np.zeros(3), place], (rod, 0.7 * rod)) for place in _away(places, rod)]
+    rods = [tube([np.zeros(3), place], (rod, 0.7 * rod)) for place in places if float(np.linalg.norm(place)) > rod]
     return LinkShape("tool", together(rods), together(ball(place, size) for place in places))
-
-
-def _away(places: Iterable[Array], least: float) -> list[Array]:
-    return [place for place in places if float(np.linalg.norm(place)) > least]

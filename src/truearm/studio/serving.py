@@ -12,13 +12,13 @@ from typing import Any, Final
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import exists
-from truearm.studio.access import Access, is_loopback, listening_socket, new_token
+from truearm.engine.base.parts import is_loopback
+from truearm.studio.access import Access, listening_socket, new_token
 from truearm.studio.gate import Gate, start_server
-from truearm.studio.page import Page
 from truearm.studio.pages import PAGES
 from truearm.studio.project import Project, open_project
 from truearm.studio.uploads import Uploads
-from truearm.studio.window import Window
+from truearm.studio.window import Page, Window
 
 #: What is chosen in a new project of the demonstration: what it calibrated and corrected itself.
 DEMONSTRATION: Final[Mapping[str, Any]] = {

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final, Protocol
 
 import viser
 
@@ -20,7 +20,6 @@ from truearm.engine.robot.robot import Robot, fitted_from
 from truearm.studio import words
 from truearm.studio.gate import Gate
 from truearm.studio.other_programs import OtherPrograms
-from truearm.studio.page import Page
 from truearm.studio.project import Project
 from truearm.studio.refusals import Refusals
 from truearm.studio.typing_at_rest import TypingAtRest
@@ -46,6 +45,21 @@ CANCELLED: Final = Rule(
     "note",
     "a long action was cancelled, and nothing was written",
 )
+
+
+class Page(Protocol):
+    """One page: a tab of the window.
+
+    Its ``__init__`` is called once inside its tab, and adds its elements with ``window.gui``. Its callbacks are made
+    with :meth:`Window.action`, so that a refusal is shown where the user acted.
+    """
+
+    title: ClassVar[str]
+
+    def __init__(self, window: Window) -> None: ...
+
+    def refresh(self) -> None:
+        """Show what is true now: the settings, a file or a result has changed."""
 
 
 class Window:

@@ -261,7 +261,6 @@ def _spheres(arm: Robot, data: Dataset, at_ball: int | None) -> tuple[OneSphere,
 
 
 def _judged(model: Robot, data: Dataset, rows: NDArray[np.intp], target: str, at_ball: int | None) -> SphereTest:
-    """Return the test of some readings by a model."""
     assert data.distance is not None
     centre = None if at_ball is None else _centre_sphere(model, data, at_ball)
     with refusals_of("data"):

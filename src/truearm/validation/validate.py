@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from truearm.engine.base.errors import InputError, Notice, Rule, counted, has_error, refusals_of
 from truearm.engine.base.files import path_argument, read_bytes
-from truearm.engine.base.manifest import sets_in
+from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.writing import output_folder, write_files
 from truearm.engine.choosing.zones import ZonedRobot, zoned_robot
 from truearm.engine.command.arguments import (
@@ -166,8 +165,6 @@ class Validation(Record):
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """What was given, as it was read."""
-
     robot: Robot  #: With what it carried, and what acted on it.
     as_calibrated: Robot  #: With what acts on it, and the loads of its file.
     data: Dataset
@@ -233,7 +230,7 @@ def _read(asked: Validate, zoned: ZonedRobot | None) -> _Given:
     digest, named = None, asked.robot
     if isinstance(asked.data, str | Path):
         with refusals_of("data"):
-            digest = hashlib.sha256(read_bytes(path_argument(asked.data, "data"))).hexdigest()
+            digest = hash_of(read_bytes(path_argument(asked.data, "data")))
     if zoned is not None:
         if asked.refit is not None:
             raise InputError(

@@ -13,9 +13,8 @@ from tests.engine.robot.test_chain import random_robot, random_unit
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array, Direction
 from truearm.engine.robot.conventions import CONVENTIONS, convention
-from truearm.engine.robot.conventions.convention import Convention, JointKind
+from truearm.engine.robot.conventions.convention import Convention, JointKind, parallel_joints_without_beta
 from truearm.engine.robot.conventions.cpc import published_direction, rotation_to, small_rotations
-from truearm.engine.robot.conventions.parallel import parallel_joints_without_beta
 from truearm.engine.robot.parts import Joint
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.reading import read_robot

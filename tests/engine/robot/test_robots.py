@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.conventions.parallel import parallel_joints_without_beta
+from truearm.engine.robot.conventions.convention import parallel_joints_without_beta
 from truearm.engine.robot.library import library, load_robot, urdf_source
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.reading import read_robot

@@ -33,7 +33,7 @@ def printable(text: str) -> str:
     r"""Return a text as one line that can be shown: control characters as their escapes, such as ``\x1b``."""
     if text.isascii() and text.isprintable():
         return text
-    return "".join(_escaped(character) if _steers(character) else character for character in text)
+    return "".join(ascii(character)[1:-1] if _steers(character) else character for character in text)
 
 
 def shortened(text: str, longest: int) -> str:
@@ -51,10 +51,6 @@ def with_short_words(text: str) -> str:
 
 def _steers(character: str) -> bool:
     return unicodedata.category(character) in _UNSEEN or character in TURNING
-
-
-def _escaped(character: str) -> str:
-    return ascii(character)[1:-1]
 
 
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.

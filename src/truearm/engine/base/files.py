@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import stat
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ from typing import Any, Final
 
 from truearm.engine.base.errors import InputError, nearest_names, wrong_kind
 from truearm.engine.base.limits import limit, refuse_beyond
-from truearm.engine.base.manifest import refuse_unfinished
+from truearm.engine.base.manifest import hash_of, refuse_unfinished
 from truearm.engine.base.schemas import Model, validated
 
 #: What an entry of a YAML file cannot do without, unless it is the first: one of these stands before it.
@@ -101,7 +100,7 @@ def read_bytes(path: Path, most: str = "file_size") -> bytes:
         refuse_beyond(most, len(content), where=str(path))
         noted = _NOTED.get()
         if noted is not None:
-            noted.setdefault(path.absolute(), []).append(hashlib.sha256(content).hexdigest())
+            noted.setdefault(path.absolute(), []).append(hash_of(content))
         return content
     except FileNotFoundError as error:
         raise _missing(path) from error

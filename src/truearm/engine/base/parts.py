@@ -6,14 +6,15 @@ import ipaddress
 import logging
 import pkgutil
 import re
-import socket
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from typing import Any, Final, Generic, TypeVar
 from urllib.parse import urlsplit
 
@@ -26,8 +27,6 @@ R = TypeVar("R")
 
 #: How long to wait for the scheduler, and for its first worker [s].
 PATIENCE: Final = 4.0
-#: How long to wait for its first words [s].
-_GREETING: Final = 2.0
 #: How much longer than that reaching it may take in all [s].
 _MARGIN: Final = 1.0
 #: How long scheduler and workers may take to answer while they work [s].
@@ -36,9 +35,6 @@ _ANSWER: Final = 60.0
 _ALONE: Final = 60.0
 #: How often to ask the scheduler about its workers [s].
 _LOOK: Final = 2.0
-#: What a scheduler says first [bytes], and how long a message it may announce.
-_LENGTH: Final = 8
-_LONGEST_GREETING: Final = 1_000_000
 #: How schedulers are reached.
 _PROTOCOLS: Final = ("tcp", "tls")
 #: Names and numbers of machines.
@@ -49,7 +45,7 @@ _LOGGERS: Final = ("distributed", "distributed.client", "tornado.application")
 _RUN_AGAIN: Final = "Run this again when it is there: what is on disk is not computed twice."
 
 
-class Cluster:
+class Cluster(Workers):
     """Parts are done by the workers of a Dask scheduler.
 
     Args:
@@ -64,114 +60,78 @@ class Cluster:
     def __init__(self, address: str, *, insecure: bool) -> None:
         self._address = checked_address(address, insecure=insecure)
         distributed = _distributed()
-        self.lost: tuple[type[BaseException], ...] = (distributed.KilledWorker,)
+        self.lost = (distributed.KilledWorker,)
         for name in _LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what happens is told, and once
         self._client = self._reached(distributed)
         try:
-            self._workers = self._waited_for_workers()
-            self._refuse_other_versions([*self._workers])
+            super().__init__(self._client.get_executor(pure=False), 1)
+            self._wait_for_workers()
         except BaseException:
             self._client.close(timeout=1)
             raise
         self._looked = self._seen = time.monotonic()
-        self._executor: Executor = self._client.get_executor(pure=False)
+
+    def _refused(self, what: str, cure: str = _RUN_AGAIN) -> InputError:
+        return InputError(what, parameter="scheduler", came=self._address, cure=cure)
 
     def _reached(self, distributed: Any) -> Any:
         """Return a client of the scheduler; Dask alone would wait for ever for what begins to speak and stops."""
+        encrypted = self._address.startswith("tls")
+        if encrypted and distributed.Security().get_connection_args("client").get("ssl_context") is None:
+            raise self._refused(
+                "the scheduler is reached by TLS, and there are no certificates for that",
+                "Name them in Dask's configuration: distributed.comm.tls.",
+            )
         client = distributed.Client.__new__(distributed.Client)
-
-        def connect() -> None:
-            self._greeted(distributed)
-            client.__init__(self._address, timeout=PATIENCE, set_as_default=False)
-
         try:
-            _within(PATIENCE + _MARGIN, connect)
-        except Exception as error:  # whatever the words of something else are taken for
+            _within(PATIENCE + _MARGIN, lambda: client.__init__(self._address, timeout=PATIENCE, set_as_default=False))
+        except ImportError as error:
             client.status = "closed"  # or it would be waited for when it is forgotten
-            if isinstance(error, InputError):
-                raise
-            if isinstance(error, ImportError):
-                raise InputError(
-                    "the scheduler has another version of Dask, or of what Dask needs",
-                    parameter="scheduler",
-                    came=self._address,
-                    cure="Install the same versions of dask and distributed on all machines.",
-                ) from error
-            certificates = ", or its certificates" if self._address.startswith("tls") else ""
-            raise InputError(
+            raise self._refused(
+                "the scheduler has another version of Dask, or of what Dask needs",
+                "Install the same versions of dask and distributed on all machines.",
+            ) from error
+        except Exception as error:  # whatever the words of something else are taken for
+            client.status = "closed"
+            certificates = ", or its certificates" if encrypted else ""
+            raise self._refused(
                 "no Dask scheduler answers there",
-                parameter="scheduler",
-                came=self._address,
-                cure=f"Start one with 'dask scheduler', or correct the address{certificates}.",
+                f"Start one with 'dask scheduler', or correct the address{certificates}.",
             ) from error
         return client
 
-    def _greeted(self, distributed: Any) -> None:
-        """Make sure that a scheduler listens: it speaks first, the length of a short message."""
-        parts = urlsplit(self._address)
-        with socket.create_connection((str(parts.hostname), int(parts.port or 0)), timeout=PATIENCE) as plain:
-            stream = plain
-            if parts.scheme == "tls":
-                context = distributed.Security().get_connection_args("client").get("ssl_context")
-                if context is None:
-                    raise InputError(
-                        "the scheduler is reached by TLS, and there are no certificates for that",
-                        parameter="scheduler",
-                        came=self._address,
-                        cure="Name them in Dask's configuration: distributed.comm.tls.",
-                    )
-                stream = context.wrap_socket(plain, server_hostname=parts.hostname)
-            first, until = b"", time.monotonic() + _GREETING
-            while len(first) < _LENGTH:
-                stream.settimeout(max(until - time.monotonic(), 0.01))
-                came = stream.recv(_LENGTH - len(first))
-                if not came:
-                    raise OSError("nothing is said there")
-                first += came
-            if int.from_bytes(first, "little") > _LONGEST_GREETING:
-                raise OSError("something else listens there")
-
-    def _waited_for_workers(self) -> dict[str, Any]:
-        """Return the workers as soon as there are any."""
+    def _wait_for_workers(self) -> None:
         until = time.monotonic() + PATIENCE
         while not (found := self._known(PATIENCE)):
             if time.monotonic() > until:
-                raise InputError(
-                    "the scheduler has no workers",
-                    parameter="scheduler",
-                    came=self._address,
-                    cure=f"Start some with 'dask worker {self._address}'.",
-                )
+                raise self._refused("the scheduler has no workers", f"Start some with 'dask worker {self._address}'.")
             time.sleep(0.1)
-        return found
+        self._refuse_other_versions([*found])
+        self._take(found)
+
+    def _take(self, workers: dict[str, Any]) -> None:
+        """Work with these from now on, two parts a thread: the next one is there when one is done."""
+        self._workers = workers
+        self.in_flight = 2 * max(1, sum(int(worker["nthreads"]) for worker in workers.values()))
 
     def _known(self, patience: float) -> dict[str, Any]:
         """Return all workers by their addresses."""
         try:
             return dict(_within(patience, lambda: self._client.scheduler_info(n_workers=-1))["workers"])
         except TimeoutError as error:
-            raise InputError(
-                "the scheduler does not answer any more", parameter="scheduler", came=self._address, cure=_RUN_AGAIN
-            ) from error
+            raise self._refused("the scheduler does not answer any more") from error
 
     def _refuse_other_versions(self, workers: list[str]) -> None:
-        """Refuse workers whose results would not be those of this version."""
         if not workers:
             return
+        version_of = "truearm.engine.base.version:__version__"
+        run = partial(self._client.run, pkgutil.resolve_name, version_of, workers=workers, on_error="return")
         try:
-            there = _within(
-                _ANSWER,
-                lambda: self._client.run(
-                    pkgutil.resolve_name, "truearm.engine.base.version:__version__", workers=workers, on_error="return"
-                ),
-            )
+            there = _within(_ANSWER, run)
         except TimeoutError as error:
-            raise InputError(
-                "workers of the scheduler do not answer",
-                parameter="scheduler",
-                came=self._address,
-                cure="Look at what they print, and start them again.",
+            raise self._refused(
+                "workers of the scheduler do not answer", "Look at what they print, and start them again."
             ) from error
         others = {address: version for address, version in there.items() if version != __version__}
         if others:
@@ -186,11 +146,6 @@ class Cluster:
                 cure="Install the same version on all of them.",
             )
 
-    @property
-    def in_flight(self) -> int:
-        """Two a thread: the next one is there when one is done."""
-        return 2 * max(1, sum(int(worker["nthreads"]) for worker in self._workers.values()))
-
     def handed(self, work: Callable[[P], R], part: P) -> Future[R] | None:
         """Hand out a part; None if the connection was lost."""
         try:
@@ -198,26 +153,19 @@ class Cluster:
         except Exception:  # of Dask, which has sent nothing: the work is done elsewhere
             return None
 
-    def refusal(self, error: Exception) -> InputError | None:
-        """Return none: what the cluster adds is broken connections and parts that workers died of."""
-        return None
-
     def renew(self) -> None:
         """Wait for the scheduler, where its connection was lost, and for workers."""
         until = time.monotonic() + PATIENCE
         while self._client.status != "running":
             if time.monotonic() > until or self._client.status == "closed":
-                raise InputError("the scheduler is gone", parameter="scheduler", came=self._address, cure=_RUN_AGAIN)
+                raise self._refused("the scheduler is gone")
             time.sleep(0.1)
         try:
-            self._workers = self._waited_for_workers()
-            self._refuse_other_versions([*self._workers])
+            self._wait_for_workers()
         except InputError:
             raise
         except Exception as error:  # of Dask, whose connection is lost again
-            raise InputError(
-                "the scheduler is gone", parameter="scheduler", came=self._address, cure=_RUN_AGAIN
-            ) from error
+            raise self._refused("the scheduler is gone") from error
         self._executor = self._client.get_executor(pure=False)
 
     def news(self) -> list[str]:
@@ -238,13 +186,11 @@ class Cluster:
         except Exception:  # of Dask, whose connection is being lost: its parts will say so
             return []
         gone = [address for address in self._workers if address not in found]
-        self._workers = found
+        self._take(found)
         if found:
             self._seen = now
         elif now - self._seen > _ALONE:
-            raise InputError(
-                "all workers of the scheduler are gone", parameter="scheduler", came=self._address, cure=_RUN_AGAIN
-            )
+            raise self._refused("all workers of the scheduler are gone")
         return [f"worker {address} is gone, and what it was doing is repeated by others" for address in gone]
 
     def close(self, *, finish: bool) -> None:
@@ -276,7 +222,7 @@ def checked_address(address: str, *, insecure: bool) -> str:
             cure="A scheduler knows no users and passwords: leave them out." if "@" in address else None,
         )
     assert host is not None
-    if parts.scheme == "tcp" and not insecure and not _is_here(host):
+    if parts.scheme == "tcp" and not insecure and not is_loopback(host):
         raise InputError(
             "this scheduler is on another machine, and is reached without TLS",
             parameter="scheduler",
@@ -295,14 +241,13 @@ def _without_password(address: str) -> str:
     return f"{named}...@{rest.rpartition('@')[2]}" if "@" in address else address
 
 
-def _is_here(host: str) -> bool:
-    """Return whether a host is this machine by its name or number."""
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine reaches a host."""
     if host == "localhost":
         return True
-    try:
+    with suppress(ValueError):
         return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    return False
 
 
 def _within(seconds: float, work: Callable[[], R]) -> R:
@@ -385,15 +330,17 @@ def done_parts(
 
 
 class _Run(Generic[Part, Result]):
-    """What is being done, and what will be repeated alone because a worker died while it was done."""
+    """What is being done, and what will be repeated alone because a worker died while it was done.
+
+    Each part with how often a worker has died of it alone; -1 while none has died.
+    """
 
     def __init__(
         self, work: Callable[[Part], Result], parts: Iterator[Part], workers: Workers, tell: Callable[[str], None]
     ) -> None:
         self._work, self._parts, self._workers, self._tell = work, parts, workers, tell
-        self.running: dict[Future[Result], Part] = {}
-        self._suspects: deque[tuple[Part, int]] = deque()  # with how often a worker died of them alone
-        self._alone: int | None = None  # of the suspect that is being done
+        self.running: dict[Future[Result], tuple[Part, int]] = {}
+        self._suspects: deque[tuple[Part, int]] = deque()
         self._in_a_row = 0
 
     def results(self) -> Iterator[Done[Part, Result]]:
@@ -405,11 +352,12 @@ class _Run(Generic[Part, Result]):
             broken: BaseException | None = None
             for future in finished:
                 try:
-                    result = future.result()
+                    done = Done(self.running[future][0], future.result())
                 except self._workers.lost:
-                    yield Done(self._taken(future), None, lost=True)
+                    done = Done[Part, Result](self.running[future][0], None, lost=True)
                 except (BrokenExecutor, CancelledError) as error:
                     broken = error
+                    continue
                 except InputError:
                     raise
                 except Exception as error:
@@ -419,56 +367,47 @@ class _Run(Generic[Part, Result]):
                     raise refusal from error
                 else:
                     self._in_a_row = 0
-                    yield Done(self._taken(future), result)
+                del self.running[future]
+                yield done
             if broken is not None:
                 yield from self._broken(broken)
-
-    def _taken(self, future: Future[Result]) -> Part:
-        self._alone = None
-        return self.running.pop(future)
 
     def _hand_out(self) -> bool:
         """Hand out as many parts as may be done at once; return whether any is being done."""
         while not self._suspects and len(self.running) < self._workers.in_flight:
-            found = next(((part,) for part in self._parts), None)
-            if found is None:
+            if not (found := [*islice(self._parts, 1)]):
                 break
-            if not self._handed(found[0]):
-                self._suspects.append((found[0], 0))
+            self._hand(found[0], -1)
         while self._suspects and not self.running:
-            part, self._alone = self._suspects[0]
-            if self._handed(part):
-                self._suspects.popleft()
-            else:
+            self._hand(*self._suspects.popleft())
+            if not self.running:
                 self._renew()
         return bool(self.running)
 
-    def _handed(self, part: Part) -> bool:
-        """Hand out a part; False if a worker has just died."""
+    def _hand(self, part: Part, deaths: int) -> None:
+        """Hand out a part, or keep it where a worker has just died."""
         future = self._workers.handed(self._work, part)
         if future is None:
-            return False
-        self.running[future] = part
-        return True
+            self._suspects.appendleft((part, max(deaths, 0)))
+        else:
+            self.running[future] = part, deaths
 
     def _broken(self, reason: BaseException) -> Iterator[Done[Part, Result]]:
         """Repeat what was being done, or give up the part of which a worker died alone too often."""
-        held = [*self.running.values()]
+        held = [(part, deaths + 1) for part, deaths in self.running.values()]
         self.running.clear()
-        deaths = 0 if self._alone is None else self._alone + 1
-        self._alone = None
-        given_up = deaths == _MOST_DEATHS
-        if given_up:
+        part, deaths = held[0]
+        if deaths == _MOST_DEATHS:
             self._tell("a worker died of the same part again, and the part is given up")
         else:
             self._tell(f"a worker died, and {counted(len(held), 'part')} will be repeated")
-            self._suspects.extendleft((part, deaths) for part in reversed(held))
+            self._suspects.extendleft(reversed(held))
         try:
             self._renew()
         except InputError as error:
             raise error from reason
-        if given_up:
-            yield Done(held[0], None, lost=True)
+        if deaths == _MOST_DEATHS:
+            yield Done(part, None, lost=True)
 
     def _renew(self) -> None:
         self._in_a_row += 1

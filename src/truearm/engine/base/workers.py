@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import wait
-from typing import Final, ParamSpec, Protocol, TypeVar
+from typing import Final, ParamSpec, TypeVar
 
 from truearm.engine.base.errors import InputError, Words
 
@@ -24,16 +24,18 @@ _ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREAD
 _RUN_AGAIN: Final = "Run this again with it: what is on disk is not computed twice."
 
 
-class Workers(Protocol):
-    """Who does parts of work."""
+class Workers:
+    """Who does parts of work: an executor, and what to do where those that it has die.
 
-    @property
-    def in_flight(self) -> int:
-        """How many parts are handed out at once: enough that nobody waits, and no more."""
+    Attributes:
+        in_flight: How many parts are handed out at once: enough that nobody waits, and no more.
+        lost: What is raised for a part that workers died of, after it was repeated.
+    """
 
-    @property
-    def lost(self) -> tuple[type[BaseException], ...]:
-        """What is raised for a part that workers died of, after it was repeated."""
+    lost: tuple[type[BaseException], ...] = ()
+
+    def __init__(self, executor: Executor, in_flight: int) -> None:
+        self._executor, self.in_flight = executor, in_flight
 
     def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
         """Hand out a part; None if workers have just died.
@@ -41,9 +43,14 @@ class Workers(Protocol):
         Raises:
             InputError: If nobody takes it.
         """
+        try:
+            return self._executor.submit(work, part)
+        except BrokenExecutor:
+            return None
 
     def refusal(self, error: Exception) -> InputError | None:
         """Return what to say of an error in the place of a result; None if it is the work's own."""
+        return None
 
     def renew(self) -> None:
         """Put new workers in the place of those that died.
@@ -58,42 +65,30 @@ class Workers(Protocol):
         Raises:
             InputError: If nobody is left who could do the work.
         """
+        return []
 
     def close(self, *, finish: bool) -> None:
         """Let go of the workers, of what they are doing too unless they shall finish it."""
 
 
-class ThisProcess:
-    """Parts are done here, one after the other."""
-
-    in_flight: Final = 1
-    lost: tuple[type[BaseException], ...] = ()
-
-    def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
-        """Do it, and return what came out."""
+class _Here(Executor):
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
         future = Future[R]()
         try:
-            future.set_result(work(part))
+            future.set_result(fn(*args, **kwargs))
         except Exception as error:
             future.set_exception(error)
         return future
 
-    def refusal(self, error: Exception) -> InputError | None:
-        """Return none: the work was done here."""
-        return None
 
-    def renew(self) -> None:
-        """Do nothing."""
+class ThisProcess(Workers):
+    """Parts are done here, one after the other."""
 
-    def news(self) -> list[str]:
-        """Return nothing."""
-        return []
-
-    def close(self, *, finish: bool) -> None:
-        """Do nothing."""
+    def __init__(self) -> None:
+        super().__init__(_Here(), 1)
 
 
-class Processes:
+class Processes(Workers):
     """Parts are done by processes of this machine, each with one BLAS thread.
 
     They are started anew and not copied (``spawn``), so that threads and locks of this process do them no harm; they
@@ -102,8 +97,6 @@ class Processes:
     Args:
         workers: How many.
     """
-
-    lost: tuple[type[BaseException], ...] = ()
 
     def __init__(self, workers: int) -> None:
         if getattr(multiprocessing.current_process(), "_inheriting", False):
@@ -115,35 +108,15 @@ class Processes:
         self._workers = workers
         self._environment = {name: os.environ.get(name) for name in _ONE_THREAD}
         os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-        self._executor = self._pool()
+        super().__init__(self._pool(), in_flight=2 * workers)  # the next one is there when one is done
 
     def _pool(self) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(self._workers, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
-
-    @property
-    def in_flight(self) -> int:
-        """Two a worker: the next one is there when one is done."""
-        return 2 * self._workers
-
-    def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
-        """Hand out a part; None if a process has just died."""
-        try:
-            return self._executor.submit(work, part)
-        except BrokenExecutor:
-            return None
-
-    def refusal(self, error: Exception) -> InputError | None:
-        """Return none: these processes add no errors of their own."""
-        return None
 
     def renew(self) -> None:
         """Start new processes."""
         self._executor.shutdown(wait=False, cancel_futures=True)
         self._executor = self._pool()
-
-    def news(self) -> list[str]:
-        """Return nothing: a process that dies breaks its pool."""
-        return []
 
     def close(self, *, finish: bool) -> None:
         """End the processes."""
@@ -169,7 +142,7 @@ def _end_with(sentinel: int) -> None:
     os._exit(1)
 
 
-class Given:
+class Given(Workers):
     """Parts are done by an executor that somebody else has made, and closes.
 
     Args:
@@ -177,11 +150,8 @@ class Given:
         in_flight: How many parts it is handed at once.
     """
 
-    lost: tuple[type[BaseException], ...] = ()
-
     def __init__(self, executor: Executor, in_flight: int = 32) -> None:
-        self._executor = executor
-        self.in_flight = in_flight
+        super().__init__(executor, in_flight)
 
     def handed(self, work: Callable[[T], R], part: T) -> Future[R] | None:
         """Hand out a part; None if it is broken, as a pool is whose worker died."""
@@ -218,13 +188,6 @@ class Given:
         raise InputError(
             "the workers of the executor are gone", parameter="executor", cure=f"Make a new one. {_RUN_AGAIN}"
         )
-
-    def news(self) -> list[str]:
-        """Return nothing."""
-        return []
-
-    def close(self, *, finish: bool) -> None:
-        """Leave it open."""
 
 
 def _words(error: Exception) -> Words:

@@ -8,7 +8,7 @@ import secrets
 import shutil
 import sys
 import tempfile
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +30,9 @@ from truearm.engine.base.manifest import (
     unfinished_text,
 )
 
+if sys.platform != "win32":
+    import fcntl
+
 # How files take the place of others: in one step each, all of them or none, and put back where that was cut off.
 
 #: Names of files that are there only while others are written.
@@ -50,27 +53,38 @@ def alone_in(folders: Iterable[Path]) -> Iterator[None]:
     """Let other runs wait that write into the same folders; always in one order, so that no two wait for each other."""
     with ExitStack() as held:
         for folder in sorted({folder.resolve() for folder in folders}):
-            held.enter_context(_locked(folder))
+            held.enter_context(locked(folder, wait=True))
         yield
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Lock a folder; the lock ends with the process, however that ends."""
+def locked(folder: Path, *, wait: bool) -> Iterator[bool]:
+    """Lock a folder, and return whether that could be done; the lock ends with the process, however that ends."""
     if sys.platform == "win32":  # folders cannot be opened there
-        yield
+        yield True
         return
-    import fcntl
-
     handle = os.open(folder, os.O_RDONLY)
     try:
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
+        yield lock(handle, wait=wait)
         with suppress(OSError):  # by itself, as a copy of this process would hold on to it
             fcntl.flock(handle, fcntl.LOCK_UN)
     finally:
         os.close(handle)
+
+
+def lock(handle: int, *, wait: bool) -> bool:
+    """Lock what is open, as long as it is; return False where another has it, and it is not waited for.
+
+    Windows, and file systems without locks, keep nobody apart.
+    """
+    if sys.platform != "win32":
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        except OSError:
+            pass
+    return True
 
 
 def clear_temporary(folder: Path) -> None:
@@ -94,57 +108,45 @@ def _name(target: Path, folder: Path) -> str:
 def replace_all(
     folder: Path, contents: Mapping[Path, bytes], command: str | None, known: Mapping[Path, str | None]
 ) -> None:
-    """Put new files in place of old ones, all or none, while those stand there that are known."""
+    """Put new files in place of old ones, all or none, while those stand there that are known.
+
+    What it leaves beside them is for :func:`clear_temporary`, unless the mark still stands.
+    """
     mark = folder / UNFINISHED
-    staged: dict[Path, Path] = {}
-    kept: dict[Path, Path] = {}
-    made: dict[Path, Path] = {}
+    staged = {target: _staged(target, content) for target, content in contents.items()}
+    if len(contents) > 1:
+        kept, made = dict[str, str](), dict[str, str]()
+        for target in contents:
+            with writing_refused_at(target):
+                beside = _temporary(target)
+                if os.path.lexists(target):
+                    kept[_name(target, folder)] = beside.name
+                    _keep(target, beside)
+                else:
+                    made[_name(target, folder)] = beside.name
+                    beside.touch(exist_ok=False)
+        run = Unfinished(file_set(folder, contents, command), kept, made)
+        staged = {mark: _staged(mark, unfinished_text(run).encode()), **staged}
+        synchronise(contents)
+    for target, value in known.items():  # as late as can be: editors know nothing of locks
+        with writing_refused_at(target):
+            refuse_others(target, value)
     try:
-        for target, content in contents.items():
+        for target, temporary in staged.items():
             with writing_refused_at(target):
-                staged[target] = _temporary(target)
-                _write(staged[target], content)
-        if len(contents) > 1:
-            for target in contents:
-                with writing_refused_at(target):
-                    if os.path.lexists(target):
-                        kept[target] = _temporary(target)
-                        _keep(target, kept[target])
-                    else:
-                        made[target] = _temporary(target)
-                        made[target].touch(exist_ok=False)
-            names = [{_name(target, folder): path.name for target, path in beside.items()} for beside in (kept, made)]
-            with writing_refused_at(mark):
-                staged[mark] = _temporary(mark)
-                _write(staged[mark], unfinished_text(Unfinished(file_set(folder, contents, command), *names)).encode())
-                synchronise(contents)
-        for target, value in known.items():  # as late as can be: editors know nothing of locks
-            with writing_refused_at(target):
-                refuse_others(target, value)
-        try:
-            if mark in staged:
-                with writing_refused_at(mark):
-                    staged[mark].replace(mark)
-                    del staged[mark]
-                    synchronise([mark])
-            for target, temporary in staged.items():
-                with writing_refused_at(target):
-                    if known.get(target, "") is None:
-                        _name_first(temporary, target)
-                    else:
-                        temporary.replace(target)
-            synchronise(contents)
-            with writing_refused_at(mark):
-                mark.unlink(missing_ok=True)
-        except BaseException:
-            with suppress(OSError):  # an old file that cannot be put back keeps its other name, and the mark
-                undo_unfinished(folder)
-            raise
-    finally:
-        beside = () if os.path.lexists(mark) else (*kept.values(), *made.values())
-        for temporary in (*staged.values(), *beside):
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
+                if known.get(target, "") is None:
+                    _name_first(temporary, target)
+                else:
+                    temporary.replace(target)
+            if target == mark:
+                synchronise([mark])
+        synchronise(contents)
+        with writing_refused_at(mark):
+            mark.unlink(missing_ok=True)
+    except BaseException:
+        with suppress(OSError):  # an old file that cannot be put back keeps its other name, and the mark
+            undo_unfinished(folder)
+        raise
 
 
 def refuse_others(target: Path, known: str | None) -> None:
@@ -222,16 +224,20 @@ def _temporary(target: Path) -> Path:
     return target.with_name(f".truearm.{secrets.token_hex(8)}")
 
 
-def _write(path: Path, content: bytes) -> None:
-    with path.open("xb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
+def _staged(target: Path, content: bytes) -> Path:
+    """Write what a file will hold under another name beside it, and return that."""
+    with writing_refused_at(target):
+        path = _temporary(target)
+        with path.open("xb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        return path
 
 
-def write_through(path: Path) -> None:
+def write_through(path: Path, how: int = os.O_RDWR) -> None:
     """Let what a file holds be on disk before its name is."""
-    handle = os.open(path, os.O_RDWR)
+    handle = os.open(path, how)
     try:
         os.fsync(handle)
     finally:
@@ -242,11 +248,7 @@ def synchronise(paths: Iterable[Path]) -> None:
     """Let what was done to the names of files be on disk before anything that follows."""
     for folder in {path.parent for path in paths}:
         with suppress(OSError):  # folders cannot be opened everywhere, and not every file system can do it
-            handle = os.open(folder, os.O_RDONLY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
+            write_through(folder, os.O_RDONLY)
 
 
 def _keep(file: Path, name: Path) -> None:
@@ -275,44 +277,34 @@ def output_folder(
     """
     with refusals_of(parameter):
         path = writable_folder(path_argument(folder, parameter))
-        put_back_old(path)
-        sets = sets_in(path)
-        for name in names:
-            refuse_overwriting(path / name, read)
-            if ours:
-                _refuse_not_ours(path / name, name, sets)
+        _refuse_others_of(path, names, read, ours)
     return path
 
 
-def output_file(file: object, read: Iterable[Path] = (), parameter: str = "file", *, ours: bool = False) -> Path:
+def output_file(file: object, read: Collection[Path] = (), parameter: str = "file", *, ours: bool = False) -> Path:
     """Return the file that was given to write to, or refuse a place that cannot be; `read` and `ours` as for a folder.
 
     Only files that are written together with others stand in the manifest.
     """
     with refusals_of(parameter):
         path = writable_file(path_argument(file, parameter))
-        put_back_old(path.parent)
-        sets = sets_in(path.parent)
-        refuse_overwriting(path, read)
-        if ours:
-            _refuse_not_ours(path, path.name, sets)
+        _refuse_others_of(path.parent, [path.name], read, ours)
     return path
 
 
-def _refuse_not_ours(path: Path, name: str, sets: Sequence[FileSet]) -> None:
-    """Refuse to replace a file that is not as truearm has written it there."""
-    if not exists(path):
-        return
-    known = [one.files[name] for one in sets if name in one.files]
-    if not known or not path.is_file():
+def _refuse_others_of(folder: Path, names: Iterable[str], read: Collection[Path], ours: bool) -> None:
+    put_back_old(folder)
+    sets = sets_in(folder)
+    for name in names:
+        path = folder / name
+        refuse_overwriting(path, read)
+        known = [one.files[name] for one in sets if name in one.files]
+        if not ours or not exists(path) or any(is_the_known(path, hashed) for hashed in known):
+            continue
         raise InputError(
-            "this exists already, was not written here by truearm, and is not overwritten",
-            where=str(path),
-            cure="Choose another `out`, or move the file.",
-        )
-    if not any(is_the_known(path, hashed) for hashed in known):
-        raise InputError(
-            "this was written here by truearm and has been changed since, and is not overwritten",
+            "this was written here by truearm and has been changed since, and is not overwritten"
+            if known and path.is_file()
+            else "this exists already, was not written here by truearm, and is not overwritten",
             where=str(path),
             cure="Choose another `out`, or move the file.",
         )
@@ -421,21 +413,14 @@ def same_place(one: Path, other: Path) -> bool:
     """Return whether two paths lead to the same file, whether it exists or not."""
     try:
         return one.resolve() == other.resolve() or one.samefile(other)
-    except (OSError, RuntimeError):  # where one of them does not exist, or links lead round
+    except (OSError, RuntimeError, ValueError):  # where one of them does not exist, or links lead round
         return False
 
 
 def refuse_overwriting(out: Path, inputs: Iterable[Path]) -> None:
     """Refuse an output that is one of the inputs, by whatever path."""
-    for path in inputs:
-        try:
-            same = out.samefile(path)
-        except (OSError, ValueError):  # where one of them does not exist they are not the same
-            same = False
-        if same:
-            raise InputError(
-                "this file is read, and would be overwritten", where=str(out), cure="Choose another `out`."
-            )
+    if any(same_place(out, path) for path in inputs):
+        raise InputError("this file is read, and would be overwritten", where=str(out), cure="Choose another `out`.")
 
 
 def write_files(
@@ -487,7 +472,12 @@ def write_files(
                     undo_unfinished(place)
                     clear_temporary(place)
             known = {folder / name: value for name, value in (standing or {}).items()}
-            replace_all(folder, _with_manifest(folder, contents, command, inputs or {}), command, known)
+            try:
+                replace_all(folder, _with_manifest(folder, contents, command, inputs or {}), command, known)
+            finally:
+                if not os.path.lexists(folder / UNFINISHED):
+                    for place in folders:
+                        clear_temporary(place)
         made.clear()
     finally:
         for new in reversed(made):

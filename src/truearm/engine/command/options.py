@@ -198,7 +198,9 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
             raise typer.Exit(3)
 
     asked = [one for name in declared for one in _parameters(name, declared, owners[name].default(name))]
-    flags = [] if instead is None else [_flag_parameter(instead.job, instead.job, _headline(instead))]
+    flags = []
+    if instead is not None:
+        flags.append(_flag_parameter(instead.job, instead.job, instead.help_text().partition("\n")[0]))
     flags += [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in (("details", Details), ("json", Json))
@@ -215,10 +217,6 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
     }
     run.today = words  # type: ignore[attr-defined]
     return run
-
-
-def _headline(request: type[Request]) -> str:
-    return request.help_text().partition("\n")[0]
 
 
 def _with_flags(typed: Mapping[str, Any], declared: Mapping[str, Option]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.diagnose.expected_error import ExpectedError
 from truearm.engine.diagnose.unmodelled import ANY_ERROR, PULLED_AWAY
 from truearm.engine.fit.fit import Fit, Status
-from truearm.engine.robot.conventions.parallel import parallel_joints_without_beta
+from truearm.engine.robot.conventions.convention import parallel_joints_without_beta
 from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.loads import has_weight

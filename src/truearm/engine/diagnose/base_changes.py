@@ -178,7 +178,6 @@ def _motion(to: Transform, of: Transform) -> Motion:
 
 
 def _moved(data: Dataset, part: NDArray[np.intp], motions: Sequence[Motion]) -> Dataset:
-    """Return the data with the readings of each part moved."""
     position = data.position.copy()
     quaternion = None if data.quaternion is None else data.quaternion.copy()
     of_reading = part[data.configuration]

@@ -291,7 +291,6 @@ def _model_words(fit: Fit, share: Share, visited: bool, seen: _Part) -> str:
 
 
 def _remainder_words(square: float, doubt: float) -> str:
-    """Say what a remainder means."""
     if abs(square) <= _CHANCE * doubt:
         return "within the uncertainty of the shares and of the held-out mean"
     if square > 0.0:

@@ -278,7 +278,7 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     turned = orientation_slips(robot, _some(data))
     some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
     some = replace(some, quaternion=None, sigma_rot=None)
-    seen = [t for t in range(len(some.targets)) if _seen(some, t)]
+    seen = [t for t in range(len(some.targets)) if (some.has_position & (some.target == t)).any()]
     errors = placed_errors(robot, [_only(some, t) for t in seen])
     misfit = {t: float(np.median(off)) for t, off in zip(seen, errors, strict=True)}
     least = min(misfit.values())
@@ -540,7 +540,3 @@ def _only(data: Dataset, target: int) -> Dataset:
 
     some = data.of_readings(kept)
     return replace(some, target=np.zeros(len(some.target), dtype=np.intp), targets=(data.targets[target],))
-
-
-def _seen(data: Dataset, target: int) -> bool:
-    return bool((data.has_position & (data.target == target)).any())

@@ -138,7 +138,6 @@ def _edges(cube: Cube) -> Figure:
 
 
 def _strokes(start: Array, end: Array, colour: str) -> Figure:
-    """Draw a stroke from each start to each end."""
     gaps = np.full(start.shape, np.nan)
     points = np.stack([start, end, gaps], axis=1).reshape(-1, 3)
     return {

@@ -333,7 +333,6 @@ class Evaluation:
 
     @cached_property
     def _fixtures(self) -> dict[str, ForwardKinematics]:
-        """Forward kinematics to each fixture."""
         data = self.problem.data
         names = dict.fromkeys((*data.fixtures, *(() if data.setup is None else data.setup.targets)))
         return {name: self.problem.robot.fixture_kinematics(name, self._values) for name in names}

@@ -335,7 +335,6 @@ class CollisionCheck:
     # -- what is kept clear of what -------------------------------------------------------------------------
 
     def _moving(self) -> list[Capsule]:
-        """Return the capsules that move."""
         fixed = self.arm.fixed
         return [c for c in (*self.arm.links, *self.arm.tools) if not (c.start in fixed and c.end in fixed)]
 

@@ -310,7 +310,6 @@ def _orientation(given: _Kept | None) -> tuple[Orientation, Array]:
 
 
 def _unit(direction: Triple) -> Array:
-    """Return a direction as a unit vector, however long it is."""
     largest = max(map(abs, direction))
     if largest == 0.0:
         raise InputError("a direction cannot be zero", came=list(direction))

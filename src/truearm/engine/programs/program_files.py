@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import gc
-import hashlib
 import json
 import os
 import re
@@ -25,7 +24,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import exists, read_bytes
 from truearm.engine.base.limits import limit, refuse_beyond
-from truearm.engine.base.manifest import sets_in
+from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.schemas import validated
 from truearm.engine.base.writing import refuse_overwriting, write_files
 from truearm.engine.programs import LANGUAGES
@@ -180,8 +179,8 @@ def recorded(
         truearm=SCHEMA,
         program=Path(file.name).name,
         language=language,
-        original_sha256=_hash(file.original),
-        corrected_sha256=_hash(corrected),
+        original_sha256=hash_of(file.original),
+        corrected_sha256=hash_of(corrected),
         applied=dict(applied),
         original=base64.b64encode(zlib.compress(file.original, 9)).decode(),
         date=date,
@@ -222,7 +221,7 @@ def write_programs(
         path = folder / name
         refuse_overwriting(path, read)
         report = name.endswith(".html") and exists(path)
-        if report and all(one.files.get(name) != _hash(read_bytes(path)) for one in sets_in(folder)):
+        if report and all(one.files.get(name) != hash_of(read_bytes(path)) for one in sets_in(folder)):
             raise _not_written_here(path)
         if name.endswith(".truearm.json"):
             _refuse_losing(path)
@@ -239,7 +238,7 @@ def write_programs(
         here = read_bytes(path)
         record = correction_record(path)
         new = content if isinstance(content, bytes) else content.encode()
-        if here != new and (record is None or record.corrected_sha256 != _hash(here)):
+        if here != new and (record is None or record.corrected_sha256 != hash_of(here)):
             raise _not_written_here(path)
     if ledger is not None:
         remember(*ledger)
@@ -299,7 +298,7 @@ def _original(path: Path, again: bool) -> bytes:
 
 
 def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
-    if _hash(_text_bytes(path)) != record.corrected_sha256:
+    if hash_of(_text_bytes(path)) != record.corrected_sha256:
         raise InputError(
             "this program was changed after it was corrected, so its record is no longer about it",
             where=str(path),
@@ -307,7 +306,7 @@ def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
             f"program, move it away from {record_path(path).name}.",
         )
     original = _unpacked(record.original, record_path(path))
-    if _hash(original) != record.original_sha256:
+    if hash_of(original) != record.original_sha256:
         raise InputError("the original in this record is damaged", where=str(record_path(path)))
     return original
 
@@ -407,7 +406,3 @@ def _names(paths: Sequence[Path]) -> list[str]:
             depth += 1
         names.append("/".join(own[-depth:]))
     return names
-
-
-def _hash(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

@@ -163,8 +163,6 @@ class PoseEvaluation:
 
 @dataclass(frozen=True, eq=False)
 class _Judge:
-    """With what and by what is judged."""
-
     alignment: Alignment
     instrument: Instrument
 

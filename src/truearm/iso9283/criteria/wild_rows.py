@@ -213,7 +213,7 @@ class _Rows:
         chosen = self._furthest()
         rows = np.array([row for row in np.flatnonzero(chosen) if self.group[row] not in places], dtype=np.intp)
         means, offset = self._means(chosen), self._offsets()
-        keys = [_key(one) for one in self.groups]
+        keys = [(one.test, one.robot, one.pose, one.approach, one.velocity, one.load) for one in self.groups]
         named: list[WildRow] = []
         alike: dict[tuple[object, ...], TwoPlaces] = {}
         for row in rows:
@@ -294,10 +294,6 @@ class _Rows:
         deviations = np.sqrt(squares / variance) / _gaussian_deviation(free)
         deviations = np.where(self.small[group], deviations / _CAUTION, deviations)
         return np.where(free >= _LEAST_FREEDOM, deviations, 0.0)
-
-
-def _key(one: Cycles) -> tuple[object, ...]:
-    return one.test, one.robot, one.pose, one.approach, one.velocity, one.load
 
 
 def _gaussian_deviation(freedom: Array) -> Array:

@@ -192,8 +192,5 @@ def _not_measured(plan: PerformancePlan, values: Sequence[Value], absent: Sequen
 
 
 def _nothing(criterion: str, where: str, conditions: Conditions) -> Value:
-    return Value(criterion, "position", where, float("nan"), _quantity(criterion), None, 0, conditions, "not-measured")
-
-
-def _quantity(criterion: str) -> Quantity:
-    return _QUANTITIES.get(criterion, "length")
+    quantity = _QUANTITIES.get(criterion, "length")
+    return Value(criterion, "position", where, float("nan"), quantity, None, 0, conditions, "not-measured")

@@ -190,7 +190,6 @@ def _orientations(plane: DiagonalPlane, ahead: str) -> list[Array]:
 
 
 def _test(name: str, velocities: Sequence[float], loads: Sequence[float], layout: _Layout) -> PlannedTest:
-    """Return what is planned for a test."""
     known = TESTS[name]
     speeds = (max(velocities),) if name in _RATED_ONLY else tuple(velocities)
     if name == "WS":  # at the rated velocity its frequency is beyond what an arm follows

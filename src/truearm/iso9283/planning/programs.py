@@ -238,8 +238,6 @@ class _Programs:
 
 
 class _Steps:
-    """The steps of one program."""
-
     def __init__(self, programs: _Programs, test: PlannedTest, share: float) -> None:
         self.programs, self.test, self.share = programs, test, share
         self.speed = share * programs.plan.rated_velocity

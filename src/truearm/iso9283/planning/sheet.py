@@ -49,7 +49,7 @@ def iso9283_sheet(planned: Iso9283Plan) -> str:
             _tests(plan),
             *_orders(plan),
             _poses(plan),
-            _noted(),
+            tabled("To note", ("What", ""), tuple((what, "_" * 40) for what in _NOTED)),
             pictured("cube", "Where the poses and paths lie", cube, _cube(plan)),
         ],
         planned.command,
@@ -99,7 +99,3 @@ def _poses(plan: PerformancePlan) -> Section:
         rows.append((pose.name, *(f"{v * 1e3:.3f}" for v in pose.position), *(f"{v + 0.0:.6f}" for v in turned)))
     heading = ("Pose", "x [mm]", "y [mm]", "z [mm]", "qw", "qx", "qy", "qz")
     return tabled("Poses in the robot's base frame", heading, tuple(rows))
-
-
-def _noted() -> Section:
-    return tabled("To note", ("What", ""), tuple((what, "_" * 40) for what in _NOTED))

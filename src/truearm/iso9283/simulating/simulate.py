@@ -239,7 +239,6 @@ def _check_kinds(robot: Robot, other: Robot) -> None:
 
 
 def _check_same_arm(robot: Robot, planned: Robot) -> None:
-    """Refuse a plan of another robot."""
     with refusals_of("plan"):
         _check_kinds(robot, planned)
     q = planned.random_configurations(5, np.random.default_rng(0))

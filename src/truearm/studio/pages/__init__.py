@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from truearm.studio.page import Page
 from truearm.studio.pages.calibrate import CalibratePage
 from truearm.studio.pages.cell import CellPage
 from truearm.studio.pages.check import CheckPage
@@ -14,6 +13,7 @@ from truearm.studio.pages.performance import PerformancePage
 from truearm.studio.pages.plan import PlanPage
 from truearm.studio.pages.programs import ProgramsPage
 from truearm.studio.pages.proof import ProofPage
+from truearm.studio.window import Page
 
 #: One tab each.
 PAGES: Final[tuple[type[Page], ...]] = (

@@ -15,7 +15,7 @@ from truearm.studio import words
 from truearm.studio.evaluated_with import OTHER_SETTINGS
 from truearm.studio.fit_course import fit_course
 from truearm.studio.pages.check import choose_measurements, data_of
-from truearm.studio.pages.choices import NONE, chosen, offer
+from truearm.studio.pages.fields import NONE, chosen, offer
 from truearm.studio.pictures import Picture
 from truearm.studio.project import stamp_of
 from truearm.studio.tasks import Outcome, calibrate

@@ -14,7 +14,7 @@ from truearm.studio import words
 from truearm.studio.cell_rules import CellRules
 from truearm.studio.pages.cell_boxes import CellBoxes
 from truearm.studio.pages.cell_places import CellPlaces
-from truearm.studio.pages.choices import NONE, chosen, offer
+from truearm.studio.pages.fields import NONE, chosen, offer
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.scene import Scene
 from truearm.studio.uploads import Upload

@@ -11,8 +11,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import exists, read_text
 from truearm.studio import words
 from truearm.studio.cell_rules import CellRules, changed_rules, read_rules, with_box, with_length, without_box
-from truearm.studio.pages.choices import NONE, chosen, offer
-from truearm.studio.pages.fields import Fields
+from truearm.studio.pages.fields import NONE, Fields, chosen, offer
 from truearm.studio.window import Window
 
 #: The file that is written where none is chosen.

@@ -13,7 +13,7 @@ from truearm.engine.data.excluded import Exclusion, exclusions_text, read_exclus
 from truearm.engine.robot.chain import Array
 from truearm.studio import words
 from truearm.studio.checked import Checked, checked, with_exclusions
-from truearm.studio.pages.choices import NONE, chosen, offer
+from truearm.studio.pages.fields import NONE, chosen, offer
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.project import stamp_of
 from truearm.studio.window import Window

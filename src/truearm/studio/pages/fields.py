@@ -1,14 +1,33 @@
-"""Fields of a page that show a group of settings, and change it where somebody has typed or chosen."""
+"""Fields of a page that show a group of settings, and change it where somebody has typed or chosen; and their lists."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Final
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.units import as_number
-from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.window import Window
+
+#: What stands in a list where nothing is chosen: an empty text would stop the whole page.
+NONE: Final = "(none)"
+
+
+def offer(element: Any, names: Iterable[str], value: str | None, none: str | None = NONE) -> None:
+    """Let a list offer names and show the chosen one, which is offered even where it is no longer there.
+
+    Args:
+        none: What stands for nothing chosen; None where something always is.
+    """
+    offered = dict.fromkeys([*([] if none is None else [none]), *names, *([] if value is None else [value])])
+    if element.options != tuple(offered):
+        element.options = tuple(offered)
+    element.value = none if value is None else value
+
+
+def chosen(element: Any, none: str = NONE) -> str | None:
+    """Return what is chosen in a list; None if nothing is."""
+    return None if element.value == none else str(element.value)
 
 
 class Fields:

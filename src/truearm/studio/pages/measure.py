@@ -14,8 +14,7 @@ from truearm.studio import words
 from truearm.studio.measure_fields import SOURCES
 from truearm.studio.measuring import HEAD, Measuring
 from truearm.studio.pages.check import choose_measurements
-from truearm.studio.pages.choices import NONE, offer
-from truearm.studio.pages.fields import Fields
+from truearm.studio.pages.fields import NONE, Fields, offer
 from truearm.studio.pages.measured_with import MeasuredWith
 from truearm.studio.pages.measuring_scene import MeasuringScene
 from truearm.studio.pictures import Picture

@@ -28,8 +28,8 @@ from truearm.iso9283.planning.plan_file import PLAN
 from truearm.iso9283.simulating.simulate import FILES
 from truearm.studio import words
 from truearm.studio.evaluated_with import evaluated_with, other_evaluations, stamps_of
-from truearm.studio.pages.choices import NONE, chosen, offer
 from truearm.studio.pages.drawn_cube import DrawnCube
+from truearm.studio.pages.fields import NONE, chosen, offer
 from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.project import stamp_of
 from truearm.studio.tasks import Outcome

@@ -18,8 +18,7 @@ from truearm.engine.twin.devices import DEVICES
 from truearm.planning.choosing import ERROR
 from truearm.studio import words
 from truearm.studio.arrows import coloured
-from truearm.studio.pages.choices import NONE, offer
-from truearm.studio.pages.fields import Fields
+from truearm.studio.pages.fields import NONE, Fields, offer
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.plan_made_with import other_plan_told

@@ -11,7 +11,7 @@ from truearm.engine.robot.chain import Array
 from truearm.studio import words
 from truearm.studio.arrows import FACTORS, Arrows, error_arrows
 from truearm.studio.drawn_program import DrawnProgram
-from truearm.studio.pages.choices import NONE, offer
+from truearm.studio.pages.fields import NONE, offer
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.window import Window
 

@@ -18,8 +18,7 @@ from truearm.engine.robot.wrench import WRENCH_FRAMES, Wrench
 from truearm.studio import words
 from truearm.studio.corrected import Corrected, corrected_now, kinematics_files
 from truearm.studio.drawn_program import DrawnProgram, corrected_program, read_program
-from truearm.studio.pages.choices import NONE, chosen, offer
-from truearm.studio.pages.fields import Fields
+from truearm.studio.pages.fields import NONE, Fields, chosen, offer
 from truearm.studio.pages.program_in_space import ProgramInSpace
 from truearm.studio.project import stamp_of
 from truearm.studio.window import Window

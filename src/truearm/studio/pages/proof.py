@@ -15,8 +15,8 @@ from truearm.engine.data.excluded import read_exclusions
 from truearm.studio import words
 from truearm.studio.evaluated_with import OTHER_MEASUREMENTS, OTHER_ROBOT, OTHER_SETTINGS
 from truearm.studio.made_with import MadeWith, made_with
-from truearm.studio.pages.choices import NONE, offer
 from truearm.studio.pages.error_arrows import ErrorArrows
+from truearm.studio.pages.fields import NONE, offer
 from truearm.studio.pictures import Picture, report_figures
 from truearm.studio.project import stamp_of
 from truearm.studio.window import Window

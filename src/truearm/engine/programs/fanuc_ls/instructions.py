@@ -240,8 +240,6 @@ def split_moves(program: Program, splits: Sequence[Split]) -> SplitEdits:
 
 
 class _SplitFile:
-    """A file with split moves."""
-
     def __init__(self, program: Program, source: int) -> None:
         self._program, self._source = program, source
         self._raw = program.sources[source].text

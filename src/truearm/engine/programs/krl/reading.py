@@ -326,8 +326,6 @@ def read(sources: Sequence[Source]) -> Program:
 
 
 class _Reader:
-    """Reads one program."""
-
     def __init__(self, sources: Sequence[Source]) -> None:
         self._sources = tuple(sources)
         self._texts = [Text(index, source) for index, source in enumerate(sources)]

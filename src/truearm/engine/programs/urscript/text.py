@@ -371,7 +371,8 @@ class Script(Text):
                     self.assignments.append(Assignment(found["variable"], start, None, routine, ""))
             elif event == "header":
                 blocks.append((found.start(), routine))
-                names = (self._argument_name(one) for one in self.arguments(place - 1))
+                arguments = self.arguments(place - 1)
+                names = (one.keyword or code[one.value.start : one.value.stop] for one in arguments)
                 self.routines.append(Routine(found["header"], found.start(), routine, frozenset(names)))
                 routine = len(self.routines) - 1
                 stretch += 1
@@ -386,9 +387,6 @@ class Script(Text):
             word = _WORD_SCRIPT.search(code, blocks[-1][0])
             what = "routine or block" if word is None else word[0]
             raise self.refusal(f"this {what} has no end", blocks[-1][0], "The file may be truncated.")
-
-    def _argument_name(self, argument: Argument) -> str:
-        return argument.keyword or self.code[argument.value.start : argument.value.stop]
 
 
 # What a variable of a URScript file holds where it is used.

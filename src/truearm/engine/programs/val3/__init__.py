@@ -131,8 +131,6 @@ class _Application:
 
 @dataclass
 class _Found:
-    """What was found so far."""
-
     targets: list[ProgramTarget] = field(default_factory=list)
     moves: list[Move] = field(default_factory=list)
     skipped: list[Skipped] = field(default_factory=list)

@@ -35,12 +35,11 @@ from __future__ import annotations
 from typing import Final
 
 from truearm.engine.robot.chain import Motion
-from truearm.engine.robot.conventions.convention import JOINT, Convention, JointKind
+from truearm.engine.robot.conventions.convention import JOINT, Convention, JointKind, parallel_joints_without_beta
 from truearm.engine.robot.conventions.cpc import CpcConvention
 from truearm.engine.robot.conventions.exponentials import ExponentialsConvention
 from truearm.engine.robot.conventions.joint_errors import JointErrorsConvention
 from truearm.engine.robot.conventions.origin import OriginConvention
-from truearm.engine.robot.conventions.parallel import parallel_joints_without_beta
 from truearm.engine.robot.conventions.zero_reference import ZeroReferenceConvention
 
 __all__ = ["CONVENTIONS", "JOINT", "Convention", "JointKind", "convention", "parallel_joints_without_beta"]

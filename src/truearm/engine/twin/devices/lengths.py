@@ -189,10 +189,6 @@ def _turned(roll: float, pitch: float, yaw: float) -> Array:
     return np.asarray(about_z @ about_y @ about_x)
 
 
-def _grid() -> tuple[tuple[float, float, float], ...]:
-    return tuple((x, y, z) for x, y, z in rectangular_grid(6, 5, 0.05).tolist())
-
-
 _TILT: Final = float(np.deg2rad(20.0))
 _SLOPE: Final = float(np.deg2rad(-45.0))
 _RADIUS: Final = 0.1
@@ -202,7 +198,7 @@ CALIBRATION_TABLE: Final = KnownPoints(
     "Li et al., section 3: holes of a table on a ball joint that turns by up to 20 deg; grid and deviation ours",
     sigma=5e-5,
     tool=Tool({"tip": (0.02, 0.01, 0.15)}),
-    points=_grid(),
+    points=tuple((x, y, z) for x, y, z in rectangular_grid(6, 5, 0.05).tolist()),
     plates=((0.0, 0.0, 0.0), (_TILT, 0.0, 0.0), (0.0, _TILT, 0.0)),
 )
 TOUCH_UP: Final = KnownPoints(

@@ -122,7 +122,7 @@ def program(*asked: str) -> Commands:
 
 def _function(words: str) -> Callable[..., None]:
     first, *others = (_named(dotted) for dotted in (COMMANDS[words], *OF_DEVICES.get(words, ())))
-    return command_of(first.request, *(one.request for one in others)) if hasattr(first, "request") else first
+    return command_of(first.request, *(other.request for other in others)) if hasattr(first, "request") else first
 
 
 def _named(dotted: str) -> Any:

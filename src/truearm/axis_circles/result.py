@@ -69,28 +69,28 @@ class AxisCalibration(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give the circles, the axes, and the robot's parameters and joint errors, in mm, deg and mrad."""
-        found = self.analysis
+        axis_analysis = self.analysis
         yield say(
             truearm="truearm-axes/1",
-            robot=found.nominal.name,
-            configurations=found.data.configurations,
-            left_out=found.found.left_out,
-            frame="robot" if found.in_robot_frame else "instrument",
-            declared=found.found.declared,
-            excess=found.found.excess,
+            robot=axis_analysis.nominal.name,
+            configurations=axis_analysis.data.configurations,
+            left_out=axis_analysis.found.left_out,
+            frame="robot" if axis_analysis.in_robot_frame else "instrument",
+            declared=axis_analysis.found.declared,
+            excess=axis_analysis.found.excess,
         )
         yield detail(
             "joint  target  points   arc [deg]  radius [mm]  axis +/- [mm]  [mrad]  tangential [mm]  backlash [deg]"
         )
-        yield each("circles", map(_circle, found.found.circles))
+        yield each("circles", map(_circle, axis_analysis.found.circles))
         yield say(
             axes=self._axes(),
-            base=_placed(found.base),
-            flange=_placed(found.flange),
+            base=_placed(axis_analysis.base),
+            flange=_placed(axis_analysis.flange),
             targets={t.name: [self.robot.values[t.parameter(a)] * 1e3 for a in "xyz"] for t in self.robot.targets},
             tables=self._tables,
         )
-        yield under("joint_errors", joint_errors(found.errors))
+        yield under("joint_errors", joint_errors(axis_analysis.errors))
 
     @cached_property
     def _tables(self) -> dict[str, Any]:
@@ -153,10 +153,10 @@ class AxisCalibration(Record):
 def joint_errors(fit: AxisFit) -> Iterator[Block]:
     """Give what a fit in joint errors says: what was found, of what, and what circles cannot observe."""
     everything = FreeParameters((*fit.free.parameters, *(fit.robot.parameters[r.dropped] for r in fit.redundancies)))
-    found = [p for p in fit.free.parameters if p.group != "base"]
+    parameters = [p for p in fit.free.parameters if p.group != "base"]
     unseen = f"{counted(len(fit.redundancies), 'combination')} of errors unobservable with circles and held"
-    yield say(f"Joint errors: {len(found)} found, in 95 % intervals; {unseen}:")
-    yield each("found", (_joint_error(p, in_words(fit.combination(p.name), everything)) for p in found))
+    yield say(f"Joint errors: {len(parameters)} found, in 95 % intervals; {unseen}:")
+    yield each("found", (_joint_error(p, in_words(fit.combination(p.name), everything)) for p in parameters))
     yield detail("Unobservable with circles, and held at their nominal values:")
     yield each("unseen", (_unseen(r, moves_flange=r.dropped in fit.moving_flange) for r in fit.redundancies))
 
@@ -220,11 +220,11 @@ def found_axes(asked: Axes) -> AxisCalibration:
     readings = readings_argument(nominal, asked.data)
     asked.progress("fitting circles and axes")
     with refusals_of("data"):
-        found = AxisCalibration(
+        axis_calibration = AxisCalibration(
             analyse(nominal, readings, in_robot_frame=asked.measurement_frame == "robot"),
             files_of(asked.robot, asked.data),
         )
     if folder is not None:
         asked.progress("writing the files")
-        found.save(folder)
-    return found
+        axis_calibration.save(folder)
+    return axis_calibration

@@ -22,17 +22,17 @@ _MOST: Final = 3000
 
 def bag_html(imported: ImportedBag) -> str:
     """Return the page."""
-    found = imported.found
+    recording = imported.found
     words = (
         "In the blue times the robot stands still: no joint moves more than allowed. The mean of what was seen of a "
         "target then is its reading. Where a target moves in them, the clocks of the two topics differ."
     )
-    drawing = pictured("recording", "Joints and targets over time", words, _picture(found))
+    drawing = pictured("recording", "Joints and targets over time", words, _picture(recording))
     return Document(
         "Standstills in a recording",
         [
             answer(imported.lines(), ()),
-            _table(found),
+            _table(recording),
             drawing,
         ],
         imported.command,

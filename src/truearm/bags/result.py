@@ -68,26 +68,26 @@ class ImportedBag(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give the standstills and what was seen in them, in s and mm."""
-        found = self.found
-        lasted = [still.end - still.start for still in found.standstills]
+        recording = self.found
+        lasted = [still.end - still.start for still in recording.standstills]
         yield say(
             f"{counted(len(lasted), 'standstill')} of {min(lasted):.1f} to {max(lasted):.1f} s, joints "
-            f"{', '.join(found.joints.names)}",
+            f"{', '.join(recording.joints.names)}",
             configurations=self.data.configurations,
-            joint_names=list(found.joints.names),
-            standstills_s=[[still.start, still.end] for still in found.standstills],
+            joint_names=list(recording.joints.names),
+            standstills_s=[[still.start, still.end] for still in recording.standstills],
         )
-        yield each("targets", (_of_target(*one) for one in zip(found.targets, found.sightings, strict=True)))
+        yield each("targets", (_of_target(*one) for one in zip(recording.targets, recording.sightings, strict=True)))
         text = []
-        if found.missed:
-            when = listed([f"{at:.1f} s" for at in found.missed])
+        if recording.missed:
+            when = listed([f"{at:.1f} s" for at in recording.missed])
             text = [
-                f"  {counted(len(found.missed), 'pause')} without a standstill, at {when}: too short, creeping, or",
+                f"  {counted(len(recording.missed), 'pause')} without a standstill, at {when}: too short, creeping, or",
                 "  the joints were not recorded. Each takes a number: the way to the next one is not known.",
             ]
-        yield detail(*text, missed_pauses_s=list(found.missed))
+        yield detail(*text, missed_pauses_s=list(recording.missed))
         words = "  No deviations are declared: in a standstill all samples are the same."
-        yield detail("" if found.declares_sigma else words, declares_sigma=found.declares_sigma)
+        yield detail("" if recording.declares_sigma else words, declares_sigma=recording.declares_sigma)
         yield detail(*joints_lines("controller" if self.data.joints_are == "controller" else "model"))
 
     def written_at(self, out: str) -> str:
@@ -145,8 +145,8 @@ def of_bag(asked: ImportRos) -> ImportedBag:
     bag = path_argument(asked.file, "file")
     out = None if asked.out is None else _table_for(asked.out, bag)
     with refusals_of("file"):
-        found = _found(bag, asked)
-    imported = ImportedBag(found, asked.again, files_of(bag))
+        recording = _found(bag, asked)
+    imported = ImportedBag(recording, asked.again, files_of(bag))
     if out is not None:
         asked.progress("writing the files")
         imported.save(out)

@@ -83,15 +83,15 @@ def read_hand_eye(
     cells = read_named(path)
     if board is None:
         columns = columns_beside_joints(cells, _OF_POSES, _UNITS, _DEVIATIONS)
-        found = configurations_of(cells, columns)
-        refuse_repeated(cells, found, "Each row is a pose of the board: give it a label of its own.")
+        configurations = configurations_of(cells, columns)
+        refuse_repeated(cells, configurations, "Each row is a pose of the board: give it a label of its own.")
         views = _poses(cells, columns)
     else:
         from truearm.board.pictures import seen_in_pictures
 
         columns = columns_beside_joints(cells, _OF_PICTURES, {})
-        found = configurations_of(cells, columns)
-        refuse_repeated(cells, found, "Each row is a picture of the board: give it a label of its own.")
+        configurations = configurations_of(cells, columns)
+        refuse_repeated(cells, configurations, "Each row is a picture of the board: give it a label of its own.")
         views = seen_in_pictures([path.parent / name for name in cells.texts(columns["picture"][0])], board)
     if on_flange != "camera":
         ahead = 0.0
@@ -101,7 +101,7 @@ def read_hand_eye(
         places, turns, sigma, sigma_rot = views.camera_in_board(ahead)
     else:
         places, turns, sigma, sigma_rot = views.board_in_camera()
-    data = _dataset(str(path), found, ON_FLANGE[on_flange])
+    data = _dataset(str(path), configurations, ON_FLANGE[on_flange])
     quaternion = quaternion_from_rotation(turns)
     return HandEyeReadings(
         replace(data, position=places, quaternion=quaternion, sigma=sigma, sigma_rot=sigma_rot), views, ahead

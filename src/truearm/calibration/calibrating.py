@@ -124,9 +124,9 @@ def followed(progress: Callable[[str], None], judging: Dataset, *, held_out: boo
                 errors = errors_of(inner.robot.with_values(values), judging)
         except InputError:  # a step on the way may be no robot
             return
-        found = errors.position or errors.length
-        if found is not None:
-            progress(FitStep.of(number, cost, found.mean, "held-out" if held_out else "training"))
+        spread = errors.position or errors.length
+        if spread is not None:
+            progress(FitStep.of(number, cost, spread.mean, "held-out" if held_out else "training"))
         spent += time.process_time() - began
 
     with watching(told):

@@ -328,14 +328,14 @@ def candidates_table(selection: Selection) -> Table:
     """Return a row for every joint effect that could be chosen."""
     rows = [
         (
-            one.effect,
-            "–" if one.gain is None else f"{one.gain.mean * 1e3:+.4f}",
-            "–" if one.gain is None else f"{one.gain.error * 1e3:.4f}",
-            "taken" if one.taken else f"left out: {one.reason}",
+            candidate.effect,
+            "–" if candidate.gain is None else f"{candidate.gain.mean * 1e3:+.4f}",
+            "–" if candidate.gain is None else f"{candidate.gain.error * 1e3:.4f}",
+            "taken" if candidate.taken else f"left out: {candidate.reason}",
         )
-        for one in selection.candidates
+        for candidate in selection.candidates
     ]
-    taken = tuple("taken" if one.taken else "" for one in selection.candidates)
+    taken = tuple("taken" if candidate.taken else "" for candidate in selection.candidates)
     heading = ("joint effect", "gain [mm]", "standard error [mm]", "")
     return Table(heading, rows, texts=(3,), name="selection", wide=True, marks=taken)
 
@@ -344,14 +344,14 @@ def confirmations_table(selection: Selection) -> Table:
     """Return a row for every model that was fitted in the folds."""
     rows = [
         (
-            listed(one.effects) or "geometric",
-            f"{one.error * 1e3:.4f}",
-            listed(one.smaller) or "geometric",
-            f"{one.smaller_error * 1e3:.4f}",
-            f"{one.gain.mean * 1e3:+.4f}",
-            f"{one.gain.error * 1e3:.4f}",
+            listed(confirmation.effects) or "geometric",
+            f"{confirmation.error * 1e3:.4f}",
+            listed(confirmation.smaller) or "geometric",
+            f"{confirmation.smaller_error * 1e3:.4f}",
+            f"{confirmation.gain.mean * 1e3:+.4f}",
+            f"{confirmation.gain.error * 1e3:.4f}",
         )
-        for one in selection.confirmations
+        for confirmation in selection.confirmations
     ]
     heading = ("model", "error [mm]", "instead of", "error [mm]", "gain [mm]", "standard error [mm]")
     return Table(heading, rows, texts=(2,), name="confirmations", wide=True)
@@ -362,7 +362,7 @@ def candidates_figure(selection: Selection) -> Figure:
 
     The axis is linear near no gain and logarithmic beyond, so that what little effects gain is seen beside a large one.
     """
-    tried = [one for one in reversed(selection.candidates) if one.gain is not None]
+    tried = [candidate for candidate in reversed(selection.candidates) if candidate.gain is not None]
     errors = [1e3 * one.gain.error for one in tried if one.gain is not None and one.gain.error > 0.0]
     linear = max(float(np.median(errors)) if errors else 0.0, _SMALLEST)
     ends: list[float] = [linear]

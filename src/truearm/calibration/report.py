@@ -242,7 +242,7 @@ def _certified(run: Calibration) -> list[tuple[str, str | Sequence[NextStep]]]:
         facts.append(("Excluded", "; ".join(rows)))
     facts.append(("Targets", ", ".join(run.data.targets)))
     if run.data.fixtures:
-        facts.append(("Measured against", ", ".join(f"{one.name} ({one.kind})" for one in robot.fixtures)))
+        facts.append(("Measured against", ", ".join(f"{fixture.name} ({fixture.kind})" for fixture in robot.fixtures)))
     return facts
 
 
@@ -470,7 +470,7 @@ def _parameters(fit: Fit) -> Section:
             "one of each is held at its nominal value. At configurations like the measured ones predictions hardly "
             "depend on them."
         )
-        entries = [f"`{one.dropped}` held: `{one.combination}`" for one in fit.redundancies]
+        entries = [f"`{redundancy.dropped}` held: `{redundancy.combination}`" for redundancy in fit.redundancies]
         blocks.append(Points("Redundant combinations", combined, entries, "redundancies"))
     turn = ", ".join(f"{number:.6f}" for number in fit.robot.base_quaternion)
     base = (

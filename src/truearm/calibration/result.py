@@ -250,9 +250,9 @@ class Calibration(Record):
         """Return where the targets are on the flange, with their deviations."""
         text = []
         for target in self.robot.targets:
-            found = [self.robot.parameters[target.parameter(axis)] for axis in "xyz"]
-            place = ", ".join(f"{p.value * 1e3:.3f}" for p in found)
-            known = ", ".join("?" if p.deviation is None else f"{p.deviation * 1e3:.2g}" for p in found)
+            parameters = [self.robot.parameters[target.parameter(axis)] for axis in "xyz"]
+            place = ", ".join(f"{p.value * 1e3:.3f}" for p in parameters)
+            known = ", ".join("?" if p.deviation is None else f"{p.deviation * 1e3:.2g}" for p in parameters)
             text.append(f"Target {target.name} on the flange: ({place}) mm, deviations ({known}) mm")
         return text
 

@@ -86,11 +86,11 @@ def check_correction(
     """
     corrections = result.corrections
     made = _corrected(result)
-    skipped = sum(len(one.skipped) for one in corrections)
+    skipped = sum(len(correction.skipped) for correction in corrections)
     if skipped:
         made.append(TARGETS_SKIPPED(f"{_counted(skipped, 'target')} left unchanged, as listed with the reason."))
     made += [*_not_better(robot, result), *_beyond(robot, result)]
-    unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
+    unknown: Counter[str] = sum((Counter(correction.program.unknown) for correction in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
         made.append(
@@ -99,7 +99,7 @@ def check_correction(
                 f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
             )
         )
-    edges = [(one, row) for one in corrections for row in one.on_edge]
+    edges = [(correction, row) for correction in corrections for row in correction.on_edge]
     if edges:
         made.append(
             CONFIGURATION_ON_EDGE(
@@ -115,7 +115,7 @@ def check_correction(
                 "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be.",
             )
         )
-    unsplit = sum(len(one.unsplit) for one in splits)
+    unsplit = sum(len(split.unsplit) for split in splits)
     if unsplit:
         made.append(
             MOVES_NOT_DIVIDED(
@@ -126,7 +126,9 @@ def check_correction(
         )
     made += _loads(robot, result)
     made += _apart(result)
-    if any(one.program.load_changes for one in corrections) and any(effect.loaded for effect in robot.effects):
+    if any(correction.program.load_changes for correction in corrections) and any(
+        effect.loaded for effect in robot.effects
+    ):
         made.append(
             LOAD_CHANGES(
                 "The programs change what the robot carries (GripLoad, TLoad, tload). Targets were corrected for the "
@@ -154,10 +156,10 @@ NO_TARGETS: Final = Rule(
 def _corrected(result: CorrectedPrograms) -> list[Notice]:
     """Say what the correction rests on, or that there is none."""
     corrections = result.corrections
-    if not any(one.program.targets for one in corrections):
+    if not any(correction.program.targets for correction in corrections):
         return [NO_TARGETS("There is no target in the programs that could be corrected.")]
-    alone = sum(why == ALONE for one in corrections for why in one.kept.values())
-    made = _assumed(result) if any(one.corrected.any() for one in corrections) else _nothing(alone)
+    alone = sum(why == ALONE for correction in corrections for why in correction.kept.values())
+    made = _assumed(result) if any(correction.corrected.any() for correction in corrections) else _nothing(alone)
     return made + _by_joints(corrections)
 
 
@@ -171,7 +173,7 @@ NOT_BETTER_HERE: Final = Rule(
 
 def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     """Say which targets are rather worse off with their correction, and what became of them."""
-    every = [(one, row) for one in result.corrections for row in one.not_better]
+    every = [(correction, row) for correction in result.corrections for row in correction.not_better]
     if not every:
         return []
     alone = [(one, row) for one, row in every if one.expected is not None and one.expected.worse[row] > LIKELY]
@@ -204,7 +206,11 @@ def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
 
 def _flange_counts(result: CorrectedPrograms) -> bool:
     """Return whether it counts in programs where on the flange tools are that were not measured."""
-    judged = [(one, np.isfinite(one.expected.before)) for one in result.corrections if one.expected is not None]
+    judged = [
+        (correction, np.isfinite(correction.expected.before))
+        for correction in result.corrections
+        if correction.expected is not None
+    ]
     turns = np.concatenate([one.before[rows, :3, :3] for one, rows in judged])
     alike = result.frames.frames == "assumed" and np.allclose(turns, turns[0], atol=_TURNED)
     return result.frames.tools == "assumed" and not alike
@@ -222,9 +228,9 @@ BEYOND_MEASURED: Final = Rule(
 def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     """Say which targets are reached with joint positions that calibration has not seen."""
     found = [
-        (one, row)
-        for one in result.corrections
-        for row in np.flatnonzero(one.corrected & beyond_measured(robot, one.joints).any(axis=1)).tolist()
+        (correction, row)
+        for correction in result.corrections
+        for row in np.flatnonzero(correction.corrected & beyond_measured(robot, correction.joints).any(axis=1)).tolist()
     ]
     if not found:
         return []
@@ -270,7 +276,7 @@ JOINT_TARGETS_KEPT: Final = Rule(
 
 
 def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
-    kept = sum(why == "given by joints" for one in corrections for why in one.kept.values())
+    kept = sum(why == "given by joints" for correction in corrections for why in correction.kept.values())
     if not kept:
         return []
     stay = "is given by joints and stays as it is" if kept == 1 else "are given by joints and stay as they are"
@@ -367,9 +373,9 @@ def _targets_by_shift(result: CorrectedPrograms) -> list[int]:
     """Return how many targets each shift of the base was found from."""
     apart = result.choice.was_taught("frames")
     number: Counter[str] = Counter()
-    for one in result.corrections:
-        for row, target in enumerate(one.program.targets):
-            if one.corrected[row] or row in one.not_better:
+    for correction in result.corrections:
+        for row, target in enumerate(correction.program.targets):
+            if correction.corrected[row] or row in correction.not_better:
                 number[target.frame.lower() if apart else ""] += 1
     return list(number.values())
 
@@ -425,7 +431,7 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
             f"{given}. The program's tools are taken to sit on a flange that agrees best with the nominal one all over "
             f"the workspace, {size(frames.flange)} from the identified one."
         )
-        if any(one.expected is not None for one in result.corrections):
+        if any(correction.expected is not None for correction in result.corrections):
             said[-1] += " No reading tells where it really is; the errors to expect contain that."
     return said
 

@@ -280,9 +280,9 @@ def _wrenches(arm: Robot, pushed: Wrench | None, file: Path | None) -> tuple[Tar
         return () if pushed is None else (TargetWrench((), (), pushed),)
     with refusals_of("wrench"):
         acting = read_wrenches(file)
-        for one in acting:
-            with refusals_at(one.where):
-                arm.with_wrench(one.wrench)
+        for target_wrench in acting:
+            with refusals_at(target_wrench.where):
+                arm.with_wrench(target_wrench.wrench)
     return acting
 
 
@@ -308,7 +308,7 @@ def _refuse_taught_and_measured(choice: Choice, cell: Cell) -> None:
 
 def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: CorrectionLimit | None) -> list[Notice]:
     """Refuse corrections that errors of the robot do not explain, or say that they were accepted."""
-    rows = [(one, np.flatnonzero(one.corrected)) for one in result.corrections]
+    rows = [(correction, np.flatnonzero(correction.corrected)) for correction in result.corrections]
     targets = [one.program.targets[row] for one, some in rows for row in some.tolist()]
     programs = [one.program for one, some in rows for _ in some]
     given = [name for name in ("frames", "tools") if getattr(result.frames, name) == "identified"]

@@ -336,7 +336,7 @@ _BEGINNINGS: Final = (re.compile(r"\w+"), re.compile(r"\w+\[\d+"))
 
 def numbers_read(language: Language, corrections: Sequence[Correction]) -> list[str]:
     """Return where programs read numbers of targets that are corrected: file, line and what is read."""
-    return [where for one in corrections for where in _read_in(language, one)]
+    return [where for correction in corrections for where in _read_in(language, correction)]
 
 
 def _read_in(language: Language, correction: Correction) -> Iterator[str]:

@@ -137,7 +137,9 @@ class FollowedPath(Record):
     def _error(self, name: Knowledge) -> Block:
         error = self.path.errors[name] * 1e3
         mean, most = float(error.mean()), float(error.max())
-        words = f"  {STAGES[name]:<{max(len(STAGES[one]) for one in self.stages)}}  mean {mean:.3f}  max {most:.3f} mm"
+        words = (
+            f"  {STAGES[name]:<{max(len(STAGES[stage]) for stage in self.stages)}}  mean {mean:.3f}  max {most:.3f} mm"
+        )
         return under(name, [say(words, mean=mean, max=most)])
 
     def motion_csv(self) -> str:
@@ -308,7 +310,9 @@ def _entries(arm: Robot, languages: Sequence[Language], texts: Mapping[str, str]
     return tuple(
         LedgerEntry(program=str(path), date=day, robot=arm.name, targets=corrected_digests((), targets))
         for language in languages
-        for program in language.programs([one for one in sources if one.path.suffix.lower() in language.suffixes])
+        for program in language.programs(
+            [source for source in sources if source.path.suffix.lower() in language.suffixes]
+        )
         for path, targets in program.by_file().items()
     )
 

@@ -199,18 +199,20 @@ def _bases(
     """Return the base by the name of the frame for whose targets it is."""
     if frames == "identified":
         # What is given by joints stays where it is to the first frame that was measured.
-        return dict.fromkeys(names, next(one.measured_base for one in programs if one.measured_base is not None))
+        return dict.fromkeys(
+            names, next(program.measured_base for program in programs if program.measured_base is not None)
+        )
     if frames == "held":
         return dict.fromkeys(names, np.eye(4))
     progress("finding where the base is")
     bases: dict[str, Array] = {}
     for group in [(name,) for name in names] if choice.was_taught("frames") else [names]:
         bases |= dict.fromkeys(group, _base_of(programs, group, start, flange))
-        found = [(one, one.some(_MORE_THAN_ONE, group)) for one in programs]
+        found = [(program, program.some(_MORE_THAN_ONE, group)) for program in programs]
         if sum(len(rows) for _, rows in found) == 1:
             # The frame takes up all that a correction could do to it.
-            for one, rows in found:
-                one.keep(rows, ALONE)
+            for resolved_program, rows in found:
+                resolved_program.keep(rows, ALONE)
     return bases
 
 
@@ -221,18 +223,22 @@ def _base_of(programs: Sequence[ResolvedProgram], frames: Sequence[str], start: 
     looked for again where that ends.
     """
     everything = []
-    for one in programs:
-        rows = one.some(_TARGETS_FOR_BASE // len(programs) + 1, frames)
-        everything.append((rows, one.joints_near(rows)))
+    for program in programs:
+        rows = program.some(_TARGETS_FOR_BASE // len(programs) + 1, frames)
+        everything.append((rows, program.joints_near(rows)))
     base = start
     for _ in range(2):
         parts = everything
 
         def corrected(shift: Array) -> tuple[Array, Array]:
             nonlocal parts
-            found = [one.tips_with(*part, shift, flange) for one, part in zip(programs, parts, strict=True)]
-            parts = [(tips.rows, tips.joints) for tips in found]
-            return np.concatenate([tips.before for tips in found]), np.concatenate([tips.after for tips in found])
+            tips_founds = [
+                program.tips_with(*part, shift, flange) for program, part in zip(programs, parts, strict=True)
+            ]
+            parts = [(tips.rows, tips.joints) for tips in tips_founds]
+            return np.concatenate([tips.before for tips in tips_founds]), np.concatenate(
+                [tips.after for tips in tips_founds]
+            )
 
         base = base_shift(corrected, base)
     return base

@@ -161,7 +161,7 @@ def _files(correction: ProgramCorrection) -> Section:
     heading = ("targets", "corrected", "kept", "unchanged", "expected [mm]", "now", "shift [mm]", "largest")
     blocks: list[Block] = [Words(words), Table(("file", *heading), rows, look="spread", wide=True)]
     if correction.splits:
-        moves, added = (sum(getattr(one, what) for one in correction.splits) for what in ("moves", "added"))
+        moves, added = (sum(getattr(split, what) for split in correction.splits) for what in ("moves", "added"))
         blocks.append(Words(f"{moves} straight or circular moves were split by {added} more targets."))
     return Section("Files", blocks, "files")
 

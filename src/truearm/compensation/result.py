@@ -365,7 +365,7 @@ class ProgramCorrection(Record):
     def as_written(self) -> tuple[Program, ...]:
         """Return the programs as they are read again from their new texts."""
         language = language_called(self.files[0].language)
-        return read_sources(language, [Source(one.file.path, one.text.decode("latin-1")) for one in self.files])
+        return read_sources(language, [Source(file.file.path, file.text.decode("latin-1")) for file in self.files])
 
     def written_at(self, out: str) -> str:
         """Return the line that says where it was written."""
@@ -387,17 +387,17 @@ class ProgramCorrection(Record):
         files: dict[str, str | bytes] = {}
         entries = []
         written = {path: targets for program in self.as_written() for path, targets in program.by_file().items()}
-        for one in self.files:
-            path = one.file.path
-            targets = corrected_digests(one.correction.program.by_file()[path], written[path])
-            files[one.name] = one.text
-            files[f"{one.name}.truearm.json"] = recorded(
-                one.file, one.text, one.language, self.applied(), self.date, targets
+        for file in self.files:
+            path = file.file.path
+            targets = corrected_digests(file.correction.program.by_file()[path], written[path])
+            files[file.name] = file.text
+            files[f"{file.name}.truearm.json"] = recorded(
+                file.file, file.text, file.language, self.applied(), self.date, targets
             )
-            entries.append(LedgerEntry(program=one.name, date=self.date, robot=self.robot.name, targets=targets))
+            entries.append(LedgerEntry(program=file.name, date=self.date, robot=self.robot.name, targets=targets))
         files[REPORT] = program_html(self)
         progress("writing the files")
-        read = [*(one.file.path for one in self.files), *self.inputs]
+        read = [*(file.file.path for file in self.files), *self.inputs]
         ledger = None if self.ledger is None else (self.ledger, entries)
         write_programs(folder, read, files, self.command, ledger)
         return tuple(folder / name for name in files)

@@ -114,10 +114,10 @@ def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configur
     joints_are, names = joint_names(columns, f"{page.points}, line {cells.header}")
     joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"][0])
-    found = found_configurations(
+    configurations = found_configurations(
         cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are
     )
-    if len(found.labels) < len(labels):
+    if len(configurations.labels) < len(labels):
         again = Counter(labels).most_common(1)[0][0]
         raise InputError(
             "a configuration appears twice",
@@ -126,7 +126,7 @@ def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configur
             cure="Number the configurations through, in the order in which they were drawn.",
         )
     angle, height = (cells.numbers(*columns[name]) for name in ("angle", "height"))
-    return found, drawn_circle(read_circle(page.scan, dpi), angle, found.joints, height)
+    return configurations, drawn_circle(read_circle(page.scan, dpi), angle, configurations.joints, height)
 
 
 def _columns(cells: Cells) -> dict[str, tuple[int, str]]:

@@ -199,7 +199,7 @@ class Reason:
     @property
     def size(self) -> float:
         """How much there is of it, to order robots with the same reason."""
-        times = [abs(one.times) for one in self.differences] + [abs(one.times) for one in self.drifts]
+        times = [abs(difference.times) for difference in self.differences] + [abs(drift.times) for drift in self.drifts]
         return max(times, default=self.error)
 
 
@@ -483,7 +483,7 @@ def analysed(rows: Iterable[Row]) -> Analysis:
         kinds=tuple(found),
         looks=first_looks(
             judged,
-            [one for each in found for one in each.differences],
+            [difference for each in found for difference in each.differences],
             [one for each in found for one in each.drifts.significant],
         ),
     )
@@ -507,13 +507,15 @@ def with_proposed(robot: Robot, spreads: Sequence[ParameterSpread]) -> tuple[Rob
     """
     known = robot.parameters
     proposed = {
-        one.parameter: replace(known[one.parameter].restarted(one.centre if one.beside else None), prior=one.proposed)
-        for one in spreads
-        if one.proposed is not None and one.parameter in known
+        spread.parameter: replace(
+            known[spread.parameter].restarted(spread.centre if spread.beside else None), prior=spread.proposed
+        )
+        for spread in spreads
+        if spread.proposed is not None and spread.parameter in known
     }
     if not proposed:
         return robot, ()
-    robots = max(one.robots for one in spreads)
+    robots = max(spread.robots for spread in spreads)
     words = f"priors of {counted(len(proposed), 'parameter')} from the spread of {counted(robots, 'robot')}"
     source = "; ".join(part for part in (robot.source, words) if part)
     return replace(robot.with_parameters(proposed.values()), source=source), tuple(proposed)

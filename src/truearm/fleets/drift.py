@@ -530,13 +530,13 @@ def _with_chances(lines: list[Drift], compared: int) -> list[Drift]:
     """Return changes with their chances, and intervals that hold for all comparisons together (Bonferroni)."""
     from scipy.special import ndtr, ndtri
 
-    times = np.array([one.times for one in lines])
+    times = np.array([line.times for line in lines])
     chances = np.minimum(2.0 * ndtr(-np.abs(times)) * compared, 1.0)
     reach = float(-ndtri(FALSE_ALARMS / (2.0 * max(compared, 1))))
     made = []
-    for one, chance in zip(lines, chances.tolist(), strict=True):
-        half = reach / _Z * (one.high - one.slope)
-        made.append(replace(one, chance=chance, low=one.slope - half, high=one.slope + half))
+    for line, chance in zip(lines, chances.tolist(), strict=True):
+        half = reach / _Z * (line.high - line.slope)
+        made.append(replace(line, chance=chance, low=line.slope - half, high=line.slope + half))
     return made
 
 

@@ -46,7 +46,7 @@ def fleet_figures(found: Analysis) -> dict[str, Figure]:
         kind = found.kinds[0]
         if len(_drawn(kind)):
             figures["parameters"] = parameters_figure(kind)
-        if any(one.spread is not None for one in kind.spreads):
+        if any(spread.spread is not None for spread in kind.spreads):
             figures["spread"] = spread_figure(kind)
     for unit, name in (("m", "drift-lengths"), ("rad", "drift-angles")):
         changes = shown_drifts(found, unit)
@@ -134,7 +134,7 @@ def histogram_figure(errors: Errors) -> Figure:
 
 def _drawn(found: KindFound) -> NDArray[np.intp]:
     """Return the parameters that are worth a look: the readings tell much of them, or a robot differs in them."""
-    differ = np.isin(np.array(found.kind.parameters), [one.parameter for one in found.differences])
+    differ = np.isin(np.array(found.kind.parameters), [difference.parameter for difference in found.differences])
     return np.flatnonzero((found.kind.share > _TOLD) | differ)
 
 
@@ -169,7 +169,10 @@ def parameters_figure(found: KindFound) -> Figure:
         traces.append(_boxes(names, values))
     row_of = {kind.names[row]: place for place, row in enumerate(rows.tolist())}
     column_of = {kind.parameters[column]: place for place, column in enumerate(chosen.tolist())}
-    marks = [(one, (row_of[one.robot], column_of[one.parameter])) for one in found.differences[:_MOST_MARKS]]
+    marks = [
+        (difference, (row_of[difference.robot], column_of[difference.parameter]))
+        for difference in found.differences[:_MOST_MARKS]
+    ]
     if marks:
         sizes = [values[place] for _, place in marks]
         traces.append(
@@ -286,7 +289,7 @@ def spread_figure(found: KindFound) -> Figure:
 
 def shown_drifts(found: Analysis, unit: str) -> list[Drift]:
     """Return the changes that are drawn: the surest of a unit, those that are more than chance before others."""
-    those = [one for one in found.drifts if one.unit == unit]
+    those = [drift for drift in found.drifts if drift.unit == unit]
     sure = [one for one in those if one.significant]
     return sorted(sure or those, key=lambda one: -abs(one.times))[: len(_LINES) if sure else 3]
 
@@ -299,18 +302,18 @@ def drift_figure(changes: list[Drift]) -> Figure:
         return rounded(np.array([from_si(v, unit) for v in values]), 4)
 
     traces: list[Figure] = []
-    for one, colour in zip(changes, _LINES, strict=False):
-        name = f"{html.escape(one.machine)}, {html.escape(one.parameter)}"
+    for change, colour in zip(changes, _LINES, strict=False):
+        name = f"{html.escape(change.machine)}, {html.escape(change.parameter)}"
         traces.append(
             {
                 "type": "scatter",
                 "mode": "markers",
-                "name": f"{name}{'' if one.significant else ' (no more than chance)'}",
-                "x": rounded(np.array(one.campaign_months), 5),
-                "y": shown(one.changes),
+                "name": f"{name}{'' if change.significant else ' (no more than chance)'}",
+                "x": rounded(np.array(change.campaign_months), 5),
+                "y": shown(change.changes),
                 "error_y": {
                     "type": "data",
-                    "array": shown(tuple(1.96 * d for d in one.deviations)),
+                    "array": shown(tuple(1.96 * d for d in change.deviations)),
                     "thickness": 1.4,
                     "width": 5,
                 },
@@ -322,9 +325,9 @@ def drift_figure(changes: list[Drift]) -> Figure:
             {
                 "type": "scatter",
                 "mode": "lines",
-                "x": rounded(np.array([0.0, one.months]), 5),
-                "y": shown((0.0, one.change)),
-                "line": {"color": colour, "width": 1.5, "dash": "solid" if one.significant else "dot"},
+                "x": rounded(np.array([0.0, change.months]), 5),
+                "y": shown((0.0, change.change)),
+                "line": {"color": colour, "width": 1.5, "dash": "solid" if change.significant else "dot"},
                 "hoverinfo": "skip",
                 "showlegend": False,
             }

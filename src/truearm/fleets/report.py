@@ -148,7 +148,7 @@ def _parameters(found: Fleet, drawn: dict[str, Figure]) -> list[Section]:
             "elsewhere in every cell and are not compared."
         )
         blocks += [Words(words), Picture("parameters", drawn["parameters"])]
-    differing = [(one.robot, difference_words(one)) for one in kind.differences[:_ROWS]]
+    differing = [(difference.robot, difference_words(difference)) for difference in kind.differences[:_ROWS]]
     if differing:
         blocks.append(Table(("robot", "differs by"), differing, texts=(1,), look="looks"))
     else:
@@ -160,7 +160,7 @@ def _parameters(found: Fleet, drawn: dict[str, Figure]) -> list[Section]:
         )
         blocks += [Words(words), Picture("spread", drawn["spread"])]
     heading = ("parameter", "unit", "prior", "spread", "95 %", "mean off", "proposed", "verdict")
-    rows = [_spread(one, kind) for one in kind.spreads]
+    rows = [_spread(spread, kind) for spread in kind.spreads]
     table = Table(heading, rows, texts=(1, 7), look="parameters sortable", wide=True)
     blocks.append(Folded("Every parameter beside its prior", [table], open="spread" in drawn))
     if found.proposed is not None:
@@ -180,7 +180,7 @@ def _drifts(said: Analysis, drawn: dict[str, Figure]) -> list[Section]:
     if unseen:
         words = f"No change can be seen of {', '.join(unseen)}: base or target may have moved instead. {words}"
     heading = ("machine", "parameter", "campaigns", "months", "change", "a month", "95 %", "verdict")
-    rows = [_change(one) for one in said.drifts[:_ROWS]]
+    rows = [_change(drift) for drift in said.drifts[:_ROWS]]
     return [
         Section(
             "Machines measured again",

@@ -156,7 +156,7 @@ class Fleet(Record):
     @cached_property
     def proposed(self) -> tuple[Robot, tuple[str, ...]] | None:
         """The nominal robot with the priors that follow from the kind with most robots, and which; None if none do."""
-        if not self.analysis.kinds or all(one.proposed is None for one in self.analysis.kinds[0].spreads):
+        if not self.analysis.kinds or all(spread.proposed is None for spread in self.analysis.kinds[0].spreads):
             return None
         asked, first = self.recorded.manifest, self.analysis.kinds[0].kind.names[0]
         if asked.experiment is not None:
@@ -203,10 +203,10 @@ class Fleet(Record):
 
     def _outcome(self) -> str:
         """Return how many have a result, and of how many of these it should not be used."""
-        found = self.analysis
-        if not found.left_out:
-            return f", {found.usable} calibrated, {len(found.failed)} failed"
-        return f": {outcome_words(found)}"
+        analysis = self.analysis
+        if not analysis.left_out:
+            return f", {analysis.usable} calibrated, {len(analysis.failed)} failed"
+        return f": {outcome_words(analysis)}"
 
     @property
     def draw(self) -> str | None:
@@ -234,11 +234,11 @@ class Fleet(Record):
         figures = [f"{kind} {figure} [mm]" for kind in kinds for figure in ("mean", "max")]
         table.writerow(["name", "of", "date", "status", "fit", *figures, "errors", "look", "message"])
         looks = {look.robot: look.reasons for look in self.analysis.looks}
-        for one in self._read[1]:
-            reasons = " ".join(reason.why.replace(" ", "-") for reason in looks.get(one.name, ()))
-            errors = [_mean_and_max(one.errors.get(kind)) for kind in kinds]
+        for line in self._read[1]:
+            reasons = " ".join(reason.why.replace(" ", "-") for reason in looks.get(line.name, ()))
+            errors = [_mean_and_max(line.errors.get(kind)) for kind in kinds]
             figures = [f"{v * 1e3:.6f}" if v is not None else "" for pair in errors for v in pair]
-            table.writerow([*one.begin, *figures, one.codes, reasons, one.message])
+            table.writerow([*line.begin, *figures, line.codes, reasons, line.message])
         return stream.getvalue()
 
     def write(self) -> tuple[Path, ...]:

@@ -97,7 +97,7 @@ def _changed(entry: RobotEntry, noted: Mapping[Path, Sequence[str]]) -> Path | N
 
 def _row(entry: RobotEntry, made: Calibration, began: float) -> Row:
     names, covariance = _own(made)
-    found = made.fit.robot.parameters
+    mapping = made.fit.robot.parameters
     return Row(
         entry.name,
         "calibrated",
@@ -109,7 +109,7 @@ def _row(entry: RobotEntry, made: Calibration, began: float) -> Row:
         parameters=FoundParameters.of(
             {
                 p.name: FoundParameter(p.unit, p.value, p.deviation or 0.0, p.nominal, p.prior)
-                for p in (found[name] for name in names)
+                for p in (mapping[name] for name in names)
             }
         ),
         fit_status=made.status.value,

@@ -161,13 +161,13 @@ def calibrated_fleet(asked: CalibrateFleet) -> Fleet:
         with with_workers(chosen), recorded.alone() as known:
             run = _computed(recorded, known, make, chosen, asked.progress)
             asked.progress("reading the parts")
-            found = Fleet(recorded, run, asked.again)
-            found.write()
+            fleet = Fleet(recorded, run, asked.again)
+            fleet.write()
     except KeyboardInterrupt as stop:
         done = len(recorded.on_disk())
         words = f"{done} of {counted(manifest.parts, 'part')} {'are' if manifest.parts > 1 else 'is'} on disk"
         raise KeyboardInterrupt(f"Stopped: {words}; run it again to go on.") from stop
-    return found
+    return fleet
 
 
 def _workers(asked: CalibrateFleet, parts: int) -> Workers:

@@ -116,7 +116,7 @@ def _kind(found: KindFound, *, several: bool) -> Iterator[Block]:
     beside = (
         "with one another" if count >= LEAST_COMPARED else f"with their priors (fewer than {LEAST_COMPARED} robots)"
     )
-    differing = list(dict.fromkeys(one.robot for one in found.differences))
+    differing = list(dict.fromkeys(difference.robot for difference in found.differences))
     said = "none differs"
     if differing:
         said = f"{listed(differing)} {'differs' if len(differing) == 1 else 'differ'}"
@@ -124,21 +124,21 @@ def _kind(found: KindFound, *, several: bool) -> Iterator[Block]:
         f"{name}Parameters of {counted(count, 'robot')} compared {beside}: {said}.",
         robot=found.kind.robot,
         robots=count,
-        differing=[_difference(one) for one in found.differences[:_MOST_LOOKS]],
+        differing=[_difference(difference) for difference in found.differences[:_MOST_LOOKS]],
         drift=[_drift(one) for one in found.drifts.found[:_MOST_LOOKS]],
         drift_not_seen=[*found.drifts.unknown],
     )
     text = []
     for verdict, words in _VERDICTS.items():
-        those = [one for one in found.spreads if one.verdict == verdict]
+        those = [spread for spread in found.spreads if spread.verdict == verdict]
         known = verdict in ("wider", "narrower")
         if those:
             told = listed([f"{one.parameter} {spread_words(one)}" if known else one.parameter for one in those])
             text.append(f"  {words}: {told}.")
-    shifted = [mean_words(one) for one in found.spreads if one.beside]
+    shifted = [mean_words(spread) for spread in found.spreads if spread.beside]
     if shifted:
         text.append(f"  The whole series lies beside nominal: {listed(shifted)}.")
-    yield detail(*text, parameters=[_spread(one) for one in found.spreads])
+    yield detail(*text, parameters=[_spread(spread) for spread in found.spreads])
 
 
 def _difference(one: Difference) -> dict[str, Any]:
@@ -234,15 +234,17 @@ def drift_words(one: Drift) -> str:
 
 def _changes(found: Analysis) -> Iterator[Words]:
     """Give what has changed of machines that were measured again; JSON holds it with their kind."""
-    machines = {one.machine for one in found.drifts}
+    machines = {drift.machine for drift in found.drifts}
     if machines:
-        changed = [one for one in found.drifts if one.significant]
+        changed = [drift for drift in found.drifts if drift.significant]
         those = {one.machine for one in changed}
         words = f"{counted(len(those), 'machine')} changed" if those else "none has changed by more than chance"
         yield say(f"Measured again: {counted(len(machines), 'machine')}; {words}.")
         yield detail(*(f"  {one.machine}: {drift_words(one)}" for one in changed))
-    for one in (one for kind in found.kinds for one in kind.drifts.alike):
-        yield detail(f"  all machines alike: {one.parameter} {sized(one.slope, one.unit, sign=True)} a month")
+    for all_drift in (one for kind in found.kinds for one in kind.drifts.alike):
+        yield detail(
+            f"  all machines alike: {all_drift.parameter} {sized(all_drift.slope, all_drift.unit, sign=True)} a month"
+        )
 
 
 def reason_words(reason: Reason) -> str:
@@ -333,7 +335,7 @@ DRIFT_UNDATED: Final = Rule(
 def analysis_notices(found: Analysis) -> list[Notice]:
     """Return what to know about the figures of a fleet."""
     notices = []
-    differing = {one.robot for kind in found.kinds for one in kind.differences}
+    differing = {difference.robot for kind in found.kinds for difference in kind.differences}
     if differing:
         notices.append(
             ROBOTS_DIFFER(
@@ -341,7 +343,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
                 f"({listed(sorted(differing))}).",
             )
         )
-    changed = list(dict.fromkeys(one.machine for one in found.drifts if one.significant))
+    changed = list(dict.fromkeys(drift.machine for drift in found.drifts if drift.significant))
     if changed:
         notices.append(
             ROBOTS_DRIFT(

@@ -47,7 +47,9 @@ class _Fixtures(Given):
         for text in typed:
             numbers = read_numbers(text, name, "X,Y,Z,TURN in mm and deg, or X,Y,Z,QW,QX,QY,QZ")
             units = ["mm"] * 3 + (["deg"] if len(numbers) == 4 else ["1"] * (len(numbers) - 3))
-            places.append([sized_si(one, unit, parameter=name) for one, unit in zip(numbers, units, strict=False)])
+            places.append(
+                [sized_si(number, unit, parameter=name) for number, unit in zip(numbers, units, strict=False)]
+            )
         return places
 
     def typed_again(self, value: Any) -> list[str]:

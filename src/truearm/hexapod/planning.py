@@ -37,7 +37,7 @@ def planned(asked: PlanHexapod) -> HexapodPlan:
         arm, cups = with_cups(loaded, asked.tool)
         wanted = poses(cups)
     with refusals_of("robot"):
-        found = reachable_at_places(
+        reachable = reachable_at_places(
             arm,
             places_argument(asked.fixture),
             distinct(wanted) if asked.distinct else wanted,
@@ -45,7 +45,7 @@ def planned(asked: PlanHexapod) -> HexapodPlan:
             branches=asked.branches,
             fourth_cup=asked.fourth_cup,
         )
-    plan = HexapodPlan(arm, attached_anew(found, asked.attachments), joints_are)
+    plan = HexapodPlan(arm, attached_anew(reachable, asked.attachments), joints_are)
     files = {sheet: plan.sheet_text(), steps: plan.steps_text()}
     written = {file: content for file, content in files.items() if file is not None}
     if written:
@@ -66,8 +66,8 @@ def _files(asked: PlanHexapod) -> tuple[Path | None, Path | None]:
 def places_argument(fixture: object) -> tuple[Transform, ...]:
     """Return where the base fixture stands, one place or several."""
     places = list(fixture) if isinstance(fixture, np.ndarray) and fixture.ndim == 2 else fixture
-    if isinstance(places, list | tuple) and places and all(_is_place(one) for one in places):
-        return tuple(_fixture_argument(one) for one in places)
+    if isinstance(places, list | tuple) and places and all(_is_place(place) for place in places):
+        return tuple(_fixture_argument(place) for place in places)
     return (_fixture_argument(fixture),)
 
 

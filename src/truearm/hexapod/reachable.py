@@ -130,18 +130,18 @@ def reachable(
     on_sides = [(side, pose) for side in sides for pose in wanted]
     position = np.array([side.rotation @ pose.position + np.array(side.translation) for side, pose in on_sides])
     rotation = np.array([side.rotation @ pose.rotation for side, pose in on_sides])
-    found = inverse(robot, position, rotation, branch="all")
-    usable = np.array([status.usable for status in found.status])
-    beyond = np.array([status is PoseStatus.BEYOND_LIMIT for status in found.status])
+    joint_solutions = inverse(robot, position, rotation, branch="all")
+    usable = np.array([status.usable for status in joint_solutions.status])
+    beyond = np.array([status is PoseStatus.BEYOND_LIMIT for status in joint_solutions.status])
     turns = [joint.kind == "revolute" for joint in robot.joints]
-    wide = (np.abs(found.joints[:, turns]) > largest_turn + 1e-9).any(axis=1)
+    wide = (np.abs(joint_solutions.joints[:, turns]) > largest_turn + 1e-9).any(axis=1)
     cups = (corners if fourth_cup else corners[:3]) @ fixture.rotation.T + np.array(fixture.translation)
-    starts, ends = _bars(cups, on_sides, found.pose, device)
+    starts, ends = _bars(cups, on_sides, joint_solutions.pose, device)
     base = robot.base
     inside = (np.moveaxis(part, 1, -1) @ base.rotation.T + np.array(base.translation) for part in (starts, ends))
     starts, ends = (np.moveaxis(part, -1, 1) for part in inside)
-    room = clearance(robot, found.joints, starts, ends, arm_radius)
-    meant = np.array([not branches or branch.startswith(tuple(branches)) for branch in found.branch])
+    room = clearance(robot, joint_solutions.joints, starts, ends, arm_radius)
+    meant = np.array([not branches or branch.startswith(tuple(branches)) for branch in joint_solutions.branch])
     kept = usable & ~wide & meant & (room > 0)
     reasons = np.select(
         [~(usable | beyond), ~(usable & ~wide), ~meant], [OUT_OF_REACH, BEYOND_LIMITS, NOT_WANTED], TOO_NEAR
@@ -155,16 +155,16 @@ def reachable(
             cure="Move the fixture; it is given in the robot's base frame.",
         )
     rows = np.flatnonzero(kept)
-    order = rows[all_moving_order(found.joints[rows], 0.0)]
+    order = rows[all_moving_order(joint_solutions.joints[rows], 0.0)]
     planned = tuple(
         PlannedRow(
             configuration=str(number),
-            branch=found.branch[row],
-            pose=on_sides[found.pose[row]][1].number,
-            design=on_sides[found.pose[row]][1].design,
-            solution=on_sides[found.pose[row]][1].solution,
-            joints=found.joints[row],
-            side=1 + int(found.pose[row]) // len(wanted),
+            branch=joint_solutions.branch[row],
+            pose=on_sides[joint_solutions.pose[row]][1].number,
+            design=on_sides[joint_solutions.pose[row]][1].design,
+            solution=on_sides[joint_solutions.pose[row]][1].solution,
+            joints=joint_solutions.joints[row],
+            side=1 + int(joint_solutions.pose[row]) // len(wanted),
         )
         for number, row in enumerate(order.tolist(), 1)
     )

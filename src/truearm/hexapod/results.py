@@ -250,20 +250,20 @@ class HexapodFrame(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give the frame, the distances between its cups by the robot, and what is left at them, in mm."""
-        found = self.found
-        x, y, z = position = [value * 1e3 for value in found.frame.translation]
+        world_frame = self.found
+        x, y, z = position = [value * 1e3 for value in world_frame.frame.translation]
         yield say(
             f"Base fixture in the robot's base frame: x {x:.4f}  y {y:.4f}  z {z:.4f} mm",
-            "  quaternion {:.8f} {:.8f} {:.8f} {:.8f}".format(*found.frame.quaternion),
+            "  quaternion {:.8f} {:.8f} {:.8f} {:.8f}".format(*world_frame.frame.quaternion),
             position_mm=position,
-            quaternion=list(found.frame.quaternion),
+            quaternion=list(world_frame.frame.quaternion),
             plain={
-                "position_mm": [value * 1e3 for value in found.plain.translation],
-                "quaternion": list(found.plain.quaternion),
+                "position_mm": [value * 1e3 for value in world_frame.plain.translation],
+                "quaternion": list(world_frame.plain.quaternion),
             },
         )
-        distances = (found.seen * 1e3).tolist()
+        distances = (world_frame.seen * 1e3).tolist()
         seen = ", ".join(f"{name} {length:.3f}" for name, length in zip(side_names("B"), distances, strict=True))
         yield say(f"Distances by the robot: {seen} mm", distances_by_robot_mm=distances)
-        left = (np.linalg.norm(found.residual, axis=1) * 1e3).tolist()
+        left = (np.linalg.norm(world_frame.residual, axis=1) * 1e3).tolist()
         yield say(f"Left at the cups: {_lengths(left)} mm", residuals_mm=left)

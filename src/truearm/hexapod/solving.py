@@ -39,8 +39,10 @@ if TYPE_CHECKING:
 
 def enumerated() -> HexapodPoses:
     """Count designs, assemblies and poses of the device, and list the poses that teach much the same."""
-    found = poses()
-    return HexapodPoses(len(designs()), len(list(assemblies())), found, distinct(found), near_equal(found))
+    hexapod_poses = poses()
+    return HexapodPoses(
+        len(designs()), len(list(assemblies())), hexapod_poses, distinct(hexapod_poses), near_equal(hexapod_poses)
+    )
 
 
 def known(asked: KnowCups) -> HexapodUncertainty:
@@ -63,10 +65,10 @@ def solved(asked: SolveCups) -> HexapodSolution:
         whole = together(
             [one if isinstance(one, Sheet) else read_sheet(path_argument(one, "sheet"), device) for one in given]
         )
-    found = _of_sheet(whole, inputs, with_data=path is not None)
+    hexapod_solution = _of_sheet(whole, inputs, with_data=path is not None)
     if path is not None:
-        found.save(path)
-    return found
+        hexapod_solution.save(path)
+    return hexapod_solution
 
 
 def _of_sheet(whole: Sheet, inputs: tuple[Path, ...], *, with_data: bool) -> HexapodSolution:
@@ -130,7 +132,7 @@ def fixture_found(asked: FindFixture) -> HexapodFrame:
     with refusals_of("tool"):
         arm, _ = with_cups(loaded, asked.tool)
     joints = _touches_argument(asked.touches, arm)
-    cups = {one.name: one.name for one in arm.targets}
+    cups = {target.name: target.name for target in arm.targets}
     cup = arm.targets[0].name if asked.cup is None else choice_argument(asked.cup, "cup", cups)
     position, _ = arm.world_poses(joints, cup)
     stand = arm.base

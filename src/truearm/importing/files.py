@@ -262,7 +262,7 @@ def read_sockets(path: Path, apart: Apart, ball: float, sigma: float | None) -> 
         )
     cells = read_named(path)
     columns = columns_beside_joints(cells, _SHOWN, {})
-    found = configurations_of(cells, columns)
+    configurations = configurations_of(cells, columns)
     place, _ = columns["socket"]
     sockets = cells.texts(place)
     names = tuple(dict.fromkeys(sockets))
@@ -274,20 +274,22 @@ def read_sockets(path: Path, apart: Apart, ball: float, sigma: float | None) -> 
             allowed="two names",
             cure="Put the ball into both sockets." if len(names) < 2 else "Correct the names, or keep two of them.",
         )
-    refuse_repeated(cells, found, "Each row is a posture with the ball in one socket: give it a label of its own.")
+    refuse_repeated(
+        cells, configurations, "Each row is a posture with the ball in one socket: give it a label of its own."
+    )
     count = len(cells.lines)
     data = dataset_of(
         Readings(
             source=str(path),
             lines=cells.lines,
-            configuration=found.of_row,
+            configuration=configurations.of_row,
             targets=(BALL,) * count,
             reference=np.zeros(count, dtype=bool),
             position=np.zeros((count, 3)),
             sigma=None if sigma is None else np.full(count, sigma),
             fixture=sockets,
         ),
-        found,
+        configurations,
     )
     known = Dataset(
         source=str(path),

@@ -322,16 +322,16 @@ def _cells_below_titles(book: Workbook, name: str, shown: Sequence[Sequence[str]
     """
     counts = [_numbers(row, ".") for row in shown]
     enough = _fewest(counts)
-    found: InputError | None = None
+    refusal: InputError | None = None
     for first in range(1, _TITLES + 1):
         try:
             return sheet_cells(book, name, Layout(header=None, first_row=first), str(book.path))
         except InputError as error:
-            found = error if found is None or first <= len(shown) else found
+            refusal = error if refusal is None or first <= len(shown) else refusal
         if first <= len(shown) and counts[first - 1] >= enough:
             break
-    assert found is not None
-    return found
+    assert refusal is not None
+    return refusal
 
 
 def _measured(rows: Rows) -> _Split:

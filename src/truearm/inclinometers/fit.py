@@ -218,8 +218,10 @@ class TiltingFit:
     @property
     def with_priors(self) -> Robot:
         """The robot with these values, their deviations as priors, for a fit that frees them again."""
-        found = [self.robot.parameters[name] for name in self.names]
-        return self.robot.with_parameters(replace(p.restarted(p.value), prior=p.deviation or p.prior) for p in found)
+        parameters = [self.robot.parameters[name] for name in self.names]
+        return self.robot.with_parameters(
+            replace(p.restarted(p.value), prior=p.deviation or p.prior) for p in parameters
+        )
 
 
 def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Dataset | None = None) -> TiltingFit:
@@ -254,12 +256,12 @@ def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Datas
     spread = np.minimum(excess, 1.0 / np.sqrt(np.diag(share)))  # no value is worse known than before
     covariance = (share * np.outer(prior * spread, prior * spread))[:count, :count]
     deviation = np.sqrt(np.diag(covariance))
-    found = [
+    parameters = [
         replace(p, value=float(v), deviation=float(d), informed=float(np.clip(1.0 - (d / p.prior) ** 2, 0.0, 1.0)))
         for p, v, d in zip(effects, solution.vector, deviation, strict=False)
     ]
     return TiltingFit(
-        robot=robot.with_effects(TILTING).with_parameters(found),
+        robot=robot.with_effects(TILTING).with_parameters(parameters),
         names=tuple(p.name for p in effects),
         covariance=covariance,
         excess=excess,
@@ -483,8 +485,8 @@ TILTING_BELOW_ZERO: Final = Rule(
 
 
 def _below_zero(fit: TiltingFit) -> list[Notice]:
-    found = [fit.robot.parameters[name] for name in fit.names]
-    below = [p.name for p in found if p.value < -_BELOW * (p.deviation or math.inf)]
+    parameters = [fit.robot.parameters[name] for name in fit.names]
+    below = [p.name for p in parameters if p.value < -_BELOW * (p.deviation or math.inf)]
     if not below:
         return []
     return [

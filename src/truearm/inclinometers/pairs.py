@@ -376,12 +376,14 @@ def planned(asked: PlanInclinometers) -> InclinometerPlan:
     asked.progress("looking for ways that keep clear")
     at = np.concatenate([pairs.joints_in_turn()[0] for pairs in (made.inclined, made.posed) if len(pairs)])
     tour = tour_of(finder, at, [str(k + 1) for k in range(len(at))])
-    found = InclinometerPlan(carrying, made, asked.pull, asked.again, tour, files_of(asked.robot), joints_are)
+    inclinometer_plan = InclinometerPlan(
+        carrying, made, asked.pull, asked.again, tour, files_of(asked.robot), joints_are
+    )
     if table is None:
-        return found
-    replaced = replaced_notices(table.parent, table.name, found.csv_text())
-    found.save(table)
-    return replace(found, replaced=replaced)
+        return inclinometer_plan
+    replaced = replaced_notices(table.parent, table.name, inclinometer_plan.csv_text())
+    inclinometer_plan.save(table)
+    return replace(inclinometer_plan, replaced=replaced)
 
 
 def planned_pairs(

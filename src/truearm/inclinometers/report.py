@@ -260,7 +260,7 @@ def changes_figure(found: Tilting) -> Figure:
 
 def errors_figure(found: Tilting) -> Figure:
     """Show how errors are distributed, before, with geometry alone, and with tilting first."""
-    errors = {name: 1e3 * one.position_norms for name, one in _errors(found).items()}
+    errors = {name: 1e3 * error.position_norms for name, error in _errors(found).items()}
     errors = {name: values for name, values in errors.items() if len(values)}
     every = np.concatenate([*errors.values()]) if errors else np.array([0.1, 1.0])
     low, high = max(float(every.min()), 1e-4) * 0.9, max(float(every.max()), 1e-3) * 1.1

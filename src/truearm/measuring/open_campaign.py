@@ -104,9 +104,9 @@ class OpenCampaign(Campaign):
 
     def finish(self) -> Measured:
         """Write measurements and report, and return what has come of it; it may go on afterwards."""
-        found = self.measured()
-        found.write()
-        return found
+        measured = self.measured()
+        measured.write()
+        return measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,7 @@ def opened(asked: Measure) -> OpenCampaign:
     of = _source(asked, nominal, planned, folder)
     virtual = of.virtual
     try:
-        own = tuple(one.name for one in nominal.targets) if virtual is None else ()
+        own = tuple(target.name for target in nominal.targets) if virtual is None else ()
         names = tuple(asked.targets or own or of.known)
         _refuse_names(names, of.nests)
         quality = Quality(asked.most_deviation, asked.most_settling, asked.fewest_samples or 1)

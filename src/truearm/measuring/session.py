@@ -258,8 +258,8 @@ class Session:
     @property
     def aside_by_reason(self) -> dict[str, int]:
         """How many readings are not kept, by the reason."""
-        found = Counter(self.reason_of(entry) for entry in self._entries if entry.event == "reading")
-        return {reason: found[reason] for reason in REASONS if found[reason]}
+        counter = Counter(self.reason_of(entry) for entry in self._entries if entry.event == "reading")
+        return {reason: counter[reason] for reason in REASONS if counter[reason]}
 
     @property
     def left_out(self) -> tuple[tuple[str, str], ...]:

@@ -175,15 +175,15 @@ class Listener:
         self._session = session
         until = time.monotonic() + seconds
         while True:
-            found: list[Incoming] = []
+            incomings: list[Incoming] = []
             for key, _ in self._selector.select(max(0.0, min(until - time.monotonic(), PATIENCE / 5))):
                 if key.fileobj is self._bound:
                     self._accept()
                 else:
-                    found += self._receive(self._clients[key.fd])
+                    incomings += self._receive(self._clients[key.fd])
             self._drop_silent()
-            if found or time.monotonic() >= until:
-                return found
+            if incomings or time.monotonic() >= until:
+                return incomings
 
     def told(self) -> list[str]:
         """Return what was refused since it was asked last."""
@@ -227,17 +227,17 @@ class Listener:
             self._end(client)
             return []
         *lines, client.rest = (client.rest + content).split(b"\n")
-        found: list[Incoming] = []
+        incomings: list[Incoming] = []
         for line in lines:
             if client.stream.fileno() < 0:
                 break
             if len(line) > LONGEST_LINE or not self._has_room(client):
                 self._cut(client)
                 break
-            found += self._line(client, line)
+            incomings += self._line(client, line)
         if len(client.rest) > LONGEST_LINE and client.stream.fileno() >= 0:
             self._cut(client)
-        return found
+        return incomings
 
     def _has_room(self, client: _Client) -> bool:
         now = time.monotonic()

@@ -169,10 +169,10 @@ class WatchedFolder:
             self._known = {(e.reading.origin, e.reading.mark) for e in session.entries if e.reading is not None}
         until = time.monotonic() + seconds
         while True:
-            found = [Incoming(reading) for reading in self._new()]
+            incomings = [Incoming(reading) for reading in self._new()]
             left = until - time.monotonic()
-            if found or left <= 0:
-                return found
+            if incomings or left <= 0:
+                return incomings
             time.sleep(min(_PAUSE, left))
 
     def told(self) -> list[str]:
@@ -184,16 +184,16 @@ class WatchedFolder:
         """Nothing is held."""
 
     def _new(self) -> list[Reading]:
-        found: list[Reading] = []
+        readings: list[Reading] = []
         for path, state in self._there():
             file = self._files.setdefault(path.name, _File())
             if file.state != state:
                 try:
-                    found += self._rows(path, file)
+                    readings += self._rows(path, file)
                 except InputError as error:
                     self._not_read(path.name, str(error))
                 file.state = state
-        return found
+        return readings
 
     def _there(self) -> list[tuple[Path, tuple[int, int]]]:
         """Return the files that are read with their size and time, the oldest first."""
@@ -246,16 +246,16 @@ class WatchedFolder:
         new = [number for number in range(first, len(lines)) if self._is_row(lines[number])]
         if len(lines) < (layout.header or 0) or not new:
             return []
-        found = self._parsed(path, lines, new)
+        readings = self._parsed(path, lines, new)
         seen = self._known or set()
         if file.again:  # in this run every row counts once, by its place
-            found = [reading for reading in found if (reading.origin, reading.mark) not in seen]
+            readings = [reading for reading in readings if (reading.origin, reading.mark) not in seen]
             marks = {(origin.partition(", line ")[0], mark) for origin, mark in seen}
-            found = [r for r in found if (path.name, r.mark) not in marks]
-        seen |= {(reading.origin, reading.mark) for reading in found}
+            readings = [r for r in readings if (path.name, r.mark) not in marks]
+        seen |= {(reading.origin, reading.mark) for reading in readings}
         self._known = seen
         file.taken, file.digest, file.again = len(lines), _digest(lines), False
-        return found
+        return readings
 
     def _lines(self, path: Path, file: _File) -> list[str]:
         """Return the whole lines of a file."""
@@ -285,14 +285,14 @@ class WatchedFolder:
         except InputError as error:
             if str(error.where).startswith(f"{self.mapping},"):  # of the columns: then no row can be read
                 raise
-        found: list[Reading] = []
+        readings: list[Reading] = []
         for number in new:
             try:
-                found += self._readings(path, lines, [number])
+                readings += self._readings(path, lines, [number])
             except InputError as error:
                 self._counts.broken.append(str(error))
                 self._said.append(str(error))
-        return found
+        return readings
 
     def _readings(self, path: Path, lines: list[str], new: list[int]) -> list[Reading]:
         content, layout = self.content, self.content.layout

@@ -100,8 +100,8 @@ def _goal(joints: Array, words: str) -> AccuracyGoal:
 def _at_poses(robot: Robot, path: Path) -> AccuracyGoal:
     read = read_poses(path)
     rotations = None if read.quaternion is None else rotation_from_quaternion(read.quaternion)
-    found = inverse(robot, read.position, rotations, orientation="free" if rotations is None else "full")
-    lost = [label for label, usable in zip(read.labels, found.usable, strict=True) if not usable]
+    joint_solutions = inverse(robot, read.position, rotations, orientation="free" if rotations is None else "full")
+    lost = [label for label, usable in zip(read.labels, joint_solutions.usable, strict=True) if not usable]
     if lost:
         raise InputError(
             f"the robot cannot go to {counted(len(lost), 'pose')}",
@@ -109,7 +109,7 @@ def _at_poses(robot: Robot, path: Path) -> AccuracyGoal:
             came=listed(lost),
             cure="Look at them with 'truearm ik', and leave them out.",
         )
-    return _goal(found.joints, f"at the {counted(len(found.joints), 'pose')} of {path.name}")
+    return _goal(joint_solutions.joints, f"at the {counted(len(joint_solutions.joints), 'pose')} of {path.name}")
 
 
 def _at_targets(robot: Robot, path: Path, tools: str | Path | None, frames: str | Path | None) -> AccuracyGoal:

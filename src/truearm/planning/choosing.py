@@ -447,7 +447,7 @@ class _Search:
 
 
 def _fixtures_in_base(robot: Robot) -> dict[str, Array]:
-    places = {one.name: robot.fixture_kinematics(one.name).position[:, 0] for one in robot.fixtures}
+    places = {fixture.name: robot.fixture_kinematics(fixture.name).position[:, 0] for fixture in robot.fixtures}
     return {name: (place - np.array(robot.base.translation)) @ robot.base.rotation for name, place in places.items()}
 
 
@@ -494,7 +494,7 @@ def _in_words(readings: Dataset) -> tuple[str, ...]:
         elif beside:
             said += f" at {beside} ({', '.join(f'{v * 1e3:.2f}' for v in readings.position[row])}) mm"
         words[c].append(said)
-    return tuple("; ".join(one) for one in words)
+    return tuple("; ".join(word) for word in words)
 
 
 def before(robot: Robot, joints: Array, low: Array | None = None) -> Array:

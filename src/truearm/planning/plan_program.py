@@ -164,7 +164,7 @@ def shown_speed(speed: float) -> str:
 def _carried(robot: Robot) -> Carried:
     """Return what the controller is told of the tool: its tip is the target that is farthest from the flange."""
     flange = robot.controller.flange
-    there = {one.name: np.array(robot.tool_place(one.name).translation) for one in robot.targets}
+    there = {target.name: np.array(robot.tool_place(target.name).translation) for target in robot.targets}
     name = max(there, key=lambda one: float(np.linalg.norm(there[one])), default="")
 
     def of_controller(point: Array) -> tuple[float, float, float]:

@@ -157,8 +157,8 @@ def planned(asked: PlanPoses) -> Plan:
     )
     if read.wanted is not None and not read.wanted.approach:
         made = replace(made, before=None)
-    found = _driven(asked, read, choice, made, "" if goal is None else goal.words)
-    return found if read.table is None else _written(asked, read, read.table, found)
+    plan = _driven(asked, read, choice, made, "" if goal is None else goal.words)
+    return plan if read.table is None else _written(asked, read, read.table, plan)
 
 
 def _read(asked: PlanPoses) -> _Read:
@@ -230,7 +230,7 @@ def _driven(asked: PlanPoses, read: _Read, choice: _Choice, made: MeasurementPla
     told = load_notices(made.robot) if weighed else []
     if tour is not None and read.wanted is None:
         told += targets_notices(made.robot, read.robot, read.named)
-    found = Plan(
+    plan = Plan(
         made,
         asked.again,
         files_of(*read.given),
@@ -242,8 +242,8 @@ def _driven(asked: PlanPoses, read: _Read, choice: _Choice, made: MeasurementPla
         hashes=read.hashes,
     )
     if read.wanted is None:
-        return found
-    return with_program(found, read.wanted, read.robot, read.named, weighed=weighed)
+        return plan
+    return with_program(plan, read.wanted, read.robot, read.named, weighed=weighed)
 
 
 def _written(asked: PlanPoses, read: _Read, table: Path, found: Plan) -> Plan:

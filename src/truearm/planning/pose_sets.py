@@ -163,8 +163,8 @@ def _joints(
     if rotation is None:
         return joints_at(robot, points, target, rng)
     turned = np.broadcast_to(rotation, (len(points), 3, 3))
-    found = inverse(robot, points, turned, target=target)
-    return found.joints, np.array([status.usable for status in found.status])
+    joint_solutions = inverse(robot, points, turned, target=target)
+    return joint_solutions.joints, np.array([status.usable for status in joint_solutions.status])
 
 
 def _shown(point: Array) -> str:

@@ -208,10 +208,10 @@ def posed(asked: PosesOfSet) -> PlannedPoses:
         made = pose_set(
             arm, asked.set, cube, plane=asked.plane, count=count, target=target, rotation=rotation, seed=asked.seed
         )
-    found = PlannedPoses(arm, made, asked.again, inputs, joints_are, asked.tip is None)
+    planned_poses = PlannedPoses(arm, made, asked.again, inputs, joints_are, asked.tip is None)
     if table is not None:
-        found.save(table)
-    return found
+        planned_poses.save(table)
+    return planned_poses
 
 
 def _cube_poses(asked: PosesOfSet, arm: Robot, target: str | None) -> Cube:

@@ -327,9 +327,9 @@ def refuse_other_programs(folder: Path, names: Collection[str], *read: object) -
         read: What the job was given.
     """
     folder_for(names, folder, *read, ours=True)
-    for one in sets_in(folder):
-        others = [name for name in one.files if name not in (TABLE, PLAN_PAGE, WAYS, SHEET, *names)]
-        if TABLE in one.files and others:
+    for file_set in sets_in(folder):
+        others = [name for name in file_set.files if name not in (TABLE, PLAN_PAGE, WAYS, SHEET, *names)]
+        if TABLE in file_set.files and others:
             raise InputError(
                 "the program of another plan is there, and would stay beside this one",
                 parameter="out",
@@ -401,10 +401,10 @@ def _wait(value: str | None, language: Language) -> tuple[Literal["time", "input
 
 
 def _notices(language: Language, robot: Robot, given: Robot, device: str, *, weighed: bool) -> list[Notice]:
-    found = [*load_notices(robot), *counts_notices(robot)]
-    found += wider_limits_notices(robot)
-    found += assumed_notices(robot, given, device, weighed=weighed)
-    return [*found, *speed_notices(robot, "" if known_speeds(robot) else _assumed(language, robot))]
+    notices = [*load_notices(robot), *counts_notices(robot)]
+    notices += wider_limits_notices(robot)
+    notices += assumed_notices(robot, given, device, weighed=weighed)
+    return [*notices, *speed_notices(robot, "" if known_speeds(robot) else _assumed(language, robot))]
 
 
 def _assumed(language: Language, robot: Robot) -> str:

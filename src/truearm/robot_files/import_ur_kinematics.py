@@ -65,7 +65,7 @@ class ImportedKinematics(Record):
         """What to know about it: types that cannot be told apart by the file."""
         if not self.fitting:
             return ()
-        best, zero = min(self.fitting.items(), key=lambda one: one[1])
+        best, zero = min(self.fitting.items(), key=lambda item: item[1])
         ours = largest_zero(self.robot)
         if zero < ours / _CLEARLY:
             return (
@@ -109,10 +109,10 @@ def imported_kinematics(asked: ImportUrKinematics) -> ImportedKinematics:
     target = None if asked.out is None else new_file_for(asked.out)
     type_ = robot_argument(asked.robot)
     with refusals_of("file"):
-        found = read_kinematics(path)
+        factory_kinematics = read_kinematics(path)
     with refusals_of("robot"):
-        made = with_kinematics(type_, found)
-    fitting = _fitting(found, type_)
+        made = with_kinematics(type_, factory_kinematics)
+    fitting = _fitting(factory_kinematics, type_)
     try:
         refuse_far(made, type_, str(path))
     except InputError as error:

@@ -120,29 +120,34 @@ class JointTable(Record):
     @property
     def attention(self) -> tuple[dict[str, str], ...]:
         """Every pose that the robot cannot or should not just go to: its name, branch and status, and what to do."""
-        found = self.solutions
-        reached = set(found.pose[found.usable].tolist())
+        joint_solutions = self.solutions
+        reached = set(joint_solutions.pose[joint_solutions.usable].tolist())
         return tuple(
             {
                 "pose": self.labels[pose],
-                "branch": found.branch[row],
+                "branch": joint_solutions.branch[row],
                 "status": status.value,
-                "advice": found.advice(row),
+                "advice": joint_solutions.advice(row),
             }
-            for row, (pose, status) in enumerate(zip(found.pose.tolist(), found.status, strict=True))
+            for row, (pose, status) in enumerate(
+                zip(joint_solutions.pose.tolist(), joint_solutions.status, strict=True)
+            )
             if status.value != "reached" and (status.usable or pose not in reached)
         )
 
     def blocks(self) -> Iterator[Block]:
         """Give how many poses are reached, and what is wrong with the others."""
-        found = self.solutions
-        reached, status = len(set(found.pose[found.usable].tolist())), Counter(one.value for one in found.status)
+        joint_solutions = self.solutions
+        reached, status = (
+            len(set(joint_solutions.pose[joint_solutions.usable].tolist())),
+            Counter(one.value for one in joint_solutions.status),
+        )
         counts = ", ".join(f"{count} {name}" for name, count in status.items())
         yield say(
-            f"{reached} of {found.poses} poses reached. Rows: {counts}",
-            poses=found.poses,
+            f"{reached} of {joint_solutions.poses} poses reached. Rows: {counts}",
+            poses=joint_solutions.poses,
             poses_reached=reached,
-            rows=len(found.status),
+            rows=len(joint_solutions.status),
             joints_are=self.joints_are,
             status=dict(status),
         )

@@ -68,14 +68,14 @@ class RobotList(Record):
 
 def listed_robots(asked: ListRobots) -> RobotList:
     """List the robots of the library."""
-    found = [load_robot(robot_id) for robot_id in library()]
+    robots = [load_robot(robot_id) for robot_id in library()]
     if asked.maker is not None:
-        found = _of_maker(found, asked.maker)
+        robots = _of_maker(robots, asked.maker)
     if asked.axes is not None:
-        found = _with_axes(found, asked.axes)
+        robots = _with_axes(robots, asked.axes)
     if asked.text is not None:
-        found = _named(found, asked.text)
-    return RobotList(tuple(found))
+        robots = _named(robots, asked.text)
+    return RobotList(tuple(robots))
 
 
 def _of_maker(robots: list[Robot], maker: str) -> list[Robot]:
@@ -178,7 +178,7 @@ class ShownPose(Record):
             yield say(f"Flange of the model, from its base: {_place(flange['model'])}, quaternion {q}")
 
     def _joints(self, joints: Array) -> list[float]:
-        return [from_si(value, _unit(one)) for value, one in zip(joints.tolist(), self.robot.joints, strict=True)]
+        return [from_si(value, _unit(joint)) for value, joint in zip(joints.tolist(), self.robot.joints, strict=True)]
 
     def _pose(self, frame: Frame) -> dict[str, list[float]]:
         position, rotation = self.robot.forward(self.joints, frame=frame)

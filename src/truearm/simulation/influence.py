@@ -296,7 +296,7 @@ def _read(asked: FindInfluence) -> _Given:
     tip = _tip(nominal, measured, asked.target)
     by_unit = {"rad": asked.angle, "m": asked.length}
     parameters = [nominal.parameters[name] for name in names]
-    changes = {one.name: by_unit.get(one.unit, one.prior) for one in parameters}
+    changes = {parameter.name: by_unit.get(parameter.unit, parameter.prior) for parameter in parameters}
     return _Given(robot, nominal, model, names, changes, measured, tip)
 
 
@@ -382,7 +382,7 @@ def _identified(asked: FindInfluence, given: _Given, parts: _Parts) -> Identifie
         "calibrate": identify(nominal, first, given.model).robot,
     }
     judges = first if parts.second is None else parts.second
-    errors = {way: errors_of(one, judges) for way, one in robots.items()}
+    errors = {way: errors_of(robot, judges) for way, robot in robots.items()}
     held_out = parts.second is not None
     return Identified(robots, errors, held_out, first.configurations, by_influence, by_norm, asked.placement)
 

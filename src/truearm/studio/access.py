@@ -162,9 +162,9 @@ class Access:
         """Return the token in the cookie of a request."""
         for text in headers.get_all("Cookie"):
             with suppress(CookieError):
-                found = SimpleCookie(text).get(self.cookie)
-                if found is not None:
-                    return found.value
+                morsel = SimpleCookie(text).get(self.cookie)
+                if morsel is not None:
+                    return morsel.value
         return None
 
 

@@ -38,7 +38,7 @@ class Checked:
         """Return which readings are named; an empty target names all of its configuration."""
         whole = {label for label, target in named if not target}
         wanted = set(named)
-        found = [k for k, one in enumerate(self.readings) if one in wanted or one[0] in whole]
+        found = [k for k, reading in enumerate(self.readings) if reading in wanted or reading[0] in whole]
         return np.array(found, dtype=np.intp)
 
     def named(self, rows: Sequence[int]) -> dict[tuple[str, str], tuple[Read, ...]]:
@@ -58,18 +58,18 @@ def checked(folder: Path, robot: str, data: str, exclude: str | None, progress: 
     os.chdir(folder)
     progress("comparing the readings with the robot")
     with confined_reads(folder):
-        found = check(robot, data, exclude=exclude)
+        data_check = check(robot, data, exclude=exclude)
         progress("finding where the robot stands")
         read = load_data(data, robot)
-        base = _base(robot, found.data)
+        base = _base(robot, data_check.data)
     parts = [read] if read.references is None else [read, read.references]
     points = np.concatenate([np.where(part.has_position[:, None], part.position, np.nan) for part in parts])
     if base is not None:
         rotation, translation = base
         points = (points - translation) @ rotation
     return Checked(
-        Outcome(tuple(found.lines()), found.warnings),
-        worst_first(found.warnings),
+        Outcome(tuple(data_check.lines()), data_check.warnings),
+        worst_first(data_check.warnings),
         tuple(
             (part.labels[c], part.targets[t])
             for part in parts
@@ -111,7 +111,7 @@ def _base(robot: str, data: Dataset) -> tuple[Array, Array] | None:
 
     some = np.unique(np.linspace(0, data.configurations - 1, min(data.configurations, _PLACED_BY)).round().astype(int))
     try:
-        found = place(load_robot(robot), data.of_configurations(some), "cauchy").base
+        transform = place(load_robot(robot), data.of_configurations(some), "cauchy").base
     except InputError:
         return None
-    return found.rotation, np.array(found.translation)
+    return transform.rotation, np.array(transform.translation)

@@ -84,7 +84,9 @@ class CubeInSpace:
 def cube_in_space(plan: PerformancePlan, result: ResultFile | None) -> CubeInSpace:
     """Return what is drawn of a plan, and of its result if there is one."""
     poses = {name: pose.position for name, pose in plan.poses.items()}
-    offsets = [] if result is None else [one for one in result.offsets if one.id == "AP" and one.where in poses]
+    offsets = (
+        [] if result is None else [offset for offset in result.offsets if offset.id == "AP" and offset.where in poses]
+    )
     offsets = _fastest(offsets, lambda one: None not in one.offset_mm)
     curves = {} if result is None else {one.where: one for one in _fastest([c for c in result.curves if c.id == "AT"])}
     pieces, errors = [np.zeros((0, 2, 3))], [np.zeros(0)]
@@ -118,10 +120,10 @@ def cube_in_space(plan: PerformancePlan, result: ResultFile | None) -> CubeInSpa
     )
     return replace(
         made,
-        names=tuple(one.where for one in offsets),
-        commands=np.array([poses[one.where] for one in offsets]),
-        offsets=np.array([one.offset_mm for one in offsets], float) / 1e3,
-        repeatability=np.array([radii.get(one.where, np.nan) for one in offsets]),
+        names=tuple(offset.where for offset in offsets),
+        commands=np.array([poses[offset.where] for offset in offsets]),
+        offsets=np.array([offset.offset_mm for offset in offsets], float) / 1e3,
+        repeatability=np.array([radii.get(offset.where, np.nan) for offset in offsets]),
         under=_under(first),
     )
 
@@ -133,15 +135,19 @@ def is_of_plan(result: ResultFile, plan: PerformancePlan) -> bool:
 
 def _fastest(things: Iterable[_Kind], usable: Callable[[_Kind], bool] = lambda _: True) -> list[_Kind]:
     """Return those at the fastest velocity and the largest load, of several robots those of the first."""
-    found = [one for one in things if usable(one)]
-    if not found:
+    kinds = [thing for thing in things if usable(thing)]
+    if not kinds:
         return []
-    conditions = [conditions_of(one.conditions) for one in found]
-    best = max(conditions, key=lambda one: (one.velocity or 0.0, one.load or 0.0))
-    robot = next(one.robot for one in conditions if (one.velocity, one.load) == (best.velocity, best.load))
+    conditions = [conditions_of(one.conditions) for one in kinds]
+    best = max(conditions, key=lambda condition: (condition.velocity or 0.0, condition.load or 0.0))
+    robot = next(
+        condition.robot
+        for condition in conditions
+        if (condition.velocity, condition.load) == (best.velocity, best.load)
+    )
     return [
         one
-        for one, under in zip(found, conditions, strict=True)
+        for one, under in zip(kinds, conditions, strict=True)
         if (under.velocity, under.load, under.robot) == (best.velocity, best.load, robot)
     ]
 

@@ -110,7 +110,7 @@ def corrected_program(
     (meant, there), (_, then) = real_tips(before), real_tips(after)
     kept = ~correction.corrected[:, None]
     return DrawnProgram(
-        Outcome(tuple(made.lines()), made.warnings, tuple(one.name for one in made.files)),
+        Outcome(tuple(made.lines()), made.warnings, tuple(file.name for file in made.files)),
         _names(correction.program),
         correction.tips[:, :3, 3],
         way_through(correction.program, correction.tips, _MOVES),

@@ -68,22 +68,22 @@ def other_evaluations(result: ResultFile | None, project: Project, robot: Robot)
     """
     files = project.settings.performance
     plan = None if files.plan is None else _plan(project, files.plan)
-    found = _other_robot(result, plan, project, robot)
+    notices = _other_robot(result, plan, project, robot)
     if result is None:
-        return found
+        return notices
     pairs: list[tuple[str, str]] = []
     if result.inputs is None:
         text = (
             "This result does not say which files it is of, as it was written by an older version: whether they are "
             "those that are chosen cannot be told. Evaluate them again."
         )
-        found.append(OTHER_MEASUREMENTS(text))
+        notices.append(OTHER_MEASUREMENTS(text))
         if plan is not None and not is_of_plan(result, plan):
-            found.append(OTHER_PLAN("This result is of another plan than the one that is chosen."))
+            notices.append(OTHER_PLAN("This result is of another plan than the one that is chosen."))
     else:
         plans = [*_other_files(("plan",), result.inputs, project)] or [*_other_robot_file(result.inputs, project)]
-        found += _told(OTHER_PLAN, "was evaluated by", plans)
-        found += _told(OTHER_MEASUREMENTS, "is of", [*_other_files(_MEASURED, result.inputs, project)])
+        notices += _told(OTHER_PLAN, "was evaluated by", plans)
+        notices += _told(OTHER_MEASUREMENTS, "is of", [*_other_files(_MEASURED, result.inputs, project)])
         pairs += _other_files(_HOW, result.inputs, project)
     instrument = result.instrument
     if instrument is not None and not (
@@ -91,7 +91,7 @@ def other_evaluations(result: ResultFile | None, project: Project, robot: Robot)
     ):
         then = _noise(instrument.sigma_mm, instrument.sigma_rot_deg)
         pairs.append((then, _noise(files.noise_mm, files.noise_rot_deg)))
-    return [*found, *_told(OTHER_SETTINGS, "was made with", pairs)]
+    return [*notices, *_told(OTHER_SETTINGS, "was made with", pairs)]
 
 
 def stamps_of(project: Project) -> tuple[Any, ...]:

@@ -193,7 +193,7 @@ class Jogging:
         Raises:
             InputError: If the arm cannot be there, with what is missing; it stays where it is.
         """
-        found = inverse(
+        joint_solutions = inverse(
             self.robot,
             position[None],
             None if self.orientation == "free" else rotation[None],
@@ -202,10 +202,12 @@ class Jogging:
             seed_joints=self.joints,
             orientation=self.orientation,
         ).solutions
-        if not found.usable[0]:
-            raise InputError("the arm cannot go to this pose", where=self.tip or "flange", cure=found.advice(0))
-        self.joints = np.clip(found.joints[0], self.low, self.high)
-        return found.status[0]
+        if not joint_solutions.usable[0]:
+            raise InputError(
+                "the arm cannot go to this pose", where=self.tip or "flange", cure=joint_solutions.advice(0)
+            )
+        self.joints = np.clip(joint_solutions.joints[0], self.low, self.high)
+        return joint_solutions.status[0]
 
     def drag_to(self, position: Array, rotation: Array) -> PoseStatus:
         """Go to a pose of the tip in the world, as :meth:`go_to`, a little way from where it is in less time.
@@ -241,16 +243,18 @@ class Jogging:
         """
         p, R = self.pose()
         if self.orientation == "full" and branch_rule(self.robot) is not None:
-            found = inverse(
+            joint_solutions = inverse(
                 self.robot, p[None], R[None], target=self.tip, branch="all", seed_joints=self.joints
             ).solutions
             return [
                 Branch(name, joints, status)
-                for name, joints, status in zip(found.branch, found.joints, found.status, strict=True)
+                for name, joints, status in zip(
+                    joint_solutions.branch, joint_solutions.joints, joint_solutions.status, strict=True
+                )
             ]
         seeds = self.robot.random_configurations(_SEEDS, np.random.default_rng(0))
         count = len(seeds)
-        found = inverse(
+        joint_solutions = inverse(
             self.robot,
             np.repeat(p[None], count, axis=0),
             None if self.orientation == "free" else np.repeat(R[None], count, axis=0),
@@ -258,13 +262,18 @@ class Jogging:
             seed_joints=seeds,
             orientation=self.orientation,
         ).solutions
-        far = np.abs(found.joints - self.joints).max(axis=1)
+        far = np.abs(joint_solutions.joints - self.joints).max(axis=1)
         kept: list[int] = []
         for k in np.argsort(far, kind="stable").tolist():
-            others = [self.joints, *(found.joints[other] for other in kept)]
-            if found.usable[k] and all(np.abs(found.joints[k] - other).max() > _APART for other in others):
+            others = [self.joints, *(joint_solutions.joints[other] for other in kept)]
+            if joint_solutions.usable[k] and all(
+                np.abs(joint_solutions.joints[k] - other).max() > _APART for other in others
+            ):
                 kept.append(k)
-        return [Branch(f"posture {n}", found.joints[k], found.status[k]) for n, k in enumerate(kept[:_MOST], 1)]
+        return [
+            Branch(f"posture {n}", joint_solutions.joints[k], joint_solutions.status[k])
+            for n, k in enumerate(kept[:_MOST], 1)
+        ]
 
     def singular_value(self) -> float:
         """Return how little the tip moves with a joint motion of norm 1, positions in reach lengths.

@@ -117,7 +117,7 @@ def _on_next(line: LinkLine, place: float) -> Array:
 def _lines(robot: Robot) -> list[LinkLine]:
     """Return the axes at the ends of the pedestal and of every link, at nominal values."""
     ways: list[list[object]] = [[]]
-    found: list[LinkLine] = []
+    link_lines: list[LinkLine] = []
     axis: Array | None = None
     for link in robot.link_elements:
         for element in link:
@@ -126,12 +126,12 @@ def _lines(robot: Robot) -> list[LinkLine]:
                 continue
             kinematics = Chain(tuple(ways[-1])).forward_kinematics(np.zeros((0, 1)))  # type: ignore[arg-type]
             turned, place = kinematics.matrix()[0], kinematics.position[:, 0]
-            found.append(LinkLine(axis, place, turned @ np.array(axis_of(element))))
+            link_lines.append(LinkLine(axis, place, turned @ np.array(axis_of(element))))
             axis = np.array(axis_of(element))
             ways.append([])
     last = Chain((*ways[-1], *robot.flange_elements))  # type: ignore[arg-type]
-    found.append(LinkLine(axis, last.forward_kinematics(np.zeros((0, 1))).position[:, 0], None))
-    return found
+    link_lines.append(LinkLine(axis, last.forward_kinematics(np.zeros((0, 1))).position[:, 0], None))
+    return link_lines
 
 
 def _feet(lines: list[LinkLine], slides: list[bool]) -> tuple[list[tuple[float, float]], list[bool]]:

@@ -82,10 +82,10 @@ def made_with(result: dict[str, Any], robot: Robot | None) -> MadeWith:
         robot: The calibrated one of the same folder.
     """
     excluded = sum(int(one["readings"]) for one in result.get("excluded", ()))
-    found = _HISTORY.search(str(result.get("history", "")))
-    if found is None:
+    match = _HISTORY.search(str(result.get("history", "")))
+    if match is None:
         return MadeWith(robot, str(result["model"]["name"]), None, 0, 0, 0, "", excluded)
-    model, train, of, data, seed, loss = found.groups()
+    model, train, of, data, seed, loss = match.groups()
     return MadeWith(robot, model, data, int(train), int(of), int(seed), loss, excluded)
 
 

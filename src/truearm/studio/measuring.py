@@ -122,9 +122,9 @@ class Measuring:
 
     def finish(self) -> Measured:
         """Write measurements and report as the command does in the project's folder, and return what came of it."""
-        found = self.measured()
-        found.write()
-        return found
+        measured = self.measured()
+        measured.write()
+        return measured
 
     def outcome(self, found: Measured) -> list[str]:
         """Return what the command prints of what came of it, in the words of the window."""
@@ -201,12 +201,12 @@ class Measuring:
     def reasons(self) -> list[Sequence[object]]:
         """Return how many readings are not kept, for each reason with its meaning."""
         session = self.campaign.session
-        found: list[Sequence[object]] = [
+        sequences: list[Sequence[object]] = [
             (count, code, REASONS[code]) for code, count in session.aside_by_reason.items()
         ]
         if session.left_out:
-            found.append((len(session.left_out), "left-out", REASONS["left-out"]))
-        return found
+            sequences.append((len(session.left_out), "left-out", REASONS["left-out"]))
+        return sequences
 
     # In the scene ------------------------------------------------------------------------------------------------
 

@@ -84,6 +84,6 @@ class OtherPrograms:
 
 
 def _words(changes: Sequence[ChangedFile]) -> str:
-    told = ", ".join(f"{one.name} ({one.how})" for one in changes[:_NAMED])
+    told = ", ".join(f"{change.name} ({change.how})" for change in changes[:_NAMED])
     more = f" and {len(changes) - _NAMED} more" if len(changes) > _NAMED else ""
     return f"Another program has changed files: {told}{more}."

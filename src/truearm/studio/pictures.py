@@ -76,9 +76,9 @@ def report_figures(path: Path) -> dict[str, Any]:
     """Return the pictures of a report by their names, without those that have not the form of one."""
     if not exists(path):
         return {}
-    found = _FIGURES.search(read_text(path))
+    match = _FIGURES.search(read_text(path))
     try:
-        figures = json.loads(found[1]) if found else {}
+        figures = json.loads(match[1]) if match else {}
     except (json.JSONDecodeError, RecursionError):
         return {}
     return {name: drawn for name, drawn in figures.items() if _is_drawn(drawn)} if isinstance(figures, dict) else {}

@@ -30,16 +30,16 @@ def other_plan_told(project: Project, table: str) -> str:
     if not exists(path):
         return ""
     try:
-        found = next((one for one in sets_in(path.parent) if path.name in one.files), None)
-        if found is None:
+        file_set = next((one for one in sets_in(path.parent) if path.name in one.files), None)
+        if file_set is None:
             return f"What the plan in {table} was made with is not known: no record of it stands beside it."
-        if found.files[path.name] != hash_of(read_bytes(path)):
+        if file_set.files[path.name] != hash_of(read_bytes(path)):
             return f"{table} was changed after it was written: its record tells of another plan."
-        then = asked_by(found.command or "")
+        then = asked_by(file_set.command or "")
         if then is None:
-            return f"What the plan in {table} was made with is not compared: it was written by {found.command}."
+            return f"What the plan in {table} was made with is not compared: it was written by {file_set.command}."
         now = _asked(project)
-        return _told(table, then, found.inputs, now, _inputs(project, now))
+        return _told(table, then, file_set.inputs, now, _inputs(project, now))
     except InputError as error:
         return f"What the plan in {table} was made with cannot be compared: {words.refusal(error)}"
 

@@ -193,21 +193,21 @@ class Project:
 
     def seen(self, changes: Iterable[ChangedFile]) -> None:
         """Take note of changes that are shown; what has been changed once more since is not among them."""
-        for one in changes:
-            if one.stamp is None:
-                self._seen.pop(one.name, None)
+        for change in changes:
+            if change.stamp is None:
+                self._seen.pop(change.name, None)
             else:
-                self._seen[one.name] = one.stamp
+                self._seen[change.name] = change.stamp
 
     def changes(self) -> tuple[ChangedFile, ...]:
         """Return which files other programs have changed since the last look."""
         now, seen = self._stamps(), self._seen
-        found = [ChangedFile(name, "new", stamp) for name, stamp in now.items() if name not in seen]
-        found += [ChangedFile(name, "gone", None) for name in seen if name not in now]
-        found += [
+        changed_files = [ChangedFile(name, "new", stamp) for name, stamp in now.items() if name not in seen]
+        changed_files += [ChangedFile(name, "gone", None) for name in seen if name not in now]
+        changed_files += [
             ChangedFile(name, "changed", stamp) for name, stamp in now.items() if name in seen and seen[name] != stamp
         ]
-        told = [one for one in found if not _is_among(one.name, self.theirs)]
+        told = [one for one in changed_files if not _is_among(one.name, self.theirs)]
         return tuple(sorted(told, key=lambda one: one.name))
 
     def names(self, *suffixes: str) -> list[str]:

@@ -49,9 +49,9 @@ class Refusals:
 
     def keep_typed(self, element: Any, value: Any) -> None:
         """Let a field show what was typed as long as its refusal stands, so that it can be mended; None: no longer."""
-        for one in self._standing:
-            if one.element is element:
-                one.typed = value
+        for refusal in self._standing:
+            if refusal.element is element:
+                refusal.typed = value
 
     def standing(self) -> list[_Refusal]:
         """Return those that stand now."""
@@ -59,16 +59,16 @@ class Refusals:
 
     def remove(self, refusals: list[_Refusal]) -> bool:
         """Take some away; return whether fields show what was refused with them."""
-        for one in refusals:
-            if one in self._standing:
-                self._standing.remove(one)
-                if not one.said._impl.removed:
-                    one.said.remove()
-        return any(one.typed is not None and not one.element._impl.removed for one in refusals)
+        for refusal in refusals:
+            if refusal in self._standing:
+                self._standing.remove(refusal)
+                if not refusal.said._impl.removed:
+                    refusal.said.remove()
+        return any(refusal.typed is not None and not refusal.element._impl.removed for refusal in refusals)
 
     def shown_anew(self) -> None:
         """After the pages have shown what holds: fields show again what was typed, and lost elements lose theirs."""
         self.remove([one for one in self._standing if one.element._impl.removed or one.said._impl.removed])
-        for one in self._standing:
-            if one.typed is not None:
-                one.element.value = one.typed
+        for refusal in self._standing:
+            if refusal.typed is not None:
+                refusal.element.value = refusal.typed

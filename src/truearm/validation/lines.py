@@ -294,10 +294,10 @@ def tested(asked: TestLines) -> LineTest:
         with refusals_of("data"):
             before = from_data(poses, _placed(nominal, errors, measured), measured)
     marks = parts_of((nominal, errors, measured)) if asked.truth is None else ("data",)
-    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are, marks)
+    line_test = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are, marks)
     if path is not None:
-        found.save(path)
-    return found
+        line_test.save(path)
+    return line_test
 
 
 def _placed(nominal: Robot, errors: Robot | None, data: Dataset) -> Robot:

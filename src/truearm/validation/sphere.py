@@ -191,7 +191,7 @@ class SphereTests(Record):
         else:
             words = f"Measured less predicted distance from the centre that was taught at configuration {self.taught}:"
             yield say(words, centre="taught")
-        yield each("spheres", (one.blocks() for one in self.spheres))
+        yield each("spheres", (sphere.blocks() for sphere in self.spheres))
 
     def written_at(self, out: str) -> str:
         """Return the line that says which file holds it."""
@@ -226,7 +226,7 @@ def judged(asked: JudgeSphere) -> SphereTests:
         for name in measured.targets:
             arm.target(name)
     at_ball = None if asked.taught_at is None else _taught(measured, asked.taught_at)
-    found = SphereTests(
+    sphere_tests = SphereTests(
         arm,
         measured.source,
         _spheres(arm, measured, at_ball),
@@ -237,8 +237,8 @@ def judged(asked: JudgeSphere) -> SphereTests:
         parts_of((arm, measured)),
     )
     if page is not None:
-        found.save(page)
-    return found
+        sphere_tests.save(page)
+    return sphere_tests
 
 
 def _spheres(arm: Robot, data: Dataset, at_ball: int | None) -> tuple[OneSphere, ...]:

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 def sphere_page(tests: SphereTests) -> str:
     """Return the page."""
     rows = []
-    for one in tests.spheres:
-        for name, test in (("nominal", one.before), ("calibrated" if one.before else "this robot", one.after)):
+    for sphere in tests.spheres:
+        for name, test in (("nominal", sphere.before), ("calibrated" if sphere.before else "this robot", sphere.after)):
             if test is not None:
                 figures = (f"{value * 1e3:.3f}" for value in (test.mean, test.deviation, test.largest))
-                rows.append((f"{one.target} about {one.fixture}, {name}", str(len(one.lengths)), *figures))
+                rows.append((f"{sphere.target} about {sphere.fixture}, {name}", str(len(sphere.lengths)), *figures))
     heading = ("sphere", "readings", "mean [mm]", "deviation [mm]", "largest [mm]")
     return Document(
         f"Ballbar on a sphere: {tests.robot.title}",
@@ -32,11 +32,11 @@ def sphere_page(tests: SphereTests) -> str:
             *[
                 pictured(
                     f"sphere{number}",
-                    f"{one.target} about {one.fixture}",
+                    f"{sphere.target} about {sphere.fixture}",
                     "Measured less predicted distance of each reading, in the order of the file.",
-                    _errors(one),
+                    _errors(sphere),
                 )
-                for number, one in enumerate(tests.spheres)
+                for number, sphere in enumerate(tests.spheres)
             ],
         ],
         tests.command,

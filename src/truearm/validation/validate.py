@@ -131,9 +131,9 @@ class Validation(Record):
     def folder(out: str | Path, inputs: Iterable[Path] = (), parameter: str = "folder") -> Path:
         """Return the folder for a validation, or refuse one whose result.json or report.html are of something else."""
         folder = output_folder(out, VALIDATION_FILES, tuple(inputs), parameter, ours=True)
-        for one in sets_in(folder):
-            others = [name for name in one.files if name not in VALIDATION_FILES]
-            if others and any(name in one.files for name in VALIDATION_FILES):
+        for file_set in sets_in(folder):
+            others = [name for name in file_set.files if name not in VALIDATION_FILES]
+            if others and any(name in file_set.files for name in VALIDATION_FILES):
                 raise InputError(
                     "result.json and report.html there belong to another result",
                     parameter=parameter,
@@ -334,10 +334,10 @@ def _pushed(robot: Robot, data: Dataset, wrench: Wrench | None, at: str | None) 
 
 def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
     """Say if the readings are those that the robot was calibrated with, and how many it was trained on."""
-    found = training_of(robot, data, digest)
-    if found is None:
+    training = training_of(robot, data, digest)
+    if training is None:
         return []
-    (count, used, _), left_out = found.split, found.left_out
+    (count, used, _), left_out = training.split, training.left_out
     of = used + left_out
     rest = f"; {left_out} were left out" if left_out else ""
     held_out = (

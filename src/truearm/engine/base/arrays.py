@@ -79,8 +79,8 @@ def _without_mask(given: object) -> NDArray[np.generic]:
     rows = given if isinstance(given, list | tuple) else [given]
     if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
         return np.asarray(given)
-    found: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.generic]] = np.ma.array(given)
-    return found if np.ma.is_masked(found) else np.asarray(found.data)
+    masked_array: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.generic]] = np.ma.array(given)
+    return masked_array if np.ma.is_masked(masked_array) else np.asarray(masked_array.data)
 
 
 def axes(given: object) -> int:

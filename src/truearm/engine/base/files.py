@@ -271,9 +271,9 @@ _YAML_FAULTS: Final = (
 
 def _not_yaml(problem: str, where: str) -> InputError:
     for pattern, what, cure in _YAML_FAULTS:
-        found = re.search(pattern, problem)
-        if found is not None:
-            return InputError(what, where=where, came=found[1] or None, cure=cure)
+        match = re.search(pattern, problem)
+        if match is not None:
+            return InputError(what, where=where, came=match[1] or None, cure=cure)
     return InputError(
         f"this is not valid YAML ({problem})",
         where=where,

@@ -59,7 +59,7 @@ def hash_of(content: bytes) -> str:
 
 def manifest_text(sets: Sequence[FileSet]) -> str:
     """Return the text of a manifest."""
-    content = {"truearm": _SCHEMAS[MANIFEST], "sets": [_written(one) for one in sets]}
+    content = {"truearm": _SCHEMAS[MANIFEST], "sets": [_written(set_) for set_ in sets]}
     return json.dumps(content, indent=1) + "\n"
 
 
@@ -128,9 +128,9 @@ def written_differently(path: Path) -> tuple[str, ...]:
     for place in _places(path):
         for folder in place.parents:
             name = str(place.relative_to(folder))
-            for one in sets_in(folder):
-                if name in one.files and hash_of(place.read_bytes()) != one.files[name]:
-                    return tuple(other for other in one.files if other != name)
+            for file_set in sets_in(folder):
+                if name in file_set.files and hash_of(place.read_bytes()) != file_set.files[name]:
+                    return tuple(other for other in file_set.files if other != name)
     return ()
 
 

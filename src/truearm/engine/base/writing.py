@@ -298,7 +298,7 @@ def _refuse_others_of(folder: Path, names: Iterable[str], read: Collection[Path]
     for name in names:
         path = folder / name
         refuse_overwriting(path, read)
-        known = [one.files[name] for one in sets if name in one.files]
+        known = [set_.files[name] for set_ in sets if name in set_.files]
         if not ours or not exists(path) or any(is_the_known(path, hashed) for hashed in known):
             continue
         raise InputError(

@@ -103,8 +103,10 @@ class Selection:
         model, *smaller = self.smaller
         out = set(self.model.effects) - set(model.effects)
         candidates = tuple(
-            replace(one, taken=False, reason=f"the fit with it ended in {status}") if one.effect in out else one
-            for one in self.candidates
+            replace(candidate, taken=False, reason=f"the fit with it ended in {status}")
+            if candidate.effect in out
+            else candidate
+            for candidate in self.candidates
         )
         passed_over = (*self.passed_over, (self.model.effects, status))
         return replace(self, model=model, smaller=tuple(smaller), candidates=candidates, passed_over=passed_over)
@@ -118,10 +120,11 @@ class Selection:
             fourier: "it was not looked at apart from the curves",
         }
         candidates = tuple(
-            replace(one, taken=False, reason=reasons[one.effect])
-            if one.effect == curve or (one.effect == fourier and not one.taken and one.gain is None)
-            else one
-            for one in self.candidates
+            replace(candidate, taken=False, reason=reasons[candidate.effect])
+            if candidate.effect == curve
+            or (candidate.effect == fourier and not candidate.taken and candidate.gain is None)
+            else candidate
+            for candidate in self.candidates
         )
         return replace(self, model=model, candidates=candidates)
 
@@ -424,34 +427,34 @@ class _Choice:
 
     def _confirmed(self, search: Choices, chosen: frozenset[str]) -> tuple[frozenset[str], list[Confirmation]]:
         """Return the choice as far as fits in the folds bear it out."""
-        found: list[Confirmation] = []
+        confirmations: list[Confirmation] = []
         if CURVE in chosen:
             plain = search.best({*self.reasons, CURVE})
             self.progress("choosing a model: curves in the folds")
             errors, before = self._errors_of_curves(search, chosen), search.errors(plain)
-            found.append(_confirmation(chosen, plain, errors, before, self.folds))
-            if found[-1].gain.clear(CLEAR):
-                return chosen, found
-            if found[-1].gain.mean > 0.0 and self.data.configurations <= _CURVES_REFITTED:
-                found += self._curves_refitted(search, chosen, plain)
-                if found[-1].gain.clear(CLEAR):
-                    return chosen, found
+            confirmations.append(_confirmation(chosen, plain, errors, before, self.folds))
+            if confirmations[-1].gain.clear(CLEAR):
+                return chosen, confirmations
+            if confirmations[-1].gain.mean > 0.0 and self.data.configurations <= _CURVES_REFITTED:
+                confirmations += self._curves_refitted(search, chosen, plain)
+                if confirmations[-1].gain.clear(CLEAR):
+                    return chosen, confirmations
             self.reasons[CURVE] = _NOT_BORNE_OUT
             chosen = plain
         refits = self._refits(search, chosen)
         start = self._start(search)
         for _ in range(_MOST_REFITS if len(self.grounds) == 1 else len(self.names)):
             if chosen <= start:
-                return start, found
+                return start, confirmations
             smaller = self._next_smaller(search, chosen)
             self.progress(f"choosing a model: fits with {', '.join(_listed(chosen))} in the folds")
-            reason = self._refuted(refits, chosen, [smaller, start], found)
+            reason = self._refuted(refits, chosen, [smaller, start], confirmations)
             if not reason:
-                return chosen, found
+                return chosen, confirmations
             for name in chosen - smaller:
                 self.reasons[name] = reason
             chosen = smaller
-        return start, found
+        return start, confirmations
 
     def _curves_refitted(self, search: Choices, chosen: frozenset[str], plain: frozenset[str]) -> list[Confirmation]:
         """Return how fits with curves in the folds compare with those without; nothing where a fold has too few.

@@ -129,12 +129,12 @@ def boxes_of(content: ZonesFile, where: str) -> tuple[tuple[Box, ...], float]:
                 cure="Give it a range along x, y or z.",
             )
         boxes.append(Box(name, low, high))
-    for one, other in combinations(boxes, 2):
-        if (np.maximum(one.low, other.low) < np.minimum(one.high, other.high)).all():
+    for box, other in combinations(boxes, 2):
+        if (np.maximum(box.low, other.low) < np.minimum(box.high, other.high)).all():
             raise InputError(
                 "two zones share a part of the workspace",
                 where=f"{where}, zones",
-                came=f"{one.name} and {other.name}",
+                came=f"{box.name} and {other.name}",
                 cure="Let each end where the other begins; `overlap` only says how far beyond its sides a zone takes "
                 "in configurations.",
             )

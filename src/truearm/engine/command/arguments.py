@@ -104,9 +104,9 @@ def readings_argument(robot: Robot, data: object, parameter: str = "data") -> Da
 
 def configurations_argument(robot: Robot, data: object, parameter: str) -> Dataset:
     """Return where an arm stands, by its model: with measurements, or without them as the table of a plan has it."""
-    found = data_argument(data, parameter, read_configurations, f"{_CANONICAL}, or that of a plan")
+    dataset = data_argument(data, parameter, read_configurations, f"{_CANONICAL}, or that of a plan")
     with refusals_of(parameter):
-        return in_model_joints(robot, found)
+        return in_model_joints(robot, dataset)
 
 
 def stops_argument(robot: Robot, data: object, parameter: str) -> Dataset | None:
@@ -114,8 +114,8 @@ def stops_argument(robot: Robot, data: object, parameter: str) -> Dataset | None
     if not isinstance(data, str | Path):
         return None
     with refusals_of(parameter):
-        found = read_stops(path_argument(data, parameter))
-        return None if found is None else in_model_joints(robot, found)
+        dataset = read_stops(path_argument(data, parameter))
+        return None if dataset is None else in_model_joints(robot, dataset)
 
 
 def joints_argument(joints: object, robot: Robot, parameter: str = "joints") -> JointsOf:
@@ -147,13 +147,13 @@ def folder_beside(names: Iterable[str], mark: str, out: object, *read: object) -
     """
     wanted = tuple(names)
     folder = folder_for(wanted, out, *read, ours=True)
-    for one in sets_in(folder):
-        if mark not in one.files and any(name in one.files for name in wanted):
+    for file_set in sets_in(folder):
+        if mark not in file_set.files and any(name in file_set.files for name in wanted):
             raise InputError(
-                f"{listed([name for name in wanted if name in one.files])} there belong to another result",
+                f"{listed([name for name in wanted if name in file_set.files])} there belong to another result",
                 parameter="out",
                 where=str(folder),
-                came=f"the folder of {next(iter(one.files))}",
+                came=f"the folder of {next(iter(file_set.files))}",
                 cure="Choose another folder.",
             )
     return folder

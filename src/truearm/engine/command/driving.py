@@ -138,9 +138,9 @@ def plan_files_for(names: Collection[str], out: Path, *read: object) -> None:
     """
     for name in names:
         file_for(out.with_name(name), *read, ours=True)
-    for one in sets_in(out.parent):
-        others = [name for name in one.files if name not in names]
-        if others and any(name in one.files for name in names):
+    for file_set in sets_in(out.parent):
+        others = [name for name in file_set.files if name not in names]
+        if others and any(name in file_set.files for name in names):
             raise InputError(
                 "files of these names belong to another result there",
                 parameter="out",
@@ -178,9 +178,9 @@ def replaced_notices(folder: Path, name: str, text: str) -> tuple[Notice, ...]:
         name: Of the file that holds the plan itself.
         text: What that file will hold.
     """
-    for one in sets_in(folder):
-        if name in one.files and exists(folder / name) and one.files[name] != hash_of(text.encode()):
-            again = f", written by '{one.command}'" if one.command else ""
+    for file_set in sets_in(folder):
+        if name in file_set.files and exists(folder / name) and file_set.files[name] != hash_of(text.encode()):
+            again = f", written by '{file_set.command}'" if file_set.command else ""
             return (
                 PLAN_REPLACED(
                     f"Another plan stood in {folder / name}{again}, and was replaced. What was measured or programmed "

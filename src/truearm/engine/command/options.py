@@ -168,7 +168,7 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
     Args:
         of_devices: Requests that are made instead for their devices. The command has the options of all.
     """
-    instead, others = request.instead, {one.of_device: one for one in of_devices}
+    instead, others = request.instead, {device.of_device: device for device in of_devices}
     declared, owners = dict[str, Option](), dict[str, type[Request]]()
     for one in (request, *others.values()):
         for name, option in one.options():
@@ -197,7 +197,7 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
         if wanted.judged and not result.finished:
             raise typer.Exit(3)
 
-    asked = [one for name in declared for one in _parameters(name, declared, owners[name].default(name))]
+    asked = [parameter for name in declared for parameter in _parameters(name, declared, owners[name].default(name))]
     flags = []
     if instead is not None:
         flags.append(_flag_parameter(instead.job, instead.job, instead.help_text().partition("\n")[0]))
@@ -222,9 +222,9 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
 def _with_flags(typed: Mapping[str, Any], declared: Mapping[str, Option]) -> dict[str, Any]:
     """Return what was typed, with the values of options that have flags for them."""
     given = dict(typed)
-    for name, one in declared.items():
-        if isinstance(one.kind, ByFlags):
-            chosen = [value for value in one.kind.flags if given.pop(f"{name}_{value}")]
+    for name, option in declared.items():
+        if isinstance(option.kind, ByFlags):
+            chosen = [value for value in option.kind.flags if given.pop(f"{name}_{value}")]
             if len(chosen) > 1:
                 named = ", ".join(f"{name}_{value}" for value in chosen)
                 raise InputError("only one of them can hold", parameter=named, cure="Leave one out.")

@@ -56,10 +56,10 @@ def excluded_block(excluded: Sequence[Excluded]) -> Block:
 
 def reasons(excluded: Sequence[Excluded]) -> str:
     """Return the reasons, each with how many readings have it."""
-    found = Counter[str]()
+    counter = Counter[str]()
     for one in excluded:
-        found[one.row.reason] += one.readings
-    return ", ".join(f"{reason} ({count})" for reason, count in found.items())
+        counter[one.row.reason] += one.readings
+    return ", ".join(f"{reason} ({count})" for reason, count in counter.items())
 
 
 _RULE: Final = (
@@ -99,11 +99,11 @@ def in_parts(excluded: tuple[Excluded, ...], split: Dataset, held_out: IntArray)
 
 def count_excluded(excluded: tuple[Excluded, ...]) -> dict[str, int]:
     """Return how many readings of each target are excluded, of configurations that are not left out."""
-    found = Counter[str]()
+    counter = Counter[str]()
     for one in excluded:
         if one.part != "left out":
-            found[one.row.target] += one.readings
-    return dict(found)
+            counter[one.row.target] += one.readings
+    return dict(counter)
 
 
 EXCLUDED: Final = Rule(

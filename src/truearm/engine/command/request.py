@@ -270,7 +270,7 @@ def job(request: Callable[P, Runs[R]]) -> Callable[P, R]:
     ordered = [taken[name] for name, _ in made.options()]
     signature = inspect.Signature(ordered, return_annotation=made.run.__annotations__["return"])
     run.__signature__ = signature  # type: ignore[attr-defined]
-    run.__annotations__ = {one.name: one.annotation for one in signature.parameters.values()}
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in signature.parameters.values()}
     run.__annotations__["return"] = signature.return_annotation
     run.__doc__ = docstring(made)
     run.request = made  # type: ignore[attr-defined]

@@ -247,12 +247,12 @@ def training_of(robot: Robot, data: Dataset, digest: str | None) -> Training | N
     """
     readings = readings_digest(data)
     for line in robot.history:
-        found = _TRAINED.search(line)
-        if found is None:
+        match = _TRAINED.search(line)
+        if match is None:
             continue
-        same_file = found[3] is not None and digest is not None and found[3] == digest[: len(found[3])]
-        if same_file or (found[4] is not None and found[4] == readings[: len(found[4])]):
-            return Training((int(found[1]), int(found[2]), int(found[5])), int(found[6] or 0), line)
+        same_file = match[3] is not None and digest is not None and match[3] == digest[: len(match[3])]
+        if same_file or (match[4] is not None and match[4] == readings[: len(match[4])]):
+            return Training((int(match[1]), int(match[2]), int(match[5])), int(match[6] or 0), line)
     return None
 
 

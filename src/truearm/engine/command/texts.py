@@ -96,11 +96,11 @@ def read_region(text: str | None) -> list[list[float]] | None:
     if text is None:
         return None
     ranges = [[as_number(end.strip()) for end in part.split("..")] for part in text.split(",")]
-    if len(ranges) != 3 or any(len(one) != 2 or None in one for one in ranges):
+    if len(ranges) != 3 or any(len(range_) != 2 or None in range_ for range_ in ranges):
         raise InputError(
             "three ranges in mm belong here",
             parameter="region",
             came=text,
             allowed="LOW..HIGH for x, y and z: 300..600,-200..200,100..400",
         )
-    return [[sized_si(end, "mm", parameter="region") for end in one if end is not None] for one in ranges]
+    return [[sized_si(end, "mm", parameter="region") for end in range_ if end is not None] for range_ in ranges]

@@ -63,20 +63,20 @@ def check_data(
         excluded: How many readings of each target are missing because they were excluded: nobody need be told that.
         scaled: Configuration and target of readings in another unit of length: nothing more is said of these.
     """
-    found = [*_misnamed(data), *_missing(data, excluded or {}), *check_duplicates(data)]
+    notices = [*_misnamed(data), *_missing(data, excluded or {}), *check_duplicates(data)]
     data = _without(data, scaled)
     closer = _closer_together(data)
-    found += closer
+    notices += closer
     data = _without(data, {row for notice in closer for row in notice.at})
     pairs = repeated_joints(data)
     known = {label for pair in pairs for label in pair}
     known |= {label for notice in closer for label, _ in notice.at}
     doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
-    found += repeated_joints_notices(data, pairs)
+    notices += repeated_joints_notices(data, pairs)
     told = {suspect.configuration for suspect in doubted}
     rigid = [suspect for suspect in rigid_suspects(data) if suspect.configuration not in told]
-    found += suspect_notices([*rigid, *reference_suspects(data), *doubted])
-    return found + _moved(data) + _temperatures(data)
+    notices += suspect_notices([*rigid, *reference_suspects(data), *doubted])
+    return notices + _moved(data) + _temperatures(data)
 
 
 def _without(data: Dataset, rows: Collection[tuple[str, str]]) -> Dataset:
@@ -202,9 +202,9 @@ def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
     }
     told: dict[tuple[str, str], Suspect] = {}
     for rule in (TARGETS_SWAPPED, TARGET_MISTAKEN, OUTLIERS):
-        for one in suspects:
-            if one.rule == rule:
-                told.setdefault((one.configuration, one.target), one)
+        for suspect in suspects:
+            if suspect.rule == rule:
+                told.setdefault((suspect.configuration, suspect.target), suspect)
     notices = []
     for rule, words in advice.items():
         mine = [s for s in dict.fromkeys(suspects) if s.rule == rule and told[s.configuration, s.target] == s]

@@ -84,34 +84,34 @@ def read_exclusions(path: Path) -> tuple[Exclusion, ...]:
     columns = {name: cells.texts(k, missing=name in _MORE) for k, name in enumerate(names) if name != "read"}
     read = _noted(cells, names.index("read"), where) if "read" in names else [()] * len(cells.lines)
     rows = zip(*columns.values(), strict=True)
-    found = [
+    exclusions = [
         Exclusion(**dict(zip(columns, row, strict=True)), read=numbers, where=f"{path}, line {line}")
         for line, row, numbers in zip(cells.lines, rows, read, strict=True)
     ]
     seen: set[tuple[str, ...]] = set()
-    for one in found:
-        key = (one.configuration, one.target, one.visit, one.fixture)
+    for exclusion in exclusions:
+        key = (exclusion.configuration, exclusion.target, exclusion.visit, exclusion.fixture)
         if key in seen:
             raise InputError(
                 "this reading is excluded twice",
-                where=one.where,
-                came=f"{one.configuration}/{one.target}",
+                where=exclusion.where,
+                came=f"{exclusion.configuration}/{exclusion.target}",
                 cure="Remove one of the rows.",
             )
         seen.add(key)
-    return tuple(found)
+    return tuple(exclusions)
 
 
 def exclusions_text(exclusions: Iterable[Exclusion]) -> str:
     """Return the file of excluded readings."""
     rows = list(exclusions)
-    more = [name for name in _MORE if any(getattr(one, name) for one in rows)]
+    more = [name for name in _MORE if any(getattr(row, name) for row in rows)]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    columns, noted = [*_COLUMNS, *more], any(one.read for one in rows)
+    columns, noted = [*_COLUMNS, *more], any(row.read for row in rows)
     writer.writerow([*columns, *(["read [mm]"] if noted else [])])
-    for one in rows:
-        writer.writerow([*(getattr(one, name) for name in columns), *([_in_mm(one.read)] if noted else [])])
+    for row in rows:
+        writer.writerow([*(getattr(row, name) for name in columns), *([_in_mm(row.read)] if noted else [])])
     return stream.getvalue()
 
 
@@ -134,30 +134,30 @@ def without_readings(data: Dataset, exclusions: Sequence[Exclusion]) -> tuple[Da
     targets = [{name: number for number, name in enumerate(part.targets)} for part in parts]
     gone = [np.zeros(len(part.target), dtype=bool) for part in parts]
     counts = []
-    said = [numbers_read(part) for part in parts] if any(one.read for one in exclusions) else []
-    for one in exclusions:
-        if one.configuration not in labels:
+    said = [numbers_read(part) for part in parts] if any(exclusion.read for exclusion in exclusions) else []
+    for exclusion in exclusions:
+        if exclusion.configuration not in labels:
             raise InputError(
                 "there is no configuration of this name",
-                where=one.where,
-                came=one.configuration,
-                cure=did_you_mean(one.configuration, data.labels) or f"Name configurations of {data.source}.",
+                where=exclusion.where,
+                came=exclusion.configuration,
+                cure=did_you_mean(exclusion.configuration, data.labels) or f"Name configurations of {data.source}.",
             )
-        if not any(one.target in names for names in targets):
+        if not any(exclusion.target in names for names in targets):
             raise InputError(
                 "there is no target of this name",
-                where=one.where,
-                came=one.target,
-                cure=did_you_mean(one.target, [name for names in targets for name in names])
+                where=exclusion.where,
+                came=exclusion.target,
+                cure=did_you_mean(exclusion.target, [name for names in targets for name in names])
                 or f"Name targets of {data.source}.",
             )
         masks = [
-            _meant(part, labels[one.configuration], names.get(one.target, -1), one)
+            _meant(part, labels[exclusion.configuration], names.get(exclusion.target, -1), exclusion)
             for part, names in zip(parts, targets, strict=True)
         ]
-        if one.read and any(mask.any() for mask in masks):
+        if exclusion.read and any(mask.any() for mask in masks):
             _refuse_another(
-                one, tuple(said[k][row] for k, mask in enumerate(masks) for row in np.flatnonzero(mask)), data
+                exclusion, tuple(said[k][row] for k, mask in enumerate(masks) for row in np.flatnonzero(mask)), data
             )
         found = 0
         for meant, mask in zip(masks, gone, strict=True):
@@ -167,8 +167,8 @@ def without_readings(data: Dataset, exclusions: Sequence[Exclusion]) -> tuple[Da
         if not found:
             raise InputError(
                 "nothing was read there, so there is nothing to exclude",
-                where=one.where,
-                came=f"{one.configuration}/{one.target}",
+                where=exclusion.where,
+                came=f"{exclusion.configuration}/{exclusion.target}",
                 cure="Remove the row.",
             )
     made = _missing(data, gone[0])

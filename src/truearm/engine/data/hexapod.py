@@ -291,14 +291,14 @@ def poses(cups: Array = CUPS, device: Device = DEVICE) -> tuple[HexapodPose, ...
     cups = checked_cups(cups, device)
     base = triangle([device.base] * 3, "B")
     middle = base.mean(axis=0)
-    found: list[HexapodPose] = []
+    hexapod_poses: list[HexapodPose] = []
     for design, solution in assemblies():
         places = tool_cups(design, solution, [device.base] * 3, [device.tool] * 3, np.full(6, device.leg))
         R, p = rigid_motion(cups, places)
         normal = np.cross(places[1] - places[0], places[2] - places[0])
         if (normal @ (p - places[0])) * (normal @ (middle - places[0])) < 0:
-            found.append(HexapodPose(len(found) + 1, design, solution, places, R, p))
-    return tuple(found)
+            hexapod_poses.append(HexapodPose(len(hexapod_poses) + 1, design, solution, places, R, p))
+    return tuple(hexapod_poses)
 
 
 def checked_cups(cups: Array, device: Device = DEVICE) -> Array:

@@ -71,11 +71,11 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
     Args:
         expected: Of the fit, over the workspace.
     """
-    found = _parallel_axes(fit)
+    notices = _parallel_axes(fit)
     if fit.status is Status.NOT_CONVERGED:
-        found.append(NOT_CONVERGED(f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
+        notices.append(NOT_CONVERGED(f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
     if fit.unobservable:
-        found.append(
+        notices.append(
             RANK_LOSS(
                 f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend "
                 f"on them. {Status.RANK_LOSS.advice}",
@@ -97,15 +97,15 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
         if fit.unobservable_combinations:
             held = "; ".join(fit.unobservable_combinations)
             words += f" Unobservable combinations of parameters, held at nominal values: {held}."
-        found.append(CLOSED_LOOP(words))
+        notices.append(CLOSED_LOOP(words))
     if fit.at_bound:
-        found.append(AT_BOUND(f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
+        notices.append(AT_BOUND(f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
     if fit.redundancies:
         combinations = "; ".join(f"{r.dropped} ({r.combination})" for r in fit.redundancies)
         alike = (
             "" if fit.unobservable else " At configurations like the measured ones predictions hardly depend on them."
         )
-        found.append(
+        notices.append(
             REDUNDANT(
                 f"Redundant parameters are held at their nominal values: {combinations}. The readings hardly observe "
                 f"the combinations in brackets.{alike}",
@@ -113,7 +113,7 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
         )
     shared = fit.joint_error.any() and not fit.scattered
     if fit.excess > 1.0:
-        found.append(
+        notices.append(
             RESIDUALS_EXCEED_SIGMA(
                 f"The residuals are {fit.excess:.1f} times what the declared deviations"
                 f"{', and errors of the joints that readings of a configuration share,' if shared else ''} allow. "
@@ -121,18 +121,18 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
                 "small, or readings are wrong. The deviations of the parameters allow for it.",
             )
         )
-    found += _check_effects(fit)
+    notices += _check_effects(fit)
     if fit.robot.effect_names:
         effects = ", ".join(fit.robot.effect_names)
         own = [p.name for effect in fit.robot.effects for p in effect.parameters]
-        found.append(
+        notices.append(
             URDF_PARTIAL(
                 f"calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold {effects} "
                 f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
                 "and the targets in the instrument's frame. calibrated.yaml holds everything.",
             )
         )
-    return found
+    return notices
 
 
 PARALLEL_AXES: Final = Rule(

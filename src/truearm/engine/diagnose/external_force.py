@@ -212,8 +212,8 @@ COMPLIANCE_UNSEEN: Final = Rule(
 
 def _unseen(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
     found: dict[str, float] = {}
-    for one in bent:
-        for name, size in one.unseen.items():
+    for bending in bent:
+        for name, size in bending.unseen.items():
             found[name] = max(size, found.get(name, 0.0))
     if not found:
         return []
@@ -244,8 +244,8 @@ LOADS_BEYOND_DATA: Final = Rule(
 def _beyond(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
     unseen = {name for one in bent for name in one.unseen}
     found: dict[int, float] = {}
-    for one in bent:
-        for joint, load in one.beyond.items():
+    for bending in bent:
+        for joint, load in bending.beyond.items():
             if f"compliance_{joint + 1}" not in unseen and abs(load) > abs(found.get(joint, 0.0)):
                 found[joint] = load
     if not found or robot.proof is None:

@@ -155,9 +155,9 @@ def check_narrow_data_without_geometry(
         mean=math.hypot(expected.without_scale.mean, apart),
         interval_90=(max(low, apart - high), apart + high),
     )
-    found = check_narrow_data(wider, replace(expected, without_scale=both), measured, judged, held_out=held_out)
+    notices = check_narrow_data(wider, replace(expected, without_scale=both), measured, judged, held_out=held_out)
     more = f" The {fit.model.name} model takes the geometry as exact; here it is as uncertain as its priors."
-    return [replace(notice, message=notice.message + more) for notice in found]
+    return [replace(notice, message=notice.message + more) for notice in notices]
 
 
 def _apart(fit: Fit, other: Fit) -> float:

@@ -57,17 +57,17 @@ def measured_again(left: LeftOver, off: Off, known: float, *, checked: bool) -> 
     gain = known * (1.0 - off.left)
     if off.in_a_row:
         names = [left.problem.data.labels[index] for index in sorted(off.indices)]
-        size = math.sqrt(sum(one.distance**2 for one in off.configurations) / len(names))
+        size = math.sqrt(sum(configuration.distance**2 for configuration in off.configurations) / len(names))
         how = "them out of the calibration" if checked else f"them out (`without={labels}`)"
         words = (
             f"Measure configurations {names[0]} to {names[-1]} again, or leave {how}: they were measured one after the "
             f"other and are off by about {size * 1e3:.2g} mm, so something moved meanwhile."
         )
         return [NextStep("measure-again", words, gain)]
-    said = [_off_by(left, one) for one in off.configurations[:_NAMED]]
+    said = [_off_by(left, configuration) for configuration in off.configurations[:_NAMED]]
     rest = len(off.configurations) - len(said)
     if rest:
-        others = [left.problem.data.labels[one.index] for one in off.configurations[_NAMED:]]
+        others = [left.problem.data.labels[configuration.index] for configuration in off.configurations[_NAMED:]]
         said.append(f"{counted(rest, 'more configuration')} ({listed(others)})")
     out = "leave them out" if len(off.configurations) > 1 else "leave it out"
     way = f"{out} of the calibration" if checked else f"{out} (`without={labels}`)"

@@ -73,7 +73,7 @@ def exchanged_names(fit: Fit, data: Dataset) -> list[Suspect]:
     on_flange = np.einsum("cji,ctj->cti", turned, at)  # but for one shift at each configuration
     lines = {pair: on_flange[:, pair[1]] - on_flange[:, pair[0]] for pair in combinations(range(len(names)), 2)}
     suspects: dict[tuple[int, int], Suspect] = {}
-    for (a, b), line in sorted(lines.items(), key=lambda one: -_length(one[1])):
+    for (a, b), line in sorted(lines.items(), key=lambda item: -_length(item[1])):
         for c in _turned_round(line):
             if (c, a) not in suspects and (c, b) not in suspects:
                 for one, other in ((a, b), (b, a)):
@@ -217,39 +217,39 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
     Args:
         robot: The nominal robot, with as many joints as the data; its base and targets are left out of account.
     """
-    found = _beyond_limits(robot, data)
+    notices = _beyond_limits(robot, data)
     if data.fixture is not None:
         try:
             start_from_readings(robot, data)
         except InputError as error:
-            return Comparison([FIXTURES_UNLIKELY(str(error)), *found])
+            return Comparison([FIXTURES_UNLIKELY(str(error)), *notices])
         slips = slips_in_lengths(robot, data)
         if slips:
-            return Comparison([*slips, *found])
+            return Comparison([*slips, *notices])
         fit = identify(robot, data, named_model("geometric"), loss="cauchy")
         unlike, off_fixtures = _far_from_fixtures(fit, data)
-        return Comparison([*check_robot(fit, data), *unlike, *found], off_fixtures, fit, data)
+        return Comparison([*check_robot(fit, data), *unlike, *notices], off_fixtures, fit, data)
     if not data.has_position.any():
-        return Comparison(found)
+        return Comparison(notices)
     slips = slips_in_positions(robot, data)
     if slips and all(
         slip.code in {rule.code for rule in ORIENTATION_SLIPS} for slip in slips
     ):  # the positions are this robot's
-        return Comparison([*slips, *found])
+        return Comparison([*slips, *notices])
     if slips:
-        return Comparison([*(other_robot(robot, data) or slips), *found])
+        return Comparison([*(other_robot(robot, data) or slips), *notices])
     fit = identify(robot, data, named_model("geometric"), loss="cauchy")
     errors = errors_of(fit.robot, data)
     off = off_by(errors)
     if np.nanmedian(off) > _FITTED_WITHIN:
         slips = slips_by_fit(robot, data)
         if slips:
-            return Comparison([*(other_robot(robot, data) or slips), *found])
+            return Comparison([*(other_robot(robot, data) or slips), *notices])
     wrong = check_robot(fit, data)
     unlike_robot = check_plausible(fit, data, wrong)
     exchanged = exchanged_names(fit, data)
     if unlike_robot:
-        return Comparison([*unlike_robot, *wrong, *found], exchanged)
+        return Comparison([*unlike_robot, *wrong, *notices], exchanged)
     doubted = check_few_to_doubt(fit)
     suspects: list[Suspect] = []
     turned = np.zeros(len(off), dtype=bool)
@@ -261,7 +261,7 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
         doubted = [*mistaken, *check_orientations(fit, data, errors, alone), *often_off(data, off)]
         turned = alone
     return Comparison(
-        [*wrong, *found, *doubted, *_one_point(fit, data), *check_rounding(fit, data), *_computed(robot, data, off)],
+        [*wrong, *notices, *doubted, *_one_point(fit, data), *check_rounding(fit, data), *_computed(robot, data, off)],
         suspects,
         fit,
         without_orientations(data, turned),

@@ -424,8 +424,8 @@ def _nearest(robot: Robot, others: dict[str, Robot], joints: Array) -> dict[str,
     """
     places = robot.forward(joints)[0]
     away = {}
-    for name, one in others.items():
-        points = one.forward(joints)[0]
+    for name, other in others.items():
+        points = other.forward(joints)[0]
         rotation, translation = rigid_motion(points, places)
         away[name] = float(np.linalg.norm(points @ rotation.T + translation - places))
     return {name: others[name] for name in sorted(away, key=lambda name: away[name])[:_MOST_COMPARED]}
@@ -436,7 +436,7 @@ def _best_placed(others: dict[str, Robot], data: Dataset) -> dict[str, Robot]:
 
     One that fits several times better than another is never behind ten of those.
     """
-    placed = [FRAMES.prepared(one).with_frames(Transform(), {}) for one in others.values()]
+    placed = [FRAMES.prepared(other).with_frames(Transform(), {}) for other in others.values()]
     try:
         errors = errors_of_placed(placed, data)
     except InputError:  # frames cannot be found from these readings

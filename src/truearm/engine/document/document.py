@@ -301,4 +301,4 @@ def tabled(title: str, heading: tuple[str, ...], rows: Sequence[Sequence[str]], 
 
 def pictures_of(document: Document) -> dict[str, Figure]:
     """Return the pictures of a page by the names of their places."""
-    return {one.name: one.figure for one in _pictures((*document.cover, *document.blocks))}
+    return {picture.name: picture.figure for picture in _pictures((*document.cover, *document.blocks))}

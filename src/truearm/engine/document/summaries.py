@@ -39,24 +39,24 @@ def selection_block(selection: Selection) -> Block:
         "blocks": selection.blocks,
         "candidates": [
             {
-                "effect": one.effect,
-                "taken": one.taken,
-                "gain_mm": None if one.gain is None else one.gain.mean * 1e3,
-                "standard_error_mm": None if one.gain is None else one.gain.error * 1e3,
-                "reason": one.reason,
+                "effect": candidate.effect,
+                "taken": candidate.taken,
+                "gain_mm": None if candidate.gain is None else candidate.gain.mean * 1e3,
+                "standard_error_mm": None if candidate.gain is None else candidate.gain.error * 1e3,
+                "reason": candidate.reason,
             }
-            for one in selection.candidates
+            for candidate in selection.candidates
         ],
         "confirmations": [
             {
-                "effects": list(one.effects),
-                "smaller": list(one.smaller),
-                "error_mm": one.error * 1e3,
-                "smaller_error_mm": one.smaller_error * 1e3,
-                "gain_mm": one.gain.mean * 1e3,
-                "standard_error_mm": one.gain.error * 1e3,
+                "effects": list(confirmation.effects),
+                "smaller": list(confirmation.smaller),
+                "error_mm": confirmation.error * 1e3,
+                "smaller_error_mm": confirmation.smaller_error * 1e3,
+                "gain_mm": confirmation.gain.mean * 1e3,
+                "standard_error_mm": confirmation.gain.error * 1e3,
             }
-            for one in selection.confirmations
+            for confirmation in selection.confirmations
         ],
         "lines": [
             {
@@ -202,7 +202,7 @@ def expected_blocks(expected: ExpectedError) -> Iterator[Block]:
             **_expectation(expected.overall, expected.lower_bound),
             "lower_bound": expected.lower_bound,
             "omissions": list(expected.omissions),
-            "targets": {name: _expectation(one, expected.lower_bound) for name, one in expected.targets.items()},
+            "targets": {name: _expectation(target, expected.lower_bound) for name, target in expected.targets.items()},
             "frame": expected.frame,
             "payload": payload_words(expected.payload),
         },

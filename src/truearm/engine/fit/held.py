@@ -43,7 +43,9 @@ class Held:
         """Return the parameters of a robot that are held."""
         own = [p.name for p in robot.parameters.values() if p.group == "base"] if self.base is not None else []
         own += [name for target in robot.targets if target.name in self.targets for name in target.chain.parameters]
-        own += [name for one in robot.fixtures if one.name in self.fixtures for name in one.chain.parameters]
+        own += [
+            name for fixture in robot.fixtures if fixture.name in self.fixtures for name in fixture.chain.parameters
+        ]
         return tuple(own)
 
     def free_of(self, free: FreeParameters, robot: Robot) -> FreeParameters:

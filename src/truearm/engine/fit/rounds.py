@@ -418,16 +418,16 @@ def components_found(
         [(_NOISE_FLOOR / problem.noise[n]) ** 2 if f else _LEAST_WIDENED for f, n in zip(free, names, strict=True)]
     )
     if before is not None:
-        found = variance_components(at, before.estimated, least, alike, before)
+        components = variance_components(at, before.estimated, least, alike, before)
     else:
-        found = variance_components(at, free, least, alike)
+        components = variance_components(at, free, least, alike)
         if DECLARED in names and DECLARED not in untold:
             place = names.index(DECLARED)
-            if beyond_chance(float(found.squares[place]), max(float(found.freedom[place]), 1e-3)):
+            if beyond_chance(float(components.squares[place]), max(float(components.freedom[place]), 1e-3)):
                 free[place] = True
-                found = variance_components(at, free, least, alike)
-    covariance = CovariancePart(found.covariance, np.inf).among(uncertain).covariance
-    return replace(found, covariance=covariance, parts=tuple(part.among(uncertain) for part in found.parts))
+                components = variance_components(at, free, least, alike)
+    covariance = CovariancePart(components.covariance, np.inf).among(uncertain).covariance
+    return replace(components, covariance=covariance, parts=tuple(part.among(uncertain) for part in components.parts))
 
 
 def factors_of(problem: Problem) -> tuple[list[str], NDArray[np.intp]]:

@@ -383,15 +383,15 @@ class CollisionCheck:
 
     def _between_links(self) -> list[Room]:
         links, rooms = self.arm.links, []
-        for i, one in enumerate(links):
+        for i, link in enumerate(links):
             for other in (*links[i + 1 :], *self.arm.tools):
-                between = self.arm.along[self.arm.flange if other.tool else other.start] - self.arm.along[one.end]
-                apart = APART * (one.radius + other.radius + self.need)
+                between = self.arm.along[self.arm.flange if other.tool else other.start] - self.arm.along[link.end]
+                apart = APART * (link.radius + other.radius + self.need)
                 if apart > between:
                     self.connected = max(self.connected, apart)
-                pieces = self._without_connection(one, other, max(apart - float(between), 0.0))
+                pieces = self._without_connection(link, other, max(apart - float(between), 0.0))
                 if pieces is not None:
-                    words = f"{self._name(one)} and {self._name(other)}{_NEAR}"
+                    words = f"{self._name(link)} and {self._name(other)}{_NEAR}"
                     rooms.append(Room(LINKS, words, *pieces))
         return rooms
 

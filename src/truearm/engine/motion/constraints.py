@@ -247,8 +247,8 @@ def _in_box(box: Box, points: list[Array], length: str, where: str) -> Allowed:
     for axis, given in enumerate((box.x, box.y, box.z)):
         if given is not None:
             low, high = _range(given, length, f"{where}, {'xyz'[axis]}")
-            for one in points:
-                inside &= (one[:, axis] >= low) & (one[:, axis] <= high)
+            for point in points:
+                inside &= (point[:, axis] >= low) & (point[:, axis] <= high)
     return inside
 
 

@@ -187,8 +187,8 @@ class SevenLines:
     def _seed(self, robot: Robot) -> Array:
         """Return joint positions at the middle of the box, near which all others shall lie."""
         middle = self.position.mean(axis=0)
-        found = inverse(robot, middle[None], self.rotation[None])
-        return np.asarray(usable_joints(found, ("the middle of the box",), "line test")[0])
+        joint_solutions = inverse(robot, middle[None], self.rotation[None])
+        return np.asarray(usable_joints(joint_solutions, ("the middle of the box",), "line test")[0])
 
 
 def seven_lines(centre: ArrayLike, size: ArrayLike, poses_each: int = POSES_EACH, rotation: Array = DOWN) -> SevenLines:

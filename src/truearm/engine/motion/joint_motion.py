@@ -174,7 +174,7 @@ class _Follower:
 
     def _start(self, seed: ArrayLike | None) -> Array:
         """Return joint positions for the first sample."""
-        found = inverse(
+        joint_solutions = inverse(
             self._robot,
             self._path.position[:1],
             None if self._orientation == "free" else self._rotation[None],
@@ -182,16 +182,16 @@ class _Follower:
             orientation=self._orientation,
             seed=seed,
         )
-        if found.status[0] in (PoseStatus.UNREACHABLE, PoseStatus.BEYOND_LIMIT):
+        if joint_solutions.status[0] in (PoseStatus.UNREACHABLE, PoseStatus.BEYOND_LIMIT):
             raise InputError(
                 "the motion cannot start",
                 where=self._place(0),
-                came=found.advice(0).rstrip("."),
+                came=joint_solutions.advice(0).rstrip("."),
                 cure=None
                 if self._orientation == "free"
                 else "With a free orientation the arm has fewer conditions to meet.",
             )
-        return np.asarray(found.joints[0])
+        return np.asarray(joint_solutions.joints[0])
 
     def _followed(self, start: Array) -> Array:
         """Return joint positions for every sample, or refuse the first one that has none."""

@@ -162,11 +162,11 @@ def joints_at(
         if not len(left):
             break
         start = starts[np.asarray(near)[left, draw]]
-        found = inverse(robot, points[left], target=target, orientation="free", seed=start)
-        usable = np.array([status.usable for status in found.status])
-        joints[left[usable]] = found.joints[usable]
+        joint_solutions = inverse(robot, points[left], target=target, orientation="free", seed=start)
+        usable = np.array([status.usable for status in joint_solutions.status])
+        joints[left[usable]] = joint_solutions.joints[usable]
         reached[left[usable]] = True
-        regular[left] = [status is PoseStatus.REACHED for status in found.status]
+        regular[left] = [status is PoseStatus.REACHED for status in joint_solutions.status]
     return joints, reached
 
 

@@ -260,7 +260,7 @@ def _as_given(section: _Section, start: Array, step: float, length: str, where: 
     assert section.times is not None
     points = [np.array([sized_si(v, length, where) for v in one]) for one in section.hermite]
     waypoints = _waypoints(start, points, length)
-    velocities = np.array([[sized_si(v, length, where) for v in one] for one in section.velocities])
+    velocities = np.array([[sized_si(v, length, where) for v in velocity] for velocity in section.velocities])
     times = np.array(section.times)
     if velocities.shape != waypoints.shape or times.shape != waypoints.shape[:1]:
         raise InputError(

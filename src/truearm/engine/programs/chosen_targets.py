@@ -106,7 +106,7 @@ def kept_by_choice(programs: Sequence[Program], choice: Choice) -> list[dict[int
 def taught_question(programs: Sequence[Program], choice: Choice) -> Question | None:
     """Return what to ask where nobody has said what was taught, and there is something to correct."""
     kept = kept_by_choice(programs, choice)
-    nothing = all(len(rows) == len(one.targets) for one, rows in zip(programs, kept, strict=True))
+    nothing = all(len(rows) == len(program.targets) for program, rows in zip(programs, kept, strict=True))
     if choice.taught is not None or nothing:
         return None
     return Question(
@@ -182,14 +182,14 @@ def wrenches_of_targets(programs: Sequence[Program], given: Sequence[TargetWrenc
     """
     fits = [Patterns(programs, one.targets, "wrench", one.where or None) for one in given]
     used = {target.tool.lower() for program in programs for target in program.targets}
-    for one in given:
-        for tool in one.tools:
+    for target_wrench in given:
+        for tool in target_wrench.tools:
             if _key(tool) not in used:
                 names = sorted(name or _FLANGE for name in used)
                 raise InputError(
                     "no target of the programs has this tool",
                     parameter="wrench",
-                    where=one.where or None,
+                    where=target_wrench.where or None,
                     came=tool,
                     allowed=", ".join(names),
                     cure=did_you_mean(tool, names),
@@ -199,21 +199,21 @@ def wrenches_of_targets(programs: Sequence[Program], given: Sequence[TargetWrenc
         of_program: list[Wrench | None] = []
         for target in program.targets:
             best: dict[int, TargetWrench] = {}
-            for one, patterns in zip(given, fits, strict=True):
-                if one.targets and not patterns.fit(target.name):
+            for target_wrench, patterns in zip(given, fits, strict=True):
+                if target_wrench.targets and not patterns.fit(target.name):
                     continue
-                if one.tools and target.tool.lower() not in map(_key, one.tools):
+                if target_wrench.tools and target.tool.lower() not in map(_key, target_wrench.tools):
                     continue
-                rank = 0 if one.targets else 1 if one.tools else 2
+                rank = 0 if target_wrench.targets else 1 if target_wrench.tools else 2
                 if rank in best:
                     raise InputError(
                         "two forces are given for one target",
                         parameter="wrench",
-                        where=one.where or None,
+                        where=target_wrench.where or None,
                         came=target.name or target.tool or _FLANGE,
                         cure=f"It is in {best[rank].where}, too: take it out of one of them.",
                     )
-                best[rank] = one
+                best[rank] = target_wrench
             of_program.append(best[min(best)].wrench if best else None)
         found.append(tuple(of_program))
     return found

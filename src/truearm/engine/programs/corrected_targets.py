@@ -171,7 +171,7 @@ def known_by_ledger(ledger: Path) -> list[KnownCorrection]:
 
 def _known(ledger: Path) -> list[KnownCorrection]:
     content = read_bytes(ledger) if exists(ledger) else None
-    return [KnownCorrection(one.program, one.date, one.targets, ledger) for one in _entries(content, ledger)]
+    return [KnownCorrection(entry.program, entry.date, entry.targets, ledger) for entry in _entries(content, ledger)]
 
 
 def remember(ledger: Path, programs: Sequence[LedgerEntry]) -> None:
@@ -183,8 +183,8 @@ def remember(ledger: Path, programs: Sequence[LedgerEntry]) -> None:
     while True:
         content = read_bytes(ledger) if exists(ledger) else None
         entries = _entries(content, ledger)
-        here = {one.targets for one in entries}
-        new = [one for one in programs if one.targets and one.targets not in here]
+        here = {entry.targets for entry in entries}
+        new = [program for program in programs if program.targets and program.targets not in here]
         if not new:
             return
         text = json.dumps({"truearm": _SCHEMA, "programs": [one.model_dump() for one in (*entries, *new)]}, indent=1)

@@ -164,7 +164,7 @@ def expected_errors(
     model = _ModelErrors(robot, proof, frames == "assumed", taught_tools)
     if frames == "assumed":
         model = replace(model, shared=model.shared_by(programs))
-    return tuple(_expected(model, one).at_least(REPEATABILITY) for one in programs)
+    return tuple(_expected(model, program).at_least(REPEATABILITY) for program in programs)
 
 
 def _expected(model: _ModelErrors, targets: TargetsReached) -> ExpectedErrors:

@@ -91,9 +91,9 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     nominal = nominal_robot(robot)
     rule = branch_rule(robot)
     position, rotation = flange[:, :3, 3], flange[:, :3, :3]
-    found = inverse(robot, position, rotation, seed=near)
+    joint_solutions = inverse(robot, position, rotation, seed=near)
     if rule is None:
-        return FakeTargets(matrices(nominal, found.joints), found)
+        return FakeTargets(matrices(nominal, joint_solutions.joints), joint_solutions)
     # The branch that counts is the controller's, of the nominal arm: next to a singular posture the calibrated arm may
     # call the same joints by another name. So the nearest joints are taken, and all branches looked through where they
     # are on another one.
@@ -104,28 +104,32 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
 
     everyone = np.arange(len(flange))
     # What is out of reach was looked for on all branches already.
-    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
-    missed = np.flatnonzero((~on_branch(found, everyone) | ~found.usable) & reached)
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in joint_solutions.status], dtype=bool)
+    missed = np.flatnonzero((~on_branch(joint_solutions, everyone) | ~joint_solutions.usable) & reached)
     if len(missed):
         again = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
-        found = _better(found, again, missed[again.pose], near, on_branch)
-    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
-    lost = np.flatnonzero(~on_branch(found, everyone) & reached)
+        joint_solutions = _better(joint_solutions, again, missed[again.pose], near, on_branch)
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in joint_solutions.status], dtype=bool)
+    lost = np.flatnonzero(~on_branch(joint_solutions, everyone) & reached)
     for number in np.unique(wanted_branch[lost]).tolist():
         rows = lost[wanted_branch[lost] == number]
         again = inverse(robot, position[rows], rotation[rows], branch=BRANCHES[number], seed=near[rows])
-        found = _better(found, again, rows, near, on_branch)
-    same = on_branch(found, everyone)
+        joint_solutions = _better(joint_solutions, again, rows, near, on_branch)
+    same = on_branch(joint_solutions, everyone)
     status = []
-    for row, one in enumerate(found.status):
-        if one.usable and not same[row]:
+    for row, pose_status in enumerate(joint_solutions.status):
+        if pose_status.usable and not same[row]:
             status.append(PoseStatus.BRANCH_LOST)
-        elif one is PoseStatus.BRANCH_LOST and same[row]:  # only the calibrated arm calls it otherwise
-            status.append(PoseStatus.BEYOND_LIMIT if found.beyond[row].any() else PoseStatus.NEAR_SINGULAR)
+        elif pose_status is PoseStatus.BRANCH_LOST and same[row]:  # only the calibrated arm calls it otherwise
+            status.append(PoseStatus.BEYOND_LIMIT if joint_solutions.beyond[row].any() else PoseStatus.NEAR_SINGULAR)
         else:
-            status.append(one)
-    branch = tuple(BRANCHES[number] for number in rule.numbers(nominal.forward_kinematics(found.joints)).tolist())
-    return FakeTargets(matrices(nominal, found.joints), replace(found, status=tuple(status), branch=branch))
+            status.append(pose_status)
+    branch = tuple(
+        BRANCHES[number] for number in rule.numbers(nominal.forward_kinematics(joint_solutions.joints)).tolist()
+    )
+    return FakeTargets(
+        matrices(nominal, joint_solutions.joints), replace(joint_solutions, status=tuple(status), branch=branch)
+    )
 
 
 def fake_targets_of(robots: Sequence[Robot], which: NDArray[np.intp], flange: Array, near: Array) -> FakeTargets:

@@ -280,10 +280,10 @@ def decimals_of(text: str) -> int:
     """Return how many decimals a number is written with; ``1.5e-3`` has four."""
     if "e" not in text and "E" not in text:
         return min(len(text.partition(".")[2]), _MOST)
-    found = _PARTS.fullmatch(text)
-    if found is None:
+    match = _PARTS.fullmatch(text)
+    if match is None:
         raise ValueError(f"{text!r} is no number")
-    return int(min(max(len(found[1]) - float(found[2] or 0), 0), _MOST))  # an exponent may have 5000 digits
+    return int(min(max(len(match[1]) - float(match[2] or 0), 0), _MOST))  # an exponent may have 5000 digits
 
 
 def rewritten(text: str, value: float, fewest: int) -> str:
@@ -340,8 +340,8 @@ def without_mark(text: str) -> str:
 
 def line_end(text: str, place: int = 0) -> str:
     """Return what ends the line that a place is on, for the last line what ends the first."""
-    found = _END.search(text, place) or _END.search(text)
-    return found[0] if found else "\n"
+    match = _END.search(text, place) or _END.search(text)
+    return match[0] if match else "\n"
 
 
 def indentation(text: str, place: int) -> str:

@@ -161,13 +161,13 @@ def _every_posture(nominal: Robot, flange: Array, form: ClosedForm) -> tuple[Arr
         starts = form.starts(position, rotation)
         return starts.joints, ~np.isnan(starts.joints[:, :, 0]) & ~starts.nearest
     # A controller with kinematics of its own has no closed form, but a nominal arm beside it has.
-    found = inverse(nominal, position, rotation, branch="all")
+    joint_solutions = inverse(nominal, position, rotation, branch="all")
     joints = np.full((len(flange), SLOTS, len(nominal.joints)), np.nan)
     possible = np.zeros(joints.shape[:2], dtype=bool)
-    slot = np.arange(len(found.pose)) - np.searchsorted(found.pose, found.pose)
-    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
-    joints[found.pose[reached], slot[reached]] = found.joints[reached]
-    possible[found.pose[reached], slot[reached]] = True
+    slot = np.arange(len(joint_solutions.pose)) - np.searchsorted(joint_solutions.pose, joint_solutions.pose)
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in joint_solutions.status], dtype=bool)
+    joints[joint_solutions.pose[reached], slot[reached]] = joint_solutions.joints[reached]
+    possible[joint_solutions.pose[reached], slot[reached]] = True
     return joints, possible
 
 
@@ -272,9 +272,9 @@ def _by_seeds(
     """Return the joints of an arm whose branches have no names: nearest to what the program says, else to zero."""
     zero = (0.0,) * len(nominal.joints)
     seeds = nominal.controller.to_model(np.array([configurations[i].near or zero for i in wanted]))
-    found = inverse(nominal, flange[wanted, :3, 3], flange[wanted, :3, :3], seed=seeds)
-    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status])
-    joints[np.array(wanted)[reached]] = found.joints[reached]
+    joint_solutions = inverse(nominal, flange[wanted, :3, 3], flange[wanted, :3, :3], seed=seeds)
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in joint_solutions.status])
+    joints[np.array(wanted)[reached]] = joint_solutions.joints[reached]
     reachable: NDArray[np.bool_] = np.asarray(~np.isnan(joints).any(axis=1))
     unspecified = [i for i in wanted if configurations[i].near is None]
     return ResolvedConfigurations(joints, reachable, unspecified[0] if unspecified else None)

@@ -203,11 +203,11 @@ class ResolvedProgram:
         """
         if not len(rows):
             return TipsFound(rows, near, np.zeros((0, 4, 4)), np.zeros((0, 4, 4)))
-        found = self._found(rows, base, flange, near, pushed=False)
-        good = found.solutions.usable
+        fake_targets = self._found(rows, base, flange, near, pushed=False)
+        good = fake_targets.solutions.usable
         tips = self._base.nominal[rows] @ self._poses[rows]
-        after = found.flange @ self._tool.nominal[rows]
-        return TipsFound(rows[good], found.joints[good], tips[good], after[good])
+        after = fake_targets.flange @ self._tool.nominal[rows]
+        return TipsFound(rows[good], fake_targets.joints[good], tips[good], after[good])
 
     @property
     def tips(self) -> Array:
@@ -241,14 +241,14 @@ class ResolvedProgram:
             if row not in self._kept:
                 reasons[row] = self._why_not(row)
         if len(rows):
-            found = self._found(rows, base, flange, self.joints_near(rows))
-            joints[rows] = found.joints
+            fake_targets = self._found(rows, base, flange, self.joints_near(rows))
+            joints[rows] = fake_targets.joints
             for at, row in enumerate(rows.tolist()):
-                if not found.solutions.status[at].usable:
-                    reasons[row] = _reason(found, at)
+                if not fake_targets.solutions.status[at].usable:
+                    reasons[row] = _reason(fake_targets, at)
             reasons |= self._changed_turns(rows, joints, reasons)
             on_edge = self._on_edge(rows, joints, reasons)
-            after[rows] = np.linalg.inv(self._base.nominal[rows]) @ found.flange @ self._tool.nominal[rows]
+            after[rows] = np.linalg.inv(self._base.nominal[rows]) @ fake_targets.flange @ self._tool.nominal[rows]
         # An offset that cannot be corrected goes along with the point that it begins at, where that stays on purpose.
         along = {row: self._kept[self._first(row)] for row in reasons if self._first(row) in self._kept}
         reasons = {row: reason for row, reason in reasons.items() if row not in along}
@@ -330,9 +330,9 @@ class ResolvedProgram:
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Return fake targets for poses in the frames, and with the tools, of targets; see :data:`Between`."""
         wanted = self._base.real(rows, base) @ poses @ np.linalg.inv(self._tool.real(rows, flange))
-        found = fake_targets_of(self._arms, self._arm[rows], wanted, near)
-        fakes = np.linalg.inv(self._base.nominal[rows]) @ found.flange @ self._tool.nominal[rows]
-        return fakes, found.solutions.usable
+        fake_targets = fake_targets_of(self._arms, self._arm[rows], wanted, near)
+        fakes = np.linalg.inv(self._base.nominal[rows]) @ fake_targets.flange @ self._tool.nominal[rows]
+        return fakes, fake_targets.solutions.usable
 
     def _found(
         self, rows: NDArray[np.intp], base: Shift, flange: Array, near: Array, *, pushed: bool = True

@@ -158,7 +158,7 @@ def _bodies(robot: Robot, ends: Sequence[int]) -> list[tuple[int, float, Coordin
         (ends[link.joint], link.mass, stayed(link.joint, link.cog, robot.values), link.inertia) for link in robot.masses
     ]
     bodies.append((len(robot.arm.elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
-    return [one for one in bodies if one[1] or any(one[3])]
+    return [body for body in bodies if body[1] or any(body[3])]
 
 
 def relief(robot: Robot, variables: Array) -> Array:

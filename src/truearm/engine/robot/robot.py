@@ -378,8 +378,10 @@ class Robot(RobotData):
         """
         from truearm.engine.robot.inverse.kinematics import inverse
 
-        found = inverse(self, positions, rotations, frame=frame, seed=seed, target=target, orientation=orientation)
-        return found.without_unreached()
+        joint_solutions = inverse(
+            self, positions, rotations, frame=frame, seed=seed, target=target, orientation=orientation
+        )
+        return joint_solutions.without_unreached()
 
     def jacobian(self, joints: ArrayLike | Postures, *, frame: Frame = "base", target: str | None = None) -> Array:
         """Return how the pose of the flange, or a target, follows the joint positions: the geometric Jacobian.

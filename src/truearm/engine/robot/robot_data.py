@@ -193,8 +193,8 @@ class RobotData:
     @property
     def bearings(self) -> tuple[float, ...]:
         """How far along its axis each joint's bearing lies from the joint's origin as it is now [m]."""
-        found = (self._bearing(joint) for joint in range(len(self.joints)))
-        return tuple(bearing - carried_by(offsets, self.values) for bearing, offsets in found)
+        generator = (self._bearing(joint) for joint in range(len(self.joints)))
+        return tuple(bearing - carried_by(offsets, self.values) for bearing, offsets in generator)
 
     @cached_property
     def offset_elements(self) -> Mapping[str, tuple[tuple[int, float], ...]]:

@@ -355,18 +355,18 @@ def _origin_edits(
     """Return what to put where in the bytes so that the joint has this origin; None keeps what it has."""
     new = {name: value for name, value in ((b"xyz", xyz), (b"rpy", rpy)) if value is not None}
     tag = child_tag(joint.tag, "origin", joint.where)
-    found = _START_TAG.match(source, (tag or joint.tag).start)
-    if found is None:
+    match = _START_TAG.match(source, (tag or joint.tag).start)
+    if match is None:
         raise ValueError("the parser found a start tag where there is none")
     if tag is None:
-        return [(found.end(), found.end(), b"<origin" + _attributes(new) + b"/>")]
+        return [(match.end(), match.end(), b"<origin" + _attributes(new) + b"/>")]
     edits = []
-    for attribute in _ATTRIBUTE.finditer(source, *found.span("attributes")):
+    for attribute in _ATTRIBUTE.finditer(source, *match.span("attributes")):
         value = new.pop(attribute["name"], None)
         if value is not None:
             edits.append((*attribute.span("value"), _respelled(attribute["value"], value)))
     if new:
-        end = found.end("attributes")
+        end = match.end("attributes")
         edits.append((end, end, _attributes(new)))
     return edits
 

@@ -236,10 +236,10 @@ def _root(tree: Tree) -> str:
 
 def child_tag(tag: Tag, name: str, where: str) -> Tag | None:
     """Return the child of this name, None if there is none; two are refused."""
-    found = [child for child in tag.children if child.name == name]
-    if len(found) > 1:
+    tags = [child for child in tag.children if child.name == name]
+    if len(tags) > 1:
         raise InputError(f"there is more than one <{name}>", where=where)
-    return found[0] if found else None
+    return tags[0] if tags else None
 
 
 def numbers(tag: Tag, attribute: str, count: int, where: str) -> tuple[float, ...] | None:

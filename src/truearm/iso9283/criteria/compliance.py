@@ -72,27 +72,27 @@ def evaluate_pushes(
         chosen = [
             (int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle))) for cycle in np.unique(pushes.cycle[mine])
         ]
-        found = [_line(pushes, direction, cycle, rows, way, turn, instrument.sigma) for cycle, rows in chosen]
-        slopes = np.array([line.slope for line in found])
+        push_lines = [_line(pushes, direction, cycle, rows, way, turn, instrument.sigma) for cycle, rows in chosen]
+        slopes = np.array([line.slope for line in push_lines])
         # What a reading leaves open of a slope, as the steps spread over the forces.
-        unknown = max((instrument.sigma / _spread(line.force) for line in found), default=0.0)
+        unknown = max((instrument.sigma / _spread(line.force) for line in push_lines), default=0.0)
         values.append(
             valued(
                 "compliance",
                 "position",
                 direction,
-                len(found),
+                len(push_lines),
                 test.cycles,
                 Conditions(),
-                float(slopes.mean()) if found else _NOTHING,
+                float(slopes.mean()) if push_lines else _NOTHING,
                 "compliance",
                 None,
                 unknown,
-                least=float(slopes.min()) if found else None,
-                largest=float(slopes.max()) if found else None,
+                least=float(slopes.min()) if push_lines else None,
+                largest=float(slopes.max()) if push_lines else None,
             )
         )
-        lines += found
+        lines += push_lines
     return tuple(values), tuple(lines)
 
 

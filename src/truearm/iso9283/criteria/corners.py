@@ -94,11 +94,11 @@ def corner_values(
     Three cycles give no interval: each value has the least and the largest of the cycles.
     """
     values: list[Value] = []
-    found: list[CornerCurves] = []
+    corner_curveses: list[CornerCurves] = []
     for run in runs_of(plan, samples, transform, "CR"):
         for number in range(1, len(run.path.vertices) - 1):
             here = _corner(run, number, max(plan.limit_band, 3 * instrument.sigma), instrument.sigma)
-            found.append(here)
+            corner_curveses.append(here)
             for id_, lengths, sparse in zip(("CR", "CO"), (here.rounding, here.overshoot), here.sparse, strict=True):
                 mean = float(lengths.mean())
                 coarse = instrument.sigma > COARSE * mean and (id_ == "CR" or mean > 0.0)
@@ -118,7 +118,7 @@ def corner_values(
                         float(lengths.max()),
                     )
                 )
-    return values, found
+    return values, corner_curveses
 
 
 def _corner(run: Run, number: int, band: float, sigma: float) -> CornerCurves:

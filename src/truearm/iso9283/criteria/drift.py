@@ -71,21 +71,21 @@ def drift_values(
     """
     values: list[Value] = []
     courses: list[DriftCourse] = []
-    for one in cycles:
-        under = Conditions(one.velocity, one.load, one.robot)
-        groups = groups_of(one)
-        course = _course(one, groups)
+    for cycle in cycles:
+        under = Conditions(cycle.velocity, cycle.load, cycle.robot)
+        groups = groups_of(cycle)
+        course = _course(cycle, groups)
         courses.append(course)
         n = min(course.cycles)
-        common = (one.pose, n, test.cycles, under)
+        common = (cycle.pose, n, test.cycles, under)
         unknown = math.sqrt(2.0) * instrument.sigma
         unknown_angle = math.sqrt(2.0) * (instrument.sigma_rot or 0.0)
         for id, course_of, scatter in (
-            ("dAP", course.ap, _scatter_of_accuracy(groups, one.command)),
+            ("dAP", course.ap, _scatter_of_accuracy(groups, cycle.command)),
             ("dRP", course.rp, _scatter_of_spread([group.points for group in groups], course.rp)),
         ):
             value, interval = _largest_change(course_of, scatter)
-            tied = _changes_by_tie(groups, one.command, alignment) if id == "dAP" else None
+            tied = _changes_by_tie(groups, cycle.command, alignment) if id == "dAP" else None
             left = unknown
             if id == "dAP" and interval is not None:
                 interval = interval[0], interval[1] + _raised(groups[0])
@@ -95,7 +95,7 @@ def drift_values(
             values.append(valued(id, "position", *common, value, "length", interval, left))
             for k, angle in enumerate(ANGLES):
                 value, interval = math.nan, None
-                if one.angles is not None:
+                if cycle.angles is not None:
                     value, interval = _change_of_angle(id, [group.angles[:, k] for group in groups])  # type: ignore[index]
                 values.append(valued(id, angle, *common, value, "angle", interval, unknown_angle))
     if not cycles:

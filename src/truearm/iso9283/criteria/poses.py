@@ -55,7 +55,7 @@ def missing_rows(plan: PerformancePlan, cycles: Sequence[Cycles]) -> tuple[str, 
     """Return what is missing in tests of poses that have rows: ``AP: P3``, ``vAP: P2 from y``, ``AP: P3 at 50 %``."""
     found = []
     for test in plan.tests:
-        mine = [one for one in cycles if one.test == test.id]
+        mine = [cycle for cycle in cycles if cycle.test == test.id]
         if mine:
             robots = sorted({one.robot for one in mine})
             found += [line for robot in robots for line in _missing_of(test, mine, robot, len(robots) > 1)]
@@ -65,7 +65,7 @@ def missing_rows(plan: PerformancePlan, cycles: Sequence[Cycles]) -> tuple[str, 
 
 
 def _missing_of(test: PlannedTest, cycles: Sequence[Cycles], robot: str, several: bool) -> list[str]:
-    there = {(one.pose, one.approach, one.velocity, one.load) for one in cycles if one.robot == robot}
+    there = {(cycle.pose, cycle.approach, cycle.velocity, cycle.load) for cycle in cycles if cycle.robot == robot}
     of = f" of {robot}" if several else ""
     approaches = test.approaches if test.id == "vAP" else ("",)
     conditions = [*product(test.velocities, test.loads)]
@@ -197,7 +197,7 @@ def evaluate(
         unusual = replace(
             unusual, wild=tuple(replace(one, changes=_changes(one, values, others)) for one in unusual.wild)
         )
-    clouds = tuple(_cloud(one) for one in cycles if one.test != "dAP")
+    clouds = tuple(_cloud(cycle) for cycle in cycles if cycle.test != "dAP")
     return PoseEvaluation(tuple(values), clouds, tuple(courses), unusual, missing_rows(plan, cycles))
 
 
@@ -207,7 +207,7 @@ def _evaluated(
     values: list[Value] = []
     courses: list[DriftCourse] = []
     for test in tests:
-        mine = [one for one in cycles if one.test == test.id]
+        mine = [cycle for cycle in cycles if cycle.test == test.id]
         if test.id == "dAP":
             made, found = drift_values(test, mine, judge.instrument, judge.alignment)
             values += made
@@ -246,7 +246,7 @@ def _cloud(one: Cycles) -> PoseCloud:
 
 def _conditions(test: PlannedTest, cycles: list[Cycles], *, robots: bool = True) -> list[Conditions]:
     """Return the conditions that were planned, of each robot that was measured."""
-    names = list(dict.fromkeys(one.robot for one in cycles)) if robots else [""]
+    names = list(dict.fromkeys(cycle.robot for cycle in cycles)) if robots else [""]
     return [Conditions(v, load, name) for name in names or [""] for v in test.velocities for load in test.loads]
 
 
@@ -258,9 +258,9 @@ def _same(one: Conditions, other: Conditions) -> bool:
 def _at_poses(cycles: Iterable[Cycles], under: Conditions, pose: str, *, any_robot: bool = False) -> list[Cycles]:
     """Return those cycles at a pose under a condition."""
     return [
-        one
-        for one in cycles
-        if one.pose == pose and _same(Conditions(one.velocity, one.load, "" if any_robot else one.robot), under)
+        cycle
+        for cycle in cycles
+        if cycle.pose == pose and _same(Conditions(cycle.velocity, cycle.load, "" if any_robot else cycle.robot), under)
     ]
 
 
@@ -271,15 +271,15 @@ def _pose_accuracy(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _M
     """
     for under in _conditions(test, cycles):
         for pose in test.places:
-            found = _at_poses(cycles, under, pose)
-            n = len(found[0]) if found else 0
+            cycleses = _at_poses(cycles, under, pose)
+            n = len(cycleses[0]) if cycleses else 0
             common = (pose, n, test.cycles, under)
-            if not found:
+            if not cycleses:
                 for id in ("AP", "RP"):
                     yield valued(id, "position", *common, _NOTHING, "length")
                     yield from (valued(id, angle, *common, _NOTHING, "angle") for angle in ANGLES)
                 continue
-            one = found[0]
+            one = cycleses[0]
             yield _accuracy(one, common, judge)
             interval = repeatability_interval(one.points)
             rp = float(repeatability(one.points)) if n > 1 else _NOTHING
@@ -342,10 +342,10 @@ def _variation(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
     """Yield vAP, the largest distance between the barycentres of the approaches, and the largest angle between them."""
     for under in _conditions(test, cycles):
         for pose in test.places:
-            found = _at_poses(cycles, under, pose)
-            n = min((len(one) for one in found), default=0)
-            enough = len(found) >= len(test.approaches)
-            yield from _differences("vAP", found, (pose, n, test.cycles, under), judge, enough=enough, angles=True)
+            cycleses = _at_poses(cycles, under, pose)
+            n = min((len(one) for one in cycleses), default=0)
+            enough = len(cycleses) >= len(test.approaches)
+            yield from _differences("vAP", cycleses, (pose, n, test.cycles, under), judge, enough=enough, angles=True)
 
 
 def _differences(id: str, found: list[Cycles], common: _Common, judge: _Judge, *, enough: bool, angles: bool) -> _Made:
@@ -419,11 +419,11 @@ def _exchangeability(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> 
     for under in _conditions(test, cycles, robots=False):
         whole: list[Cycles] = []
         for pose in test.places:
-            found = _at_poses(cycles, under, pose, any_robot=True)
-            whole += found
-            n = min((len(one) for one in found), default=0)
-            enough = len(found) >= ROBOTS
-            yield from _differences("E", found, (pose, n, test.cycles, under), judge, enough=enough, angles=False)
+            cycleses = _at_poses(cycles, under, pose, any_robot=True)
+            whole += cycleses
+            n = min((len(one) for one in cycleses), default=0)
+            enough = len(cycleses) >= ROBOTS
+            yield from _differences("E", cycleses, (pose, n, test.cycles, under), judge, enough=enough, angles=False)
         n = min((len(one) for one in whole), default=0)
         enough = len(whole) >= ROBOTS * len(test.places)
         yield from _differences("E", whole, ("all poses", n, test.cycles, under), judge, enough=enough, angles=False)

@@ -55,9 +55,9 @@ def alike_cycles(cycles: Sequence[Cycles]) -> tuple[AlikeCycles, ...]:
     is left out, for it shall change.
     """
     parts: dict[tuple[str, float, float], list[Cycles]] = {}
-    for one in cycles:
-        if one.test != "dAP" and len(one) >= _LEAST_CYCLES:
-            parts.setdefault((one.test, one.velocity, one.load), []).append(one)
+    for cycle in cycles:
+        if cycle.test != "dAP" and len(cycle) >= _LEAST_CYCLES:
+            parts.setdefault((cycle.test, cycle.velocity, cycle.load), []).append(cycle)
     found = []
     for key, groups in parts.items():
         vectors = _vectors(groups)
@@ -77,11 +77,11 @@ def alike_cycles(cycles: Sequence[Cycles]) -> tuple[AlikeCycles, ...]:
 
 def _vectors(groups: Sequence[Cycles]) -> Array:
     """Return the positions of all groups in the cycles that all have, about their means, ``(n, 3 groups)``."""
-    common = functools.reduce(np.intersect1d, [one.cycle for one in groups])
+    common = functools.reduce(np.intersect1d, [group.cycle for group in groups])
     columns = []
-    for one in groups:
-        _, _, rows = np.intersect1d(common, one.cycle, return_indices=True)
-        about = one.points[rows] - one.points[rows].mean(axis=0)
+    for group in groups:
+        _, _, rows = np.intersect1d(common, group.cycle, return_indices=True)
+        about = group.points[rows] - group.points[rows].mean(axis=0)
         size = float(np.linalg.norm(about))
         if size > 1e-12:
             columns.append(about / size)
@@ -157,16 +157,16 @@ class UnusualRows:
 
 def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRows:
     """Return rows that lie far from the others, in the order of the plan, and what else is unusual about them."""
-    groups = [part for one in cycles for part in (groups_of(one) if one.test == "dAP" else [one])]
+    groups = [part for cycle in cycles for part in (groups_of(cycle) if cycle.test == "dAP" else [cycle])]
     wild: list[WildRow] = []
     two: list[TwoPlaces] = []
     kinds: tuple[Kind, Kind] = ("position", "orientation")
     for kind, least in zip(kinds, instrument.least_scatter(_LEAST_SCATTER), strict=True):
-        mine = [one for one in groups if kind == "position" or one.angles is not None]
+        mine = [group for group in groups if kind == "position" or group.angles is not None]
         if mine:
-            found = _Rows(mine, kind, least)
-            places = found.two_places()
-            named, alike = found.wild(places)
+            rows = _Rows(mine, kind, least)
+            places = rows.two_places()
+            named, alike = rows.wild(places)
             wild += named
             two += [*places.values(), *alike]
     return UnusualRows(tuple(wild), tuple(two), alike_cycles(cycles))
@@ -175,7 +175,7 @@ def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRow
 def without(cycles: Sequence[Cycles], wild: Sequence[WildRow]) -> list[Cycles]:
     """Return cycles without some rows."""
     lines = np.array([int(one.of.line[0]) for one in wild])
-    left = [one.rows(~np.isin(one.line, lines)) for one in cycles]
+    left = [cycle.rows(~np.isin(cycle.line, lines)) for cycle in cycles]
     return [one for one in left if len(one)]
 
 
@@ -185,10 +185,10 @@ class _Rows:
     def __init__(self, groups: list[Cycles], kind: Kind, least: float) -> None:
         self.groups = groups
         self.kind: Kind = kind
-        numbers = [one.points if kind == "position" or one.angles is None else one.angles for one in groups]
+        numbers = [group.points if kind == "position" or group.angles is None else group.angles for group in groups]
         self.numbers = np.concatenate(numbers)
-        self.line = np.concatenate([one.line for one in groups])
-        self.counts = np.array([len(one) for one in groups])
+        self.line = np.concatenate([group.line for group in groups])
+        self.counts = np.array([len(group) for group in groups])
         self.begin = np.cumsum(self.counts) - self.counts
         self.group = np.repeat(np.arange(len(groups)), self.counts)
         self.small = self.counts < _SMALL

@@ -400,14 +400,14 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
             cure="Compare results of one plan." if unlike else "Evaluate the same criteria of both.",
         )
     curves = {
-        key_of(one.id, one.where, one.conditions): Course(_numbers(one.along_mm), _numbers(one.distance_mm))
-        for one in second.curves
-        if _unlike(first, second, one.id, one.where, one.conditions) is None
+        key_of(curve.id, curve.where, curve.conditions): Course(_numbers(curve.along_mm), _numbers(curve.distance_mm))
+        for curve in second.curves
+        if _unlike(first, second, curve.id, curve.where, curve.conditions) is None
     }
     offsets = {
-        key_of(one.id, one.where, one.conditions): _numbers(one.offset_mm)
-        for one in second.offsets
-        if _unlike(first, second, one.id, one.where, one.conditions) is None
+        key_of(offset.id, offset.where, offset.conditions): _numbers(offset.offset_mm)
+        for offset in second.offsets
+        if _unlike(first, second, offset.id, offset.where, offset.conditions) is None
     }
     drawn = (curves, offsets) if same_tie else ({}, {})
     told = {why: tuple(ids) for why, ids in unlike.items()}

@@ -133,7 +133,9 @@ def other_cube(clouds: tuple[PoseCloud, ...], side: float) -> OtherCube | None:
     for (test, *_), members in groups.items():
         if len(members) < 2:
             continue
-        commanded, attained = (np.array([getattr(one, name) for one in members]) for name in ("command", "barycentre"))
+        commanded, attained = (
+            np.array([getattr(member, name) for member in members]) for name in ("command", "barycentre")
+        )
         found = _explained(commanded, attained - commanded, side)
         if found is not None:
             return OtherCube(str(test), *found)

@@ -48,8 +48,8 @@ _CIRCLE: Final = np.linspace(0.0, 2.0 * np.pi, 73)
 
 def fastest(things: Sequence[PoseCloud]) -> list[PoseCloud]:
     """Return those at the fastest velocity and the largest load."""
-    velocity = max((one.velocity for one in things), default=0.0)
-    of_it = [one for one in things if one.velocity == velocity]
+    velocity = max((thing.velocity for thing in things), default=0.0)
+    of_it = [thing for thing in things if thing.velocity == velocity]
     load = max((one.load for one in of_it), default=0.0)
     return [one for one in of_it if one.load == load]
 
@@ -86,7 +86,7 @@ def pose_pictures(
         other: Another result, whose accuracy is drawn beside this one's.
     """
     drawings: list[Section] = []
-    accuracy = fastest([one for one in clouds if one.test == "AP"])
+    accuracy = fastest([cloud for cloud in clouds if cloud.test == "AP"])
     # Of several robots the first: the picture is of one.
     accuracy = sorted((one for one in accuracy if one.robot == accuracy[0].robot), key=lambda one: one.pose)
     if accuracy:
@@ -100,7 +100,7 @@ def pose_pictures(
             )
         )
         drawings.append(_accuracy(plan, accuracy, under, other))
-    of_test = {test: fastest([one for one in clouds if one.test == test]) for test in ("vAP", "E")}
+    of_test = {test: fastest([cloud for cloud in clouds if cloud.test == test]) for test in ("vAP", "E")}
     others: list[tuple[Sequence[Any], str, str, str, Callable[[Any], Figure]]] = [
         (
             of_test["vAP"],

@@ -73,13 +73,13 @@ def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Se
         ("AT", "paths", "Deviation along the paths"),
         ("AT-reorientation", "paths-reoriented", "Deviation along the path on reorientation"),
     ):
-        courses = _fastest([one for one in found.deviations if one.run.test == test])
+        courses = _fastest([deviation for deviation in found.deviations if deviation.run.test == test])
         if courses:
             words = (
                 f"Distance from the command in planes at right angles to it, {_under(courses[0].run)}. "
                 "AT is the largest of the barycentre's; the band is its 95 % interval at each station for itself."
             )
-            beside = [_course(one, other) for one in courses]
+            beside = [_course(course, other) for course in courses]
             if any(beside):
                 words += " Dashed: the barycentre of the other result."
             drawings.append(pictured(name, title, words, _deviations(courses, beside)))
@@ -110,10 +110,10 @@ def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Se
 
 def _runs(found: Evaluation) -> list[Run]:
     runs = [
-        *(one.run for one in found.deviations),
-        *(one.run for one in found.corners),
-        *(one.run for one in found.velocities),
-        *(one.run for one in found.weaves),
+        *(deviation.run for deviation in found.deviations),
+        *(corner.run for corner in found.corners),
+        *(velocity.run for velocity in found.velocities),
+        *(weave.run for weave in found.weaves),
     ]
     return list({id(run): run for run in runs}.values())
 
@@ -125,7 +125,7 @@ def _fastest(curves: Sequence[_Curves]) -> list[_Curves]:
         return one.run.conditions.velocity or 0.0, one.run.conditions.load or 0.0
 
     most = max(map(of, curves), default=(0.0, 0.0))
-    return [one for one in curves if of(one) == most]
+    return [curve for curve in curves if of(curve) == most]
 
 
 def _under(run: Run) -> str:
@@ -260,7 +260,7 @@ _ANGLES: tuple[Component, ...] = ("a", "b", "c")
 def iso9283_report(found: Iso9283Evaluation) -> str:
     """Return the report: the criteria at their worst places, pictures, and every value."""
     measured = [value for value in found.values if value.status != "not-measured"]
-    worst = tuple(tuple(map(_unbroken, one.cells)) for one in worst_places(found.values))
+    worst = tuple(tuple(map(_unbroken, place.cells)) for place in worst_places(found.values))
     tables = [tabled("Criteria at their worst places", HEADING, worst, texts=(1, 4, 5))]
     if found.comparison is not None:
         tables.append(_compared(found.comparison))

@@ -256,14 +256,14 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
             )
         )
     if found.wild_pushes:
-        told = " ".join(_push_words(one) for one in found.wild_pushes)
+        told = " ".join(_push_words(push) for push in found.wild_pushes)
         notices.append(
             WILD_PUSH(
                 f"{told} The standard excludes no reading, and none was left out.",
             )
         )
     if places:
-        told = "; ".join(_places_words(one) for one in places[:_TOLD])
+        told = "; ".join(_places_words(place) for place in places[:_TOLD])
         more = f"; and {len(places) - _TOLD} more" if len(places) > _TOLD else ""
         notices.append(
             TWO_PLACES(

@@ -45,20 +45,19 @@ def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tupl
     """Return what is to be said of courses that are one group alone, or do not last as long as planned."""
     planned = 3600.0 * plan.hours
     single, other, timeless = [], [], False
-    for one in courses:
-        name = (
-            f"{one.pose}{f' of {one.robot}' if one.robot else ''}, {100 * one.velocity:g} %, load {100 * one.load:g} %"
-        )
-        if len(one.cycles) < 2:
-            single.append(f"{name} ({one.cycles[0]} cycles)")
-        elif not np.isfinite(one.time).all():
+    for course in courses:
+        of = f" of {course.robot}" if course.robot else ""
+        name = f"{course.pose}{of}, {100 * course.velocity:g} %, load {100 * course.load:g} %"
+        if len(course.cycles) < 2:
+            single.append(f"{name} ({course.cycles[0]} cycles)")
+        elif not np.isfinite(course.time).all():
             timeless = True
         else:
-            lasts = float(one.time[-1] - one.time[0])
+            lasts = float(course.time[-1] - course.time[0])
             if not _fits(lasts, planned):
                 units = [unit for unit, seconds in _UNITS.items() if _fits(lasts * seconds, planned)]
                 asked = f" (are the times in {units[0]}?)" if units else ""
-                other.append(f"{name}: {len(one.cycles)} groups over {lasts / 3600.0:.3g} h{asked}")
+                other.append(f"{name}: {len(course.cycles)} groups over {lasts / 3600.0:.3g} h{asked}")
     made = []
     if single:
         made.append(
@@ -109,8 +108,8 @@ def _low(plan: PerformancePlan, pushes: Sequence[PushLine]) -> Notice | None:
         return None
     most = GRAVITY * plan.rated_load * max(test.loads)
     largest: dict[str, float] = {}
-    for one in pushes:
-        largest[one.direction] = max(largest.get(one.direction, 0.0), float(one.force.max()))
+    for push in pushes:
+        largest[push.direction] = max(largest.get(push.direction, 0.0), float(push.force.max()))
     low = [direction for direction, force in largest.items() if force < _LOW * most]
     if not low:
         return None
@@ -140,9 +139,9 @@ def _sideways(pushes: Sequence[PushLine], instrument: Instrument) -> Notice | No
     to a force than along it. Forces under the names of other axes change columns of that matrix: then it has a negative
     one. Where not all axes were pushed along, the matrix is not known.
     """
-    names = tuple(dict.fromkeys(one.direction for one in pushes))
+    names = tuple(dict.fromkeys(push.direction for push in pushes))
     error = {name: _standard_error(pushes, name, instrument) for name in names}
-    slope = {name: np.mean([one.slopes for one in pushes if one.direction == name], axis=0) for name in names}
+    slope = {name: np.mean([push.slopes for push in pushes if push.direction == name], axis=0) for name in names}
     by_axis = {
         axis: [(1.0 if name[0] == "+" else -1.0) * slope[name] for name in names if name[1] == axis] for axis in "xyz"
     }
@@ -168,9 +167,9 @@ def _sideways(pushes: Sequence[PushLine], instrument: Instrument) -> Notice | No
 
 def _standard_error(pushes: Sequence[PushLine], name: str, instrument: Instrument) -> float:
     squares: list[float] = []
-    for one in pushes:
-        if one.direction == name:
-            about: Array = one.force - one.force.mean()
+    for push in pushes:
+        if push.direction == name:
+            about: Array = push.force - push.force.mean()
             squares.append(float(about @ about))
     return instrument.sigma / float(np.sqrt(sum(squares)))
 
@@ -240,8 +239,8 @@ def _times(found: Evaluation, instrument: Instrument) -> Notice | None:
 
 def _clocks(found: Evaluation) -> Iterator[tuple[str, Clock, float]]:
     """Yield whose each clock is, and how fast the tip is there: at rest where it enters the band [m/s]."""
-    runs = [one.run for one in found.velocities] + [one.run for one in found.deviations]
-    runs += [one.run for one in found.corners] + [one.run for one in found.weaves]
+    runs = [velocity.run for velocity in found.velocities] + [deviation.run for deviation in found.deviations]
+    runs += [corner.run for corner in found.corners] + [weave.run for weave in found.weaves]
     for run in runs:
         for clock in {id(cycle.clock): cycle.clock for cycle in run.cycles}.values():
             yield f"{run.test} on {run.path.path.name}", clock, run.velocity
@@ -352,10 +351,12 @@ UNUSUAL_SAMPLES: Final = Rule(
 def _unusual(records: Sequence[_Record]) -> Notice | None:
     named = []
     for record in records:
-        for one in unusual_samples(record.times, record.positions, record.places, record.rounding):
-            line = int(record.lines[one.cycle][one.sample])
-            text = f"line {line} (cycle {record.numbers[one.cycle]} of {record.name}, {1e3 * one.distance:.2g} mm)"
-            named.append((one.distance, text))
+        for sample in unusual_samples(record.times, record.positions, record.places, record.rounding):
+            line = int(record.lines[sample.cycle][sample.sample])
+            text = (
+                f"line {line} (cycle {record.numbers[sample.cycle]} of {record.name}, {1e3 * sample.distance:.2g} mm)"
+            )
+            named.append((sample.distance, text))
     if not named:
         return None
     return UNUSUAL_SAMPLES(

@@ -290,22 +290,22 @@ class _Layout:
             if words:
                 self.missed = f"a posture that keeps clear at every pose ({words})"
                 continue
-            found = inverse(self.robot, position, rotation, target=self.target, seed=seed, branch=branch)
-            usable = np.array([status.usable for status in found.status])
+            joint_solutions = inverse(self.robot, position, rotation, target=self.target, seed=seed, branch=branch)
+            usable = np.array([status.usable for status in joint_solutions.status])
             if not usable.all():
                 self.missed = names[int(np.flatnonzero(~usable)[0])]
                 continue
             far = [
                 name
                 for name, rows in on_paths
-                if np.abs(np.diff(found.joints[rows], axis=0)).max(initial=0.0) > _LARGEST_MOVE
+                if np.abs(np.diff(joint_solutions.joints[rows], axis=0)).max(initial=0.0) > _LARGEST_MOVE
             ]
-            words = "" if unclear is None or far else unclear(found.joints)
+            words = "" if unclear is None or far else unclear(joint_solutions.joints)
             if words:
                 self.missed = f"a posture that keeps clear on every path ({words})"
                 continue
             if not far:
-                self.found = found.joints
+                self.found = joint_solutions.joints
                 return True
             self.missed = f"{far[0]} without a change of posture"
         return False
@@ -324,7 +324,7 @@ class _Layout:
             there = inverse(self.robot, at, turned, target=self.target, branch=name)
             if there.status[0].usable:
                 postures.append((there.joints[0], name))
-        return sorted(postures, key=lambda one: float(np.abs(one[0] - first.joints[0]).max()))
+        return sorted(postures, key=lambda posture: float(np.abs(posture[0] - first.joints[0]).max()))
 
     def plan(
         self,
@@ -344,7 +344,7 @@ class _Layout:
             self.poses(),
             self.paths,
             self.starts(),
-            tuple(_test(one, velocities, loads, self) for one in self.tests),
+            tuple(_test(test, velocities, loads, self) for test in self.tests),
             rated_load,
             rated_velocity,
             limit_band,

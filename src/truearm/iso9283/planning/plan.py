@@ -90,8 +90,8 @@ def planned(asked: PlanTests) -> Iso9283Plan:
         programs = written_programs(
             plan, language, 2.0 if asked.dwell is None else asked.dwell, record, warnings, cell_unknown=cell is None
         )
-    found = Iso9283Plan(plan, asked.again, tuple(warnings), files_of(*given), programs, kept)
-    return found if folder is None else _written(found, folder, record, given)
+    iso9283_plan = Iso9283Plan(plan, asked.again, tuple(warnings), files_of(*given), programs, kept)
+    return iso9283_plan if folder is None else _written(iso9283_plan, folder, record, given)
 
 
 def _written(found: Iso9283Plan, folder: Path, record: Path | None, given: Sequence[object]) -> Iso9283Plan:

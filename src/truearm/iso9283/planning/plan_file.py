@@ -195,12 +195,12 @@ def read_plan(path: Path) -> PerformancePlan:
             "the robot's file lies beside the plan", where=f"{path}, robot", came=content.robot, allowed="a file's name"
         )
     robot = read_robot(beside)
-    if content.target is not None and content.target not in {one.name for one in robot.targets}:
+    if content.target is not None and content.target not in {target.name for target in robot.targets}:
         raise InputError(
             "the robot has no such target",
             where=f"{path}, target",
             came=content.target,
-            allowed=", ".join(one.name for one in robot.targets) or "none",
+            allowed=", ".join(target.name for target in robot.targets) or "none",
         )
     if content.cube.plane not in PLANES:
         raise InputError(
@@ -302,11 +302,11 @@ def _check_approaches(
                 cure="Add it to starts.",
             )
     elif test.criterion == "compliance":
-        for one in test.approaches:
-            _known(one, ("+x", "-x", "+y", "-y", "+z", "-z"), where, "direction")
+        for approach in test.approaches:
+            _known(approach, ("+x", "-x", "+y", "-y", "+z", "-z"), where, "direction")
     elif test.criterion == "posing-time":
-        for one in test.approaches:
-            _known(one, poses, where, "pose")
+        for approach in test.approaches:
+            _known(approach, poses, where, "pose")
     elif test.approaches:
         raise InputError("this test has no approaches", where=where, came=", ".join(test.approaches))
 
@@ -346,7 +346,7 @@ def _planned(name: str, entry: _Pose | _Start, tip: Tip, cube: Cube) -> PlannedP
 
 
 def _planned_path(entry: _Path) -> PlannedPath:
-    points = np.array([_metres(one) for one in entry.points])
+    points = np.array([_metres(point) for point in entry.points])
     count = {"polyline": None, "circle": 2, "weave": 2}[entry.kind]
     if count is not None and len(points) != count:
         raise InputError(f"a {entry.kind} has {count} points", came=len(points))

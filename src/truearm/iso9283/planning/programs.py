@@ -502,7 +502,7 @@ def _speed_notices(robot: Robot, language: Language) -> list[Notice]:
 
 def _texts(programs: Sequence[MotionProgram], language: Language) -> dict[str, str]:
     assert language.motion is not None
-    return {f"{_FOLDER}/{name}": text for one in programs for name, text in language.motion(one).items()}
+    return {f"{_FOLDER}/{name}": text for program in programs for name, text in language.motion(program).items()}
 
 
 WAYS_NEAR: Final = Rule(

@@ -151,7 +151,7 @@ def poses_text(read: AttainedPoses) -> str:
         columns.append(quaternion_from_rotation(read.rotation))
     mark = [YES] if read.simulated else []
     heading += [SIMULATED] if mark else []
-    criterion, robot, pose, approach = (_texts(one) for one in names)
+    criterion, robot, pose, approach = (_texts(name) for name in names)
     rows = zip(
         criterion,
         robot,

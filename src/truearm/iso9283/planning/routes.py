@@ -130,7 +130,7 @@ class Routes:
         names = [f"{name}, move {move}" for move in moves] if len(lengths) > 1 else [name] * len(places)
         turned = np.broadcast_to(rotation, (len(places), 3, 3))
         joints = self._followed(names, positions, turned, near)[marks]
-        legs = tuple(Leg(one, pace=pace) for one in joints[1:])
+        legs = tuple(Leg(joint, pace=pace) for joint in joints[1:])
         return Route(joints[0], legs, min(zone, _ZONE_SHARE * float(lengths.min())))
 
     def _turning(self, name: str, path: PlannedPath) -> Route:
@@ -149,7 +149,7 @@ class Routes:
         places = self.robot.forward(joints, frame="controller")[0]
         lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
         paces = lengths / (way.length / (TURNS * count))
-        legs = tuple(Leg(one, pace=float(pace)) for one, pace in zip(joints[1:], paces, strict=True))
+        legs = tuple(Leg(joint, pace=float(pace)) for joint, pace in zip(joints[1:], paces, strict=True))
         return Route(joints[0], legs, min(ZONE, _ZONE_SHARE * float(lengths.min())))
 
     def _followed(self, names: list[str], positions: Array, rotations: Array, near: Array | None = None) -> Array:
@@ -163,8 +163,8 @@ class Routes:
         branch = None
         if self._rule is not None and first.status[0].usable:
             branch = BRANCHES[int(self._rule.numbers(self.robot.forward_kinematics(start[None]))[0])]
-        found = inverse(self.robot, positions, rotations, target=self.target, seed=start, branch=branch)
-        for row, status in enumerate(found.status):
+        joint_solutions = inverse(self.robot, positions, rotations, target=self.target, seed=start, branch=branch)
+        for row, status in enumerate(joint_solutions.status):
             if not status.usable:
                 raise InputError(
                     "the robot cannot go this way",
@@ -172,7 +172,7 @@ class Routes:
                     came=status.value,
                     cure="Plan again, in a smaller cube or elsewhere.",
                 )
-        joints = found.joints.copy()
+        joints = joint_solutions.joints.copy()
         for row in range(1, len(joints)):
             joints[row] = nearest_turns(self.robot, joints[row : row + 1], joints[row - 1])[0]
         steps = np.abs(np.diff(joints, axis=0)).max(axis=1)

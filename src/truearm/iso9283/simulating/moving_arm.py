@@ -284,17 +284,17 @@ class MovingArm:
         Raises:
             InputError: If a pose is out of reach.
         """
-        found = inverse(self.nominal, frames[:, :3, 3], frames[:, :3, :3], target=self.target, seed=near)
-        lost = [row for row, status in enumerate(found.status) if not status.usable]
+        joint_solutions = inverse(self.nominal, frames[:, :3, 3], frames[:, :3, :3], target=self.target, seed=near)
+        lost = [row for row, status in enumerate(joint_solutions.status) if not status.usable]
         if lost:
             x, y, z = (1e3 * frames[lost[0], :3, 3]).tolist()
             raise InputError(
                 "the robot cannot come to a commanded pose",
                 where=self.nominal.name,
-                came=f"x {x:.1f}, y {y:.1f}, z {z:.1f} mm: {found.status[lost[0]].value}",
+                came=f"x {x:.1f}, y {y:.1f}, z {z:.1f} mm: {joint_solutions.status[lost[0]].value}",
                 cure="Plan poses and paths that the robot can reach in one posture.",
             )
-        return found.joints
+        return joint_solutions.joints
 
     def at_rest(self, joints: Array, approach: Array, working: Array, force: Array | None = None) -> Array:
         """Return where the tip stands in the world, ``(n, 4, 4)`` [m].

@@ -197,7 +197,7 @@ def simulated(asked: SimulateTests) -> Iso9283Simulation:
     if planned.test("E") is not None:
         robots += [TrueRobot(_another(nominal, twin, truth, rng), tip) for _ in range(ROBOTS - 1)]
     campaign = simulated_campaign(planned, robots, base, tracker, rng, corrected=correct, progress=asked.progress)
-    found = Iso9283Simulation(
+    iso9283_simulation = Iso9283Simulation(
         nominal.name,
         truth.name if isinstance(truth, Robot) else str(truth),
         None if corrected is None else corrected.name if isinstance(corrected, Robot) else str(corrected),
@@ -212,8 +212,8 @@ def simulated(asked: SimulateTests) -> Iso9283Simulation:
     )
     if folder is not None:
         asked.progress("writing")
-        found.save(folder)
-    return found
+        iso9283_simulation.save(folder)
+    return iso9283_simulation
 
 
 def _plan(plan: object) -> PerformancePlan:
@@ -336,17 +336,17 @@ def _correction(
 
     def corrected(mass: float, frames: Array, near: Array) -> Array:
         carrying = calibrated.with_payload(Payload(mass, tip.translation))
-        found = fake_targets(carrying, in_identified @ frames @ to_flange, near).solutions
-        lost = [row for row, status in enumerate(found.status) if not status.usable]
+        joint_solutions = fake_targets(carrying, in_identified @ frames @ to_flange, near).solutions
+        lost = [row for row, status in enumerate(joint_solutions.status) if not status.usable]
         if lost:
             raise InputError(
                 "the calibrated robot cannot come to a pose of the plan",
                 parameter="corrected",
                 where=calibrated.name,
-                came=found.status[lost[0]].value,
+                came=joint_solutions.status[lost[0]].value,
                 cure="Plan in a smaller cube.",
             )
-        return found.joints
+        return joint_solutions.joints
 
     return corrected, [] if off <= max(_NO_BETTER * nominal, 3.0 * tracker.sigma) else [_of_another(off, nominal)]
 

@@ -81,8 +81,8 @@ class CellPage:
             robot = window.robot()
         except InputError:
             return  # what is known of the robot says so
-        for one in load_notices(robot):
-            window.tell(one)
+        for notice in load_notices(robot):
+            window.tell(notice)
         away, length = math.hypot(*payload.cog), self._scene().length
         if away > length:
             text = (

@@ -104,15 +104,15 @@ class CheckPage:
 
         def done(found: Checked) -> None:
             self._checked, self._of = found, of
-            rows = [[one.level, one.code, words.spelled(one.message)] for one in found.findings]
+            rows = [[finding.level, finding.code, words.spelled(finding.message)] for finding in found.findings]
             shown = words.lines(found.outcome.lines[:1])
             shown += words.table(["level", "finding", "what it says"], rows) if rows else ""
-            messages = [one.message for one in found.findings]
+            messages = [finding.message for finding in found.findings]
             rest = [line for line in found.outcome.lines[1:] if not any(text in line for text in messages)]
             self._found.content = shown + words.lines(rest)
-            names = [_name(number, one) for number, one in enumerate(found.findings, 1)]
+            names = [_name(number, finding) for number, finding in enumerate(found.findings, 1)]
             offer(self._finding, (_ANY, *names), next(iter(names), _ANY), None)
-            self._draws.value = any(one.at for one in found.findings)  # what is right does not stand in the way
+            self._draws.value = any(finding.at for finding in found.findings)  # what is right does not stand in the way
             self._choose()
 
         window.start(
@@ -142,9 +142,9 @@ class CheckPage:
 
     def _named(self, found: Checked) -> list[int]:
         """Return the readings of the chosen finding; all if none is chosen."""
-        for number, one in enumerate(found.findings, 1):
-            if self._finding.value == _name(number, one):
-                return [int(k) for k in found.rows_of(one.at)]
+        for number, finding in enumerate(found.findings, 1):
+            if self._finding.value == _name(number, finding):
+                return [int(k) for k in found.rows_of(finding.at)]
         return list(range(len(found.readings)))
 
     def _chosen(self, found: Checked) -> list[int]:
@@ -175,7 +175,7 @@ class CheckPage:
         points = found.points @ base.rotation.T + np.array(base.translation)
         rows = self._chosen(found)
         gone = {(one.configuration, one.target) for one in self._excluded}
-        out = [k for k, one in enumerate(found.readings) if one in gone]
+        out = [k for k, reading in enumerate(found.readings) if reading in gone]
         others = sorted(set(range(len(points))) - {*rows, *out})
         for (name, colour, size), some in zip(_DRAWN, (others, [k for k in rows if k not in out], out), strict=True):
             scene.show_points(name, _seen(points[some]), colour, size)

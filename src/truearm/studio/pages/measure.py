@@ -245,20 +245,20 @@ class MeasurePage:
     def _end(self) -> None:
         """Write what is there, and end; Start goes on."""
         measuring = self._going()
-        found = measuring.finish()
+        measured = measuring.finish()
         self._close()
-        self._window.tell_lines("Measure", measuring.outcome(found))
+        self._window.tell_lines("Measure", measuring.outcome(measured))
         self._window.refresh()
 
     def _hand_over(self, measuring: Measuring) -> None:
         """Write what is there and choose it as the project's measurements; say what came of it, unless that stands."""
-        found = measuring.finish()
+        measured = measuring.finish()
         self._noted()
-        outcome, before = measuring.outcome(found), self._told
+        outcome, before = measuring.outcome(measured), self._told
         self._told = outcome
         if outcome != before:
             self._window.tell_lines("Measure", outcome)
-        if not found.files:
+        if not measured.files:
             raise InputError(
                 "no reading of a target is kept, so there are no measurements", cure="Go on, or choose another plan."
             )
@@ -337,7 +337,7 @@ class MeasurePage:
             + words.table(HEAD, measuring.rows(_ROWS))
             + (words.table(("readings", "why not kept", "what it means"), reasons) if reasons else "")
         )
-        warnings = [one for one in measuring.measured().warnings if one.code != "unfinished"]
+        warnings = [warning for warning in measuring.measured().warnings if warning.code != "unfinished"]
         self._notices.content = words.notices(warnings)
         step = session.next
         points = (NONE,) if step is None else step.names

@@ -149,7 +149,7 @@ class PerformancePage:
         result = self._result_file
         told = other_evaluations(result, self._window.project, self._window.robot())
         if result is not None:
-            told += [Notice(one.code, one.message, one.level) for one in result.warnings]
+            told += [Notice(warning.code, warning.message, warning.level) for warning in result.warnings]
         of = "" if result is None else words.lines([evaluated_with(result)])
         self._of.content = of + words.notices(told)
 

@@ -42,7 +42,7 @@ class RobotLooks:
         if urdf_source(name) is None:
             return None
         stamps = [project.path(one).stat() for one in project.names(*_FILES) if exists(project.path(one))]
-        of = (name, *((one.st_mtime_ns, one.st_size) for one in stamps))
+        of = (name, *((stamp.st_mtime_ns, stamp.st_size) for stamp in stamps))
         if of != self._of:
             self._of, self._looks = of, self._read(name)
         looks = self._looks

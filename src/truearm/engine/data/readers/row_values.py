@@ -174,7 +174,7 @@ SIGMA_UNEVEN: Final = Rule(
 
 def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list[Notice]:
     """Say if deviations of the three coordinates of a reading are far apart: a reading has one for all of them."""
-    found: list[Notice] = []
+    notices: list[Notice] = []
     for name, whole in (("sigma", "x, y and z"), ("sigma_rot", "the three angles")):
         ratios = []
         for number, reading in enumerate(content.readings, 1):
@@ -188,14 +188,14 @@ def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list
         apart = np.concatenate([*ratios, np.zeros(0)])
         if not len(apart) or np.median(apart) < _UNEVEN:
             continue
-        found.append(
+        notices.append(
             SIGMA_UNEVEN(
                 f"The deviations of {whole} of one reading are {np.median(apart):.2g} times apart in half of the "
                 f"readings or more, and up to {apart.max():.2g} times. Data have one {name} for all three, the root of "
                 "their mean square: the best coordinate counts less than it could, and the worst one more.",
             )
         )
-    return found
+    return notices
 
 
 def unlikely_radians(
@@ -209,14 +209,14 @@ def unlikely_radians(
         entry: What the mapping says of the joints.
         joints: The table that has the columns that it names; None if it names none.
     """
-    found: list[Notice] = []
+    notices: list[Notice] = []
     for number, reading in enumerate(content.readings, 1):
         for name, turned in (("angles", reading.angles), ("rotation_vector", reading.rotation_vector)):
             if turned is not None and turned.unit == "rad":
                 read = numbers_of(cells, reading.turned, turned.unit, mapping, f"readings[{number}]")
                 large = np.nanmax(np.abs(read), axis=1, initial=0.0)
                 if (large > _FULL_TURN).any():
-                    found.append(
+                    notices.append(
                         _of_radians(
                             large, f"orientations ({', '.join(turned.columns)})", f"readings[{number}].{name}.unit"
                         )
@@ -227,8 +227,8 @@ def unlikely_radians(
         of_unit = "joints.unit" if entry.units is None else "joints.units"
         large = np.abs(numbers_of(joints, named, "rad", mapping, "joints")).max(axis=1)
         if float(np.mean(large > _FULL_TURN)) >= _OFTEN:
-            found.append(_of_radians(large, f"joints ({', '.join(turning)})", of_unit))
-    return found
+            notices.append(_of_radians(large, f"joints ({', '.join(turning)})", of_unit))
+    return notices
 
 
 RADIANS_UNLIKELY: Final = Rule(

@@ -406,8 +406,8 @@ def joints_in_file(path: Path) -> tuple[Cells, Configurations]:
             allowed=f"configuration, {_JOINTS}",
             cure="Add it: it holds the labels that the measurements name.",
         )
-    found = configurations_of(cells, columns)
-    return cells, replace(found, before=stops_in(cells, found))
+    configurations = configurations_of(cells, columns)
+    return cells, replace(configurations, before=stops_in(cells, configurations))
 
 
 def refuse_repeated(cells: Cells, configurations: Configurations, cure: str) -> None:

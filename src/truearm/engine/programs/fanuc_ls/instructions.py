@@ -171,15 +171,15 @@ class Instructions:
             if _is_first_group(active):
                 alone = not words[: active.start()].strip()
                 self._hold(_which(active), active[3] if alone else None)
-        found = _WORD.match(words)
-        word = found[1].upper() if found else ""
+        match = _WORD.match(words)
+        word = match[1].upper() if match else ""
         if word in _JOINING:
             self.routine += 1
             for which in (0, 1):
                 if len(self.everywhere[which]) > 1:
                     self._hold(which, None)
-        elif found and _KNOWN.match(words, found.start(1)) is None:
-            self.unknown[found[1]] += 1
+        elif match and _KNOWN.match(words, match.start(1)) is None:
+            self.unknown[match[1]] += 1
             self.routine += 1
         elif "CALL" in words.upper():
             self.routine += 1

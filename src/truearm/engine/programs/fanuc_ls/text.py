@@ -208,11 +208,11 @@ class LsFile:
             spans = plain.regs
             head = (number, comment and _comment(comment), spans[1][0], plain.end(), spans[1])
             return Position(*head, frame, tool, config, _POSE, texts, spans[7:], _UNITS)
-        found = _POSITION.match(self.text, place, stop)
-        if found is None:
+        match = _POSITION.match(self.text, place, stop)
+        if match is None:
             return None
-        position = Position(found[2], _comment(found[3] or ""), found.start(1), found.end(), found.span(1))
-        start, end = found.span(4)
+        position = Position(match[2], _comment(match[3] or ""), match.start(1), match.end(), match.span(1))
+        start, end = match.span(4)
         groups = list(_GROUP.finditer(self.text, start, end))
         if groups:
             ends = [group.start() for group in groups[1:]] + [end]

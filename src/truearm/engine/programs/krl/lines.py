@@ -210,10 +210,10 @@ def _items(text: Text, start: int, stop: int) -> tuple[dict[str, Item], str | No
 
 def _bits(written: str) -> float | None:
     """Return a whole number that is written in bits or in hexadecimal digits, None if it is not."""
-    found = _BITS.fullmatch(written)
-    if found is None or (found[1] in "Bb" and found[2].strip("01")) or len(found[2]) > 32:
+    match = _BITS.fullmatch(written)
+    if match is None or (match[1] in "Bb" and match[2].strip("01")) or len(match[2]) > 32:
         return None
-    return float(int(found[2], 2 if found[1] in "Bb" else 16))
+    return float(int(match[2], 2 if match[1] in "Bb" else 16))
 
 
 def _missing(items: dict[str, Item], names: Sequence[str]) -> str | None:

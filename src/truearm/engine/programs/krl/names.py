@@ -90,12 +90,12 @@ class Variable:
         """Return an element, whether it has a value or not."""
         if self.elements is None:
             self.elements = {}
-        found = self.elements.get(index)
-        if found is None:
-            found = Variable(f"{self.name}[{index}]", self.type, self.module)
-            found.computed = self.computed
-            self.elements[index] = found
-        return found
+        variable = self.elements.get(index)
+        if variable is None:
+            variable = Variable(f"{self.name}[{index}]", self.type, self.module)
+            variable.computed = self.computed
+            self.elements[index] = variable
+        return variable
 
     def spoil(self, line: int) -> None:
         """Note that it gets a computed value."""
@@ -140,17 +140,17 @@ class Names:
     def find(self, name: str, scopes: Sequence[str]) -> Variable | None:
         """Return what a name means where `scopes` are known, the nearest first."""
         for scope in scopes:
-            found = self._variables.get((scope, name))
-            if found is not None:
-                return found
+            variable = self._variables.get((scope, name))
+            if variable is not None:
+                return variable
         return None
 
     def find_frame_data(self, name: str, scopes: Sequence[str]) -> FrameData | None:
         """Return what an FDAT says, None if there is none of the name."""
         for scope in scopes:
-            found = self._frame_data.get((scope, name))
-            if found is not None:
-                return found
+            frame_data = self._frame_data.get((scope, name))
+            if frame_data is not None:
+                return frame_data
         return None
 
     def declare(self, text: Text, start: int, stop: int, scopes: Sequence[str]) -> None:
@@ -371,17 +371,17 @@ class Frames:
 
     def of_inline_form(self, name: str, scopes: Sequence[str]) -> Holding | None:
         """Return what an inline form sets for its place; with XP1 goes FP1. None if there is no such FDAT."""
-        found = self._names.find_frame_data(f"F{name[1:].upper()}", scopes) if name[:1] in "Xx" else None
-        return self._of(found) if found else None
+        frame_data = self._names.find_frame_data(f"F{name[1:].upper()}", scopes) if name[:1] in "Xx" else None
+        return self._of(frame_data) if frame_data else None
 
     def _assigned(self, text: Text, what: str, begin: int, end: int, scopes: Sequence[str]) -> Holding:
         written = text.flat[begin:end].strip()
         by_data = _FROM_FRAME_DATA.fullmatch(written)
         if by_data:
-            found = self._by_frame_data(by_data[1], scopes)
+            holding = self._by_frame_data(by_data[1], scopes)
             if what == "$IPO_MODE":
-                return Holding(stationary=found.stationary)
-            return Holding(tool=found.tool) if what == "$TOOL" else Holding(base=found.base)
+                return Holding(stationary=holding.stationary)
+            return Holding(tool=holding.tool) if what == "$TOOL" else Holding(base=holding.base)
         if what == "$IPO_MODE":
             return Holding(stationary=written.upper() != "#BASE")
         if what == "$TOOL":
@@ -390,11 +390,11 @@ class Frames:
 
     def _by_frame_data(self, written: str, scopes: Sequence[str]) -> Holding:
         name = written.strip()
-        found = self._names.find_frame_data(name.upper(), scopes)
-        if found is None:
+        frame_data = self._names.find_frame_data(name.upper(), scopes)
+        if frame_data is None:
             unknown = Setting(problem=f"{short(name)}, which gives its tool and base, is not declared in this program")
             return Holding(unknown, unknown, False)
-        return self._of(found)
+        return self._of(frame_data)
 
     def _of(self, data: FrameData) -> Holding:
         found = self._by_data.get(data)

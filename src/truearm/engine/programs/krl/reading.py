@@ -92,8 +92,8 @@ def operands(flat: str, place: Span) -> list[Span]:
 def with_of(flat: str, statement: Statement) -> int | None:
     """Return where the text after the WITH of a spline begins, None if it has none."""
     _, _, after, stop = statement
-    found = _WITH.search(flat, after, stop)
-    return found.end() if found else None
+    match = _WITH.search(flat, after, stop)
+    return match.end() if match else None
 
 
 #: Where the robot stands already: a move there changes nothing.

@@ -157,18 +157,18 @@ def tool_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | N
     Raises:
         RefusedPoseError: If its pose cannot be.
     """
-    found = _TOOL_TEXT.match(text, start, stop)
-    if found is None:
+    match = _TOOL_TEXT.match(text, start, stop)
+    if match is None:
         return None, None
-    if found[1].upper() == "FALSE":
+    if match[1].upper() == "FALSE":
         return None, "is not held by the robot"
-    return _transform(found.groups()[1:]), None
+    return _transform(match.groups()[1:]), None
 
 
 def load_of(text: str, start: int, stop: int) -> Payload | None:
     """Return the load that tooldata written out have, in the controller's flange frame; None if there is none."""
-    found = _LOAD_TEXT.match(text, start, stop)
-    mass, *cog = [0.0] if found is None else [float(number) for number in found.groups()[7:]]
+    match = _LOAD_TEXT.match(text, start, stop)
+    mass, *cog = [0.0] if match is None else [float(number) for number in match.groups()[7:]]
     if not all(isfinite(number) and abs(number) < LARGEST for number in (mass, *cog)) or mass <= 0.0:
         return None
     x, y, z = (value / 1000 for value in cog)
@@ -183,10 +183,10 @@ def frame_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | 
     Raises:
         RefusedPoseError: If one of its poses cannot be.
     """
-    found = _FRAME_TEXT.match(text, start, stop)
-    if found is None:
+    match = _FRAME_TEXT.match(text, start, stop)
+    if match is None:
         return None, None
-    held, fixed, *numbers = found.groups()
+    held, fixed, *numbers = match.groups()
     if held.upper() == "TRUE":
         return None, "is held by the robot"
     if fixed.upper() == "FALSE":

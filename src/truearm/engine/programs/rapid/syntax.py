@@ -206,7 +206,7 @@ def arguments_of(code: str, start: int, stop: int) -> Arguments:
     if usual is not None:
         _, *needed, frame = usual.regs
         return Arguments(needed, {} if frame[0] < 0 else {"wobj": frame})
-    found = Arguments()
+    arguments = Arguments()
     depth, begin, optional = 0, start, False
     for mark in _MARK.finditer(code, start, stop):
         character = mark[0]
@@ -217,11 +217,11 @@ def arguments_of(code: str, start: int, stop: int) -> Arguments:
         elif character in "])}":
             depth -= 1
         elif depth == 0:
-            _put(found, code, begin, mark.start(), optional, after_option=character == "\\")
+            _put(arguments, code, begin, mark.start(), optional, after_option=character == "\\")
             optional = character == "\\"
             begin = mark.start() + (not optional)
-    _put(found, code, begin, stop, optional, after_option=False)
-    return found
+    _put(arguments, code, begin, stop, optional, after_option=False)
+    return arguments
 
 
 def _put(found: Arguments, code: str, start: int, stop: int, optional: bool, after_option: bool) -> None:
@@ -384,13 +384,13 @@ class _Walk:
         self.listing.writings.append(Writing(name, member, self.source, place, *self._scopes()))
 
     def _declaration(self, place: int, stop: int, local: bool) -> None:
-        found = _DECLARED.match(self.code, place, stop)
-        if found is None:
+        match = _DECLARED.match(self.code, place, stop)
+        if match is None:
             return
         local = local or self.code[place : place + 5].lower() == "local"
-        datum = Datum(found[1].lower(), found[2], self.source, found.start(2), size=found[3])
-        if found[4]:
-            datum.start, datum.stop = found.end(), stop
+        datum = Datum(match[1].lower(), match[2], self.source, match.start(2), size=match[3])
+        if match[4]:
+            datum.start, datum.stop = match.end(), stop
         self.listing.data.append(datum)
         if self.routine is not None:
             self._declare(self.routine, datum)
@@ -406,8 +406,8 @@ class _Walk:
             other.twice = datum.twice = True
 
     def _open(self, word: str, start: int, place: int, stop: int) -> int:
-        found = _HEAD[word].match(self.code, place, stop)
-        if found is None:
+        match = _HEAD[word].match(self.code, place, stop)
+        if match is None:
             raise self._refusal(start, f"the head of a {word.upper()} is incomplete")
         if self.routine is not None:
             raise self._refusal(self.opened, f"a routine has no {self.closing.upper()}")
@@ -416,13 +416,13 @@ class _Walk:
                 raise self._refusal(self.module_place, "a MODULE has no ENDMODULE")
             self.module, self.module_place = {}, start
             self.modules += 1
-            return found.end()
+            return match.end()
         self.routine, self.closing, self.opened = {}, f"end{word}", start
-        self.listing.routines.add(found[1].lower())
-        for one in _PARAMETER.finditer(found[2] or ""):
+        self.listing.routines.add(match[1].lower())
+        for one in _PARAMETER.finditer(match[2] or ""):
             name = one[2].lower()
             self.routine[name] = Datum(one[1].lower(), one[2], self.source, start, parameter=True)
-        return found.end()
+        return match.end()
 
     def _close(self, word: str, place: int) -> None:
         if word == "endmodule":

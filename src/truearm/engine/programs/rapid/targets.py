@@ -181,8 +181,8 @@ class Expressions:
         """Take a robtarget or jointtarget, or an array of them, that is declared."""
         code, pattern = self.listing.codes[datum.source], TARGET_TEXTS[datum.type]
         if datum.size is None:
-            found = pattern.fullmatch(code, *trimmed(code, datum.start, datum.stop))
-            made = [self._written_out(datum.source, found, datum, datum.name)]
+            match = pattern.fullmatch(code, *trimmed(code, datum.start, datum.stop))
+            made = [self._written_out(datum.source, match, datum, datum.name)]
         else:
             made = self._array(datum, pattern)
         self.elements[datum] = made
@@ -237,10 +237,10 @@ class Expressions:
         """Return what the words for a target mean, or why they mean none that can be corrected."""
         code, (start, stop) = self.listing.codes[at.source], text
         if code.startswith("[", start, stop):
-            found = (JOINTTARGET_TEXT if joints else ROBTARGET_TEXT).fullmatch(code, start, stop)
-            if found is None:
+            match = (JOINTTARGET_TEXT if joints else ROBTARGET_TEXT).fullmatch(code, start, stop)
+            if match is None:
                 return why_no_target(code[start:stop])
-            return Found([self._written_out(at.source, found, None, "", joints)], True)
+            return Found([self._written_out(at.source, match, None, "", joints)], True)
         reference = _REFERENCE.fullmatch(code, start, stop)
         if reference is not None:
             return self._reference(at, reference, "jointtarget" if joints else "robtarget")

@@ -99,9 +99,9 @@ def _read(sources: Sequence[Source]) -> Program:
     tools, frames = Places(), Places()
     unknown: Counter[str] = Counter()
     files = [_File(source, tools, frames, unknown) for source in sources]
-    parts = [(one.script, one.targets, one.goings, one.skipped) for one in files]
+    parts = [(file.script, file.targets, file.goings, file.skipped) for file in files]
     program = made_program("URScript", tuple(sources), parts, tools, frames, unknown)
-    load = _load_of([one.script for one in files])
+    load = _load_of([file.script for file in files])
     return program if load is None else replace(program, loads={target.tool: load for target in program.targets})
 
 
@@ -115,9 +115,9 @@ def _load_of(scripts: Sequence[Script]) -> Payload | None:
     said: set[Payload | None] = set()
     for script in scripts:
         for call in _PAYLOAD.finditer(script.code):
-            found = _LOAD.match(script.code, call.end())
-            mass, *cog = [0.0] if found is None else [float(number) for number in found.groups()]
-            plain = found is not None and mass >= 0.0 and all(abs(value) < _MOST_LOAD for value in (mass, *cog))
+            match = _LOAD.match(script.code, call.end())
+            mass, *cog = [0.0] if match is None else [float(number) for number in match.groups()]
+            plain = match is not None and mass >= 0.0 and all(abs(value) < _MOST_LOAD for value in (mass, *cog))
             said.add(Payload(mass, (cog[0], cog[1], cog[2])) if plain else None)
     return said.pop() if len(said) == 1 else None
 

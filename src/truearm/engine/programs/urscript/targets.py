@@ -279,7 +279,7 @@ class Targets:
         if isinstance(value, Called) and at.depth < _DEEPEST_TARGETS:
             deeper = At(at.routine, at.place, at.depth + 1)
             arguments = self._script.arguments(value.opened)
-            return any(self._comes_round(one.value, deeper) for one in arguments)
+            return any(self._comes_round(argument.value, deeper) for argument in arguments)
         return False
 
     def _spot(self, numbers: Numbers, name: str, frame: str, parent: Spot | None, turned: bool) -> Spot:

@@ -207,19 +207,19 @@ class Text:
     def _item(self, place: int) -> tuple[Argument, int]:
         """Return the argument that begins at a place, and where it ends: at a comma or at the closing bracket."""
         code = self.code
-        found = cast("re.Match[str]", _ITEM.match(code, place))  # it matches nothing, too
-        keyword, end = found[1] or "", found.end()
+        match = cast("re.Match[str]", _ITEM.match(code, place))  # it matches nothing, too
+        keyword, end = match[1] or "", match.end()
         if code[end] in ",)]":
-            if found[3] is not None:
-                return Argument(keyword, _numbers(found, 3)), end
-            if found[11] is not None:
-                return Argument(keyword, Name(found[11], *found.span(11))), end
-        elif found[11] is not None and code[end] == "(":
+            if match[3] is not None:
+                return Argument(keyword, _numbers(match, 3)), end
+            if match[11] is not None:
+                return Argument(keyword, Name(match[11], *match.span(11))), end
+        elif match[11] is not None and code[end] == "(":
             closed = self.partner[end]
             after = cast("re.Match[str]", _SPACE.match(code, closed + 1)).end()
             if code[after] in ",)]":
-                return Argument(keyword, Called(found[11], end, found.start(11), closed + 1)), after
-        start = found.start(2)
+                return Argument(keyword, Called(match[11], end, match.start(11), closed + 1)), after
+        start = match.start(2)
         stop = self._next(_ARGUMENT_END, start)
         return Argument(keyword, self.value(start, stop)), stop
 
@@ -372,7 +372,7 @@ class Script(Text):
             elif event == "header":
                 blocks.append((found.start(), routine))
                 arguments = self.arguments(place - 1)
-                names = (one.keyword or code[one.value.start : one.value.stop] for one in arguments)
+                names = (argument.keyword or code[argument.value.start : argument.value.stop] for argument in arguments)
                 self.routines.append(Routine(found["header"], found.start(), routine, frozenset(names)))
                 routine = len(self.routines) - 1
                 stretch += 1
@@ -405,14 +405,18 @@ class Names:
         self._routines = script.routines
         self._series: dict[tuple[str, int], Series] = {}
         assignments = script.assignments
-        shared = {one.name for one in assignments if one.scope == "global" or (not one.routine and not one.scope)}
-        for one in assignments:
-            own = one.scope == "local" or (one.scope == "" and one.name not in shared)
-            key = (one.name, one.routine if own else _GLOBAL)
+        shared = {
+            assignment.name
+            for assignment in assignments
+            if assignment.scope == "global" or (not assignment.routine and not assignment.scope)
+        }
+        for assignment in assignments:
+            own = assignment.scope == "local" or (assignment.scope == "" and assignment.name not in shared)
+            key = (assignment.name, assignment.routine if own else _GLOBAL)
             series = self._series.get(key)
             if series is None:
                 series = self._series[key] = Series()
-            series.add(one)
+            series.add(assignment)
 
     @property
     def series(self) -> list[Series]:

@@ -250,8 +250,8 @@ def _words(source: Source, lines: Lines, code: str, place: tuple[int, int], star
 
 
 def _reference(code: str, start: int, stop: int) -> Reference | None:
-    found = _REFERENCE.fullmatch(code, start, stop)
-    if found is None:
+    match = _REFERENCE.fullmatch(code, start, stop)
+    if match is None:
         return None
-    key = "0" if found[2] is None else "".join(found[2].split())
-    return found[1], key if _INDEX.fullmatch(key) else None
+    key = "0" if match[2] is None else "".join(match[2].split())
+    return match[1], key if _INDEX.fullmatch(key) else None

@@ -271,7 +271,7 @@ def _proof(robot: Robot, proof: Proof) -> dict[str, Any]:
         made["region"] = [_listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
         made["joint_error"] = _listed([written(v, u) for v, u in zip(proof.joint_error, units, strict=True)])
         if proof.loads:
-            made["loads"] = [_listed(one) for one in proof.loads]
+            made["loads"] = [_listed(load) for load in proof.loads]
         made["deviations"] = _flow(
             {
                 _text(name): written(deviation, SHOWN_AS[robot.parameters[name].unit])

@@ -105,11 +105,11 @@ class HexapodPoses(Device):
         )
         place, pose, joints = [], [], []
         for k, origin in enumerate(origins):
-            found = inverse(nominal, position + origin, rotation, branch="all")
-            usable = np.array([status.usable for status in found.status])
+            joint_solutions = inverse(nominal, position + origin, rotation, branch="all")
+            usable = np.array([status.usable for status in joint_solutions.status])
             place.append(np.full(int(usable.sum()), k))
-            pose.append(found.pose[usable])
-            joints.append(found.joints[usable])
+            pose.append(joint_solutions.pose[usable])
+            joints.append(joint_solutions.joints[usable])
         return origins, np.concatenate(place), np.concatenate(pose), np.concatenate(joints)
 
 

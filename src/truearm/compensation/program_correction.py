@@ -232,12 +232,12 @@ def _base_of(programs: Sequence[ResolvedProgram], frames: Sequence[str], start: 
 
         def corrected(shift: Array) -> tuple[Array, Array]:
             nonlocal parts
-            tips_founds = [
+            tips_of_all = [
                 program.tips_with(*part, shift, flange) for program, part in zip(programs, parts, strict=True)
             ]
-            parts = [(tips.rows, tips.joints) for tips in tips_founds]
-            return np.concatenate([tips.before for tips in tips_founds]), np.concatenate(
-                [tips.after for tips in tips_founds]
+            parts = [(tips.rows, tips.joints) for tips in tips_of_all]
+            return np.concatenate([tips.before for tips in tips_of_all]), np.concatenate(
+                [tips.after for tips in tips_of_all]
             )
 
         base = base_shift(corrected, base)

@@ -241,10 +241,8 @@ def _changes(found: Analysis) -> Iterator[Words]:
         words = f"{counted(len(those), 'machine')} changed" if those else "none has changed by more than chance"
         yield say(f"Measured again: {counted(len(machines), 'machine')}; {words}.")
         yield detail(*(f"  {one.machine}: {drift_words(one)}" for one in changed))
-    for all_drift in (one for kind in found.kinds for one in kind.drifts.alike):
-        yield detail(
-            f"  all machines alike: {all_drift.parameter} {sized(all_drift.slope, all_drift.unit, sign=True)} a month"
-        )
+    for alike in (one for kind in found.kinds for one in kind.drifts.alike):
+        yield detail(f"  all machines alike: {alike.parameter} {sized(alike.slope, alike.unit, sign=True)} a month")
 
 
 def reason_words(reason: Reason) -> str:

@@ -79,8 +79,8 @@ def _without_mask(given: object) -> NDArray[np.generic]:
     rows = given if isinstance(given, list | tuple) else [given]
     if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
         return np.asarray(given)
-    masked_array: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.generic]] = np.ma.array(given)
-    return masked_array if np.ma.is_masked(masked_array) else np.asarray(masked_array.data)
+    masked: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.generic]] = np.ma.array(given)
+    return masked if np.ma.is_masked(masked) else np.asarray(masked.data)
 
 
 def axes(given: object) -> int:

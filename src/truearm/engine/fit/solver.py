@@ -80,16 +80,16 @@ def _linear_program(A: Array, r: Array, room: Array) -> tuple[Array, float]:
     entries = np.concatenate([A.ravel(), -A.ravel(), -np.ones(2 * rows)])
     limits: list[tuple[float, float]] = [(a, b) for a, b in room.tolist()]
     both_sides: Any = coo_array((entries, (row, column)), shape=(2 * rows, count + rows)).tocsc()
-    optimize_result_highs = linprog(
+    solution = linprog(
         np.concatenate([np.zeros(count), np.ones(rows)]),
         A_ub=both_sides,
         b_ub=np.concatenate([-r, r]),
         bounds=[*limits, *[(0.0, np.inf)] * rows],
         method="highs",
     )
-    if optimize_result_highs.x is None or optimize_result_highs.fun is None:
-        raise ArithmeticError(f"the linear program of a step was not solved: {optimize_result_highs.message}")
-    return np.asarray(optimize_result_highs.x[:count]), float(optimize_result_highs.fun)
+    if solution.x is None or solution.fun is None:
+        raise ArithmeticError(f"the linear program of a step was not solved: {solution.message}")
+    return np.asarray(solution.x[:count]), float(solution.fun)
 
 
 #: Called at every step with the problem, the vector of its free parameters ``(parameters,)`` and the cost there: the

@@ -94,11 +94,11 @@ def corner_values(
     Three cycles give no interval: each value has the least and the largest of the cycles.
     """
     values: list[Value] = []
-    corner_curveses: list[CornerCurves] = []
+    curves: list[CornerCurves] = []
     for run in runs_of(plan, samples, transform, "CR"):
         for number in range(1, len(run.path.vertices) - 1):
             here = _corner(run, number, max(plan.limit_band, 3 * instrument.sigma), instrument.sigma)
-            corner_curveses.append(here)
+            curves.append(here)
             for id_, lengths, sparse in zip(("CR", "CO"), (here.rounding, here.overshoot), here.sparse, strict=True):
                 mean = float(lengths.mean())
                 coarse = instrument.sigma > COARSE * mean and (id_ == "CR" or mean > 0.0)
@@ -118,7 +118,7 @@ def corner_values(
                         float(lengths.max()),
                     )
                 )
-    return values, corner_curveses
+    return values, curves
 
 
 def _corner(run: Run, number: int, band: float, sigma: float) -> CornerCurves:

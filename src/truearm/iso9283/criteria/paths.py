@@ -94,7 +94,7 @@ def path_values(
         InputError: If there are no orientations and the orientation alternates.
     """
     values: list[Value] = []
-    path_deviationses: list[PathDeviations] = []
+    of_paths: list[PathDeviations] = []
     suffix = "-reorientation" if test == "AT-reorientation" else ""
     for run in runs_of(plan, samples, transform, test):
         if suffix and samples.rotation is None:
@@ -106,11 +106,11 @@ def path_values(
             )
         rng = np.random.default_rng(seed)
         here = deviations_of(run)
-        path_deviationses.append(here)
+        of_paths.append(here)
         values += _position_values(here, suffix, instrument, tie, rng)
         if here.angles is not None:
             values += _angle_values(here, suffix, instrument, tie_rot, rng)
-    return values, path_deviationses
+    return values, of_paths
 
 
 def deviations_of(run: Run, stations: int = STATIONS) -> PathDeviations:

@@ -271,15 +271,15 @@ def _pose_accuracy(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _M
     """
     for under in _conditions(test, cycles):
         for pose in test.places:
-            cycleses = _at_poses(cycles, under, pose)
-            n = len(cycleses[0]) if cycleses else 0
+            of_pose = _at_poses(cycles, under, pose)
+            n = len(of_pose[0]) if of_pose else 0
             common = (pose, n, test.cycles, under)
-            if not cycleses:
+            if not of_pose:
                 for id in ("AP", "RP"):
                     yield valued(id, "position", *common, _NOTHING, "length")
                     yield from (valued(id, angle, *common, _NOTHING, "angle") for angle in ANGLES)
                 continue
-            one = cycleses[0]
+            one = of_pose[0]
             yield _accuracy(one, common, judge)
             interval = repeatability_interval(one.points)
             rp = float(repeatability(one.points)) if n > 1 else _NOTHING
@@ -342,10 +342,10 @@ def _variation(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
     """Yield vAP, the largest distance between the barycentres of the approaches, and the largest angle between them."""
     for under in _conditions(test, cycles):
         for pose in test.places:
-            cycleses = _at_poses(cycles, under, pose)
-            n = min((len(one) for one in cycleses), default=0)
-            enough = len(cycleses) >= len(test.approaches)
-            yield from _differences("vAP", cycleses, (pose, n, test.cycles, under), judge, enough=enough, angles=True)
+            of_pose = _at_poses(cycles, under, pose)
+            n = min((len(one) for one in of_pose), default=0)
+            enough = len(of_pose) >= len(test.approaches)
+            yield from _differences("vAP", of_pose, (pose, n, test.cycles, under), judge, enough=enough, angles=True)
 
 
 def _differences(id: str, found: list[Cycles], common: _Common, judge: _Judge, *, enough: bool, angles: bool) -> _Made:
@@ -419,11 +419,11 @@ def _exchangeability(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> 
     for under in _conditions(test, cycles, robots=False):
         whole: list[Cycles] = []
         for pose in test.places:
-            cycleses = _at_poses(cycles, under, pose, any_robot=True)
-            whole += cycleses
-            n = min((len(one) for one in cycleses), default=0)
-            enough = len(cycleses) >= ROBOTS
-            yield from _differences("E", cycleses, (pose, n, test.cycles, under), judge, enough=enough, angles=False)
+            of_pose = _at_poses(cycles, under, pose, any_robot=True)
+            whole += of_pose
+            n = min((len(one) for one in of_pose), default=0)
+            enough = len(of_pose) >= ROBOTS
+            yield from _differences("E", of_pose, (pose, n, test.cycles, under), judge, enough=enough, angles=False)
         n = min((len(one) for one in whole), default=0)
         enough = len(whole) >= ROBOTS * len(test.places)
         yield from _differences("E", whole, ("all poses", n, test.cycles, under), judge, enough=enough, angles=False)

@@ -228,8 +228,9 @@ class Notice:
         return 2 if self.rule is None else self.rule.gravity
 
     def summary(self) -> dict[str, str]:
-        """Return it as JSON holds it."""
-        return {"code": self.code, "level": self.level, "message": self.message}
+        """Return it as JSON holds it; a code that was another one before stands beside that for one release."""
+        before = {"formerly": self.rule.formerly} if self.rule is not None and self.rule.formerly else {}
+        return {"code": self.code, **before, "level": self.level, "message": self.message}
 
 
 @dataclass(frozen=True)
@@ -247,6 +248,7 @@ class Rule:
     #: may not, 0 if the result holds.
     gravity: int = 1
     unless: frozenset[str] = frozenset()  #: Codes of notices beside which it says nothing.
+    formerly: str = ""  #: Its code in the release before, if that was another one.
 
     @property
     def levels(self) -> tuple[Level, ...]:

@@ -27,7 +27,7 @@ NUMBERS = re.compile(NUMBER)
 def sources(language: Language) -> list[Source]:
     """Return a program of that many targets."""
     folder = language.read.__module__.split("programs.")[1].split(".")[0]
-    made: list[Source] = importlib.import_module(f"tests.compensation.programs.test_{folder}").program_of(COUNT)
+    made: list[Source] = importlib.import_module(f"tests.engine.programs.test_{folder}").program_of(COUNT)
     return made
 
 

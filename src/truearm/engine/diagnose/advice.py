@@ -8,7 +8,7 @@ from typing import Final
 
 from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.diagnose.expected_error import ExpectedError
-from truearm.engine.diagnose.unmodelled import ANY_ERROR, PULLED_AWAY
+from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.conventions.convention import parallel_joints_without_beta
 from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
@@ -172,7 +172,7 @@ FAR_FROM_NOMINAL: Final = Rule(
     "mastered badly, or not the nominal values of its controller; `compensate`, `ik` and `export` repeat it",
     cure="Check that the nominal values are those of its controller: corrections of programs are wrong by what they "
     "differ. If they are, enter wider priors in the robot file.",
-    unless=frozenset({ANY_ERROR}),
+    unless=frozenset({WRONG_DATA}),
 )
 
 

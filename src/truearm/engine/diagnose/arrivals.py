@@ -12,7 +12,7 @@ from truearm.engine.base.errors import Notice, Rule
 from truearm.engine.base.units import from_si
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.unmodelled import ANY_ERROR, LeftOver, chi_squared_tail
+from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver, chi_squared_tail
 from truearm.engine.fit.likelihood import Arrivals, Linearised
 from truearm.engine.fit.rounds import DECLARED, factors_of
 from truearm.engine.fit.variance_components import Variances, largest_likelihood
@@ -254,7 +254,7 @@ SEPARATE_VISITS: Final = Rule(
     "readings of a configuration err as joints err, but each by itself: the robot left and came back between them",
     cure="Add the column `visit`, with the number of the visit on which each reading was taken; without it the "
     "expected error and all intervals are too small.",
-    unless=frozenset({ANY_ERROR}),
+    unless=frozenset({WRONG_DATA}),
 )
 
 

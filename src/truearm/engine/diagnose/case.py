@@ -18,7 +18,7 @@ from truearm.engine.diagnose.expected_error import ExpectedError, as_residuals_a
 from truearm.engine.diagnose.far_off import PULLING
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
 from truearm.engine.diagnose.off_configurations import Off, off_configurations
-from truearm.engine.diagnose.unmodelled import ANY_ERROR, PULLED_AWAY, LeftOver
+from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA, LeftOver
 from truearm.engine.diagnose.wrong_robot import (
     IMPLAUSIBLE,
     WRONG_ROBOT,
@@ -122,9 +122,9 @@ class Case:
         unlike = self.of_robot[0]
         return too_large, [] if unlike or has_error(too_large) else check_sigma_beside_joints(self.left)
 
-    def is_silent(self, notice: Notice, told: Sequence[Notice]) -> bool:
-        """Return whether a notice says nothing beside what was told before it."""
-        silencing = {one.code for one in told}
-        silencing |= {ANY_ERROR} if has_error(told) else set()
+    def unsilenced(self, told: Sequence[Notice]) -> list[Notice]:
+        """Return the notices but those that say nothing beside the others, by what their rules say."""
+        silencing = {notice.code for notice in told}
+        silencing |= {WRONG_DATA} if has_error([*self.of_data, *self.of_robot[0], *self.of_robot[1]]) else set()
         silencing |= {PULLED_AWAY} if self.bent else set()
-        return notice.rule is not None and not notice.rule.unless.isdisjoint(silencing)
+        return [notice for notice in told if notice.rule is None or notice.rule.unless.isdisjoint(silencing)]

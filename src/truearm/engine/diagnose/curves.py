@@ -13,7 +13,7 @@ import numpy as np
 from truearm.engine.base.errors import Notice, Rule, counted
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.unmodelled import ANY_ERROR, LeftOver
+from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver
 from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.compliance import Compliance
@@ -150,7 +150,7 @@ CURVES_OF_LOADS: Final = Rule(
     "no `compliance` in the model, and it would do most of what the [curves](models.md#curves) do: they are right "
     "for one payload only",
     cure="Compare with `effects=compliance` beside them, or with `model=auto`.",
-    unless=frozenset({ANY_ERROR}),
+    unless=frozenset({WRONG_DATA}),
 )
 
 

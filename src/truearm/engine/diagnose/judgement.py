@@ -27,7 +27,7 @@ from truearm.engine.diagnose.narrow_data import (
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.next_steps import steps_after_fit
 from truearm.engine.diagnose.plausibility import JOINTS_ROUNDED
-from truearm.engine.diagnose.unmodelled import ANY_ERROR, LeftOver
+from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver
 from truearm.engine.fit.transmission import check_transmission
 
 # Is what a fit leaves more than joints miss by, where no deviation is declared that would say so.
@@ -45,7 +45,7 @@ LARGE_REMAINDER: Final = Rule(
     "large-remainder",
     "warning",
     "no sigma is declared, and a model that fits the geometry leaves the readings farther off than joints miss by",
-    unless=OF_CHANGES | {ANY_ERROR, JOINTS_NOT_SETTLED.code, JOINTS_ROUNDED.code},
+    unless=OF_CHANGES | {WRONG_DATA, JOINTS_NOT_SETTLED.code, JOINTS_ROUNDED.code},
 )
 
 
@@ -95,7 +95,7 @@ def _check_narrow(case: Case) -> list[Notice]:
     return narrow or check_narrow_data(fit, case.expected, case.training, case.errors, held_out=case.held_out)
 
 
-#: What is asked of every fit. What is told may silence what comes after it, by :attr:`Rule.unless`.
+#: What is asked of every fit. What one tells may silence another, by :attr:`Rule.unless`.
 CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
     lambda case: case.of_data,
     lambda case: [*case.of_robot[0], *case.of_robot[1]],
@@ -119,11 +119,8 @@ CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
 
 
 def judge(case: Case) -> Judgement:
-    """Judge a fit: ask every check that nothing told before silences, and say what to do next."""
-    told: list[Notice] = []
-    for check in CHECKS:
-        told += [notice for notice in check(case) if not case.is_silent(notice, told)]
-    warnings = worst_first(told)
+    """Judge a fit: ask every check, leave out what others silence, and say what to do next."""
+    warnings = worst_first(case.unsilenced([notice for check in CHECKS for notice in check(case)]))
     return Judgement(case.expected, warnings, steps_after_fit(case, warnings))
 
 

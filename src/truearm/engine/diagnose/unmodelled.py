@@ -37,9 +37,9 @@ from truearm.engine.robot.robot import Robot
 
 #: Share of the squares of a residual that rounding leaves where parameters explain all of it.
 _ALL_EXPLAINED: Final = 1e-12
-#: Among the codes of `Rule.unless`: any notice that is an error; and wrong readings that pulled the fit away, which
-#: then leaves much and expects much, whatever the model and wherever was measured.
-ANY_ERROR: Final = "any error"
+#: Among the codes of `Rule.unless`: an error of the data, or another robot; and wrong readings that pulled the fit
+#: away, which then leaves much and expects much, whatever the model and wherever was measured.
+WRONG_DATA: Final = "wrong data"
 PULLED_AWAY: Final = "readings that pulled the fit away"
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.programs.test_every_language import languages, samples, shifted, texts
+from tests.engine.programs.reading import samples, shifted, texts
+from tests.engine.programs.test_every_language import languages
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.corrected_targets import KnownCorrection, corrected_digests, refuse_corrected

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.engine.programs.reading import reasons, sample, split, way, written
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.fanuc_ls import FANUC_LS
@@ -22,14 +23,8 @@ from truearm.engine.programs.program import Configuration, Program, Skipped, Sou
 from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
 from truearm.engine.robot.library import load_robot
 
-SAMPLES = Path(__file__).parent / "samples" / "fanuc_ls"
 HALF = (-pi, pi)
 NUT = Configuration("front", "up", ranges=((1, *HALF), (4, *HALF), (5, -pi, 0.0), (6, *HALF)), literal=True)
-
-
-def sample(name: str) -> Source:
-    path = SAMPLES / name
-    return Source(path, path.read_bytes().decode("latin-1"))
 
 
 def pose(
@@ -47,55 +42,13 @@ def program(instructions: Sequence[str], positions: str, attributes: str = "") -
     return Source(Path("P.LS"), f"/PROG  P\n/ATTR\n{attributes}/MN\n{lines}/POS\n{positions}/END\n")
 
 
-def program_of(count: int) -> list[Source]:
-    """Return a program with that many poses."""
-    rows = np.random.default_rng(8).uniform(-1.0, 1.0, (count, 6)) * [80, 300, 100, 20, 20, 20] + [
-        380,
-        0,
-        350,
-        180,
-        0,
-        0,
-    ]
-    positions = [
-        pose(
-            i,
-            f"\tX = {x:9.3f}  mm,\tY = {y:9.3f}  mm,\tZ = {z:9.3f}  mm,\n"
-            f"\tW = {w:9.3f} deg,\tP = {p:9.3f} deg,\tR = {r:9.3f} deg",
-            "UF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',",
-        )
-        for i, (x, y, z, w, p, r) in enumerate(rows.tolist(), 1)
-    ]
-    return [program([f"L P[{i}] 250mm/sec CNT100   " for i in range(1, count + 1)], "".join(positions))]
-
-
-def edited(found: Program, splits: Sequence[Split]) -> Source:
-    """Return a program with split moves; edits have to come in order and apart."""
-    assert FANUC_LS.split is not None
-    (source,) = found.sources
-    text, at = "", 0
-    for edit in FANUC_LS.split(found, splits).edits:
-        assert edit.start >= at
-        text += source.text[at : edit.start] + edit.text
-        at = edit.stop
-    return replace(source, text=text + source.text[at:])
-
-
 def moves(found: Program) -> list[tuple[int, str, str, str | None]]:
     """Return line, kind, target and via of each move."""
-    return [
-        (
-            move.line,
-            move.kind,
-            found.targets[move.target].name,
-            None if move.via is None else found.targets[move.via].name,
-        )
-        for move in found.moves
-    ]
+    return [(move.line, *one) for move, one in zip(found.moves, way(found), strict=True)]
 
 
 def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
-    found = FANUC_LS.read([sample("bracket.ls")])
+    found = sample(FANUC_LS, "bracket.ls")
     text = found.sources[0].text
     assert [(t.line, t.name, t.frame, t.tool) for t in found.targets] == [
         (61, "P[1:home]", "2", "3"),
@@ -110,23 +63,16 @@ def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
         (121, "P[11]", "2", ""),
         (133, "P[13]", "2", "3"),
     ]
-    home, approach, *_, last = found.targets
+    home, approach, *_ = found.targets
     assert (home.form.kind, home.form.angle, home.values) == ("joints", radians(1), (0.0, -20.0, 15.5, 0.0, -75.5, 0.0))
     assert (approach.form.kind, approach.values) == ("pose", (374.0, -12.25, 80.0, 180.0, -0.003, 30.0))
     assert approach.form.orientation is not None
     assert approach.configuration == NUT
-    written = [[text[slice(*place)] for place in target.places if place] for target in (home, approach, last)]
-    assert written == [
+    assert [written(found, row) for row in (0, 1, 10)] == [
         ["0.000", "-20.000", "15.500", ".000", "-75.500", ".000"],
         ["374.000", "-12.250", "80.000", "180.000", "-.003", "30.000"],
         ["430.5", "40", "+120.00000", "-179.500", "90.000", "-170.000"],
     ]
-    assert all(
-        float(text[slice(*place)]) == value
-        for t in found.targets
-        for place, value in zip(t.places, t.values, strict=True)
-        if place
-    )
     assert moves(found) == [
         (30, "joint", "P[1:home]", None),
         (33, "linear", "P[2:approach]", None),
@@ -160,7 +106,7 @@ def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
 
 
 def test_a_file_with_motion_groups_carried_instructions_and_weaving() -> None:
-    found = FANUC_LS.read([sample("seam.ls")])
+    found = sample(FANUC_LS, "seam.ls")
     assert {t.name: (t.frame, t.tool) for t in found.targets if t.name in ("P[1]", "P[3]", "P[20:unused]")} == {
         "P[1]": ("3", "1"),
         "P[3]": ("1", "1"),
@@ -176,7 +122,7 @@ def test_a_file_with_motion_groups_carried_instructions_and_weaving() -> None:
         (39, "circular", "P[3]", None),
         (41, "circular", "P[8]", None),
     ]
-    assert [(entry.line, entry.reason) for entry in found.skipped] == [
+    assert reasons(found) == [
         (41, "PR[4] is a position register, set elsewhere"),
         (43, "the circle has one position only"),
         (58, "P[2] is for the active user frame, and the program does not say for certain which that is"),
@@ -189,7 +135,7 @@ def test_a_file_with_motion_groups_carried_instructions_and_weaving() -> None:
 
 
 def test_a_file_of_a_post_processor_with_a_byte_order_mark_and_carriage_returns() -> None:
-    found = FANUC_LS.read([sample("wipe.ls")])
+    found = sample(FANUC_LS, "wipe.ls")
     assert FANUC_LS.is_one(found.sources[0].text)
     assert [(t.line, t.name, t.frame, t.tool, t.values[1]) for t in found.targets] == [
         (8, "P[1]", "", "1", 0.0),
@@ -198,16 +144,6 @@ def test_a_file_of_a_post_processor_with_a_byte_order_mark_and_carriage_returns(
     ]
     assert [t.configuration for t in found.targets] == [NUT, NUT, Configuration()]
     assert [move.line for move in found.moves] == [4, 5, 6]
-
-
-def test_lines_are_the_same_whatever_ends_them() -> None:
-    text = sample("seam.ls").text
-    shown = [
-        ([t.line for t in found.targets], moves(found), found.skipped)
-        for end in ("\n", "\r\n", "\r")
-        for found in [FANUC_LS.read([Source(Path("P.LS"), text.replace("\n", end))])]
-    ]
-    assert shown[0] == shown[1] == shown[2]
 
 
 def test_files_are_programs_of_their_own() -> None:
@@ -365,11 +301,9 @@ def test_configurations(
     assert {joint: pytest.approx((low, high)) for joint, low, high in found.ranges} == ranges
 
 
-@pytest.mark.parametrize(
-    "text", ["N N T, 0, 0, 0", "U D T, 0, 0, 0", "X U T, 0, 0, 0", "N U T, 0, a, 0", "N U T, 0, 0.5, 0"]
-)
-def test_configurations_that_cannot_be_read(text: str) -> None:
-    assert configuration(text) is None
+def test_configurations_that_cannot_be_read() -> None:
+    for text in ("N N T, 0, 0, 0", "U D T, 0, 0, 0", "X U T, 0, 0, 0", "N U T, 0, a, 0", "N U T, 0, 0.5, 0"):
+        assert configuration(text) is None, text
 
 
 #: J1, J4, J5 and J6 [deg] that controllers show with a configuration: "The perils of six-axis robots", onerobotics.com
@@ -412,15 +346,15 @@ LINE = (374.0, -12.25, -1.0, 180.0, 0.0, 30.0)
 
 
 def test_a_line_and_a_circle_are_split() -> None:
-    found = FANUC_LS.read([sample("bracket.ls")])
+    found = sample(FANUC_LS, "bracket.ls")
     first, second = (382.5, -12.25, 39.5, 180.0, -0.0015, 30.0), (390.0, -12.25, 20.0, 180.0, 0.0, 30.0)
     via, end, last_via = (
         (431.0, -11.0, -1.0, 180.0, 0.0, 37.0),
         (440.0, -6.0, -1.0, 180.0, 0.0, 47.0),
         (451.0, 9.0, -1.0, 180.0, 0.0, 66.0),
     )
-    source = edited(found, [Split(4, ((end, via),), last_via), Split(2, ((first, None), (second, None)))])
-    lines = source.text.split("\r\n")
+    added = split(FANUC_LS, found, Split(4, ((end, via),), last_via), Split(2, ((first, None), (second, None))))
+    lines = added.sources[0].text.split("\r\n")
     assert lines[32:43] == [
         "  10:L P[2:approach] 250mm/sec CNT50    ;",
         "  11:L P[100] R[4:speed]mm/sec CNT100    ;",
@@ -435,28 +369,15 @@ def test_a_line_and_a_circle_are_split() -> None:
         "  18:L P[7] 80mm/sec FINE    ;",
     ]
     assert "LINE_COUNT\t= 37;" in lines
-    assert "\n" not in source.text.replace("\r\n", "")
-    added = FANUC_LS.read([source])
-    assert added.targets[: len(found.targets)] == tuple(
-        replace(new, line=old.line + 4, places=new.places, name=old.name)
-        for old, new in zip(found.targets, added.targets, strict=False)
-    )
     values = {t.name: t.values for t in added.targets}
     assert values["P[100]"] == (382.5, -12.25, 39.5, 180.0, -0.0015, 30.0)
     assert (values["P[101]"], values["P[102]"], values["P[103]"], values["P[104]"]) == (second, via, end, last_via)
     assert {(t.frame, t.tool, t.configuration) for t in added.targets[-5:]} == {("2", "3", NUT)}
-    assert [names for _, *names in moves(added)][2:7] == [
-        ["linear", "P[100]", None],
-        ["linear", "P[101]", None],
-        ["linear", "P[3]", None],
-        ["linear", "P[4]", None],
-        ["circular", "P[103]", "P[102]"],
-    ]
 
 
 def test_what_is_to_happen_once_is_not_said_in_segments() -> None:
-    found = FANUC_LS.read([sample("bracket.ls")])
-    lines = edited(found, [Split(3, ((LINE, None),))]).text.split("\r\n")
+    found = sample(FANUC_LS, "bracket.ls")
+    lines = split(FANUC_LS, found, Split(3, ((LINE, None),))).sources[0].text.split("\r\n")
     assert lines[35:37] == [
         "  13:L P[100] 80mm/sec CNT100 ACC80    ;",
         "  14:L P[4] 80mm/sec CNT100 ACC80 TB    .10sec,DO[6]=ON    ;",
@@ -468,15 +389,15 @@ def test_instructions_that_a_move_carries_keep_their_numbers() -> None:
     source = program(["L P[1] 9mm/sec FINE", *words], pose(1) + pose(2))
     carried = "      1:  TC_ONLINE (ON) ;\n      2:  DO[1]=ON ;\n      3:  DO[2]=ON ;\n       ------ ;\n"
     source = replace(source, text=source.text.replace("   3:", carried + "   3:"))
-    text = edited(FANUC_LS.read([source]), [Split(0, ((LINE, None),))]).text
+    text = split(FANUC_LS, FANUC_LS.read([source]), Split(0, ((LINE, None),))).sources[0].text
     assert carried in text
     assert f"   2:L P[1] 9mm/sec FINE ;\n   3:J P[1] 100% FINE ;\n{carried}   4:J P[2] 100% FINE ;\n" in text
     assert "\n   5:J P[1] 100% FINE ;\n/POS" in text
 
 
 def test_lines_without_numbers_stay_without() -> None:
-    found = FANUC_LS.read([sample("wipe.ls")])
-    lines = edited(found, [Split(2, ((LINE, None),))]).text.split("\r")
+    found = sample(FANUC_LS, "wipe.ls")
+    lines = split(FANUC_LS, found, Split(2, ((LINE, None),))).sources[0].text.split("\r")
     assert lines[4:7] == [":L P[2] 100mm/sec CNT50 ;", ": L P[4] 100mm/sec CNT100    ;", ": L P[3] 100mm/sec FINE ;"]
     assert lines[-7:-1] == ["P[4]{", "GP1:", "UF : 0, UT : F,", *lines[-4:-2], "}"]
     assert lines[-4] == "X = 374.000 mm, Y = -12.250 mm, Z = -1.000 mm,"
@@ -486,13 +407,10 @@ def test_lines_without_numbers_stay_without() -> None:
 def test_numbers_of_lines_grow_into_the_blanks_before_them() -> None:
     source = program(["L P[1] 9mm/sec FINE"] * 9 + ["END"], pose(1), "LINE_COUNT = 10;\n")
     found = FANUC_LS.read([source])
-    text = edited(found, [Split(k, ((LINE, None),)) for k in range(9)]).text
+    text = split(FANUC_LS, found, *(Split(k, ((LINE, None),)) for k in range(9))).sources[0].text
     assert "\n   9:L P[6] 9mm/sec CNT100    ;\n  10:L P[1] 9mm/sec FINE ;\n" in text
     assert text.count("\n  19:END ;\n") == 1
     assert "LINE_COUNT = 19;" in text
-
-
-JOINTS = "\tJ1=     0.000 deg,\tJ2=   -20.000 deg"
 
 
 @pytest.mark.parametrize(
@@ -519,22 +437,11 @@ def test_moves_that_are_left_whole(words: str, change: Callable[[str], str]) -> 
     source = replace(source, text=change(source.text))
     found = FANUC_LS.read([source])
     is_circle = found.moves[0].kind == "circular"
-    split = Split(0, ((LINE, LINE if is_circle else None),), LINE if is_circle else None)
-    assert edited(found, [split]) == source
+    cut = Split(0, ((LINE, LINE if is_circle else None),), LINE if is_circle else None)
+    assert split(FANUC_LS, found, cut).sources == (source,)
 
 
-def test_many_positions() -> None:
-    found = FANUC_LS.read(program_of(500))
-    assert (len(found.targets), len(found.moves), found.skipped, found.unknown) == (500, 500, (), {})
-    assert [move.target for move in found.moves] == list(range(500))
-    assert {move.routine for move in found.moves} == {0}
-
-
-@pytest.mark.parametrize(
-    ("line", "left"), [("UTOOL[1]=PR[7]", True), ("UFRAME[2] = PR[1]", True), ("PR[7]=UTOOL[1]", False)]
-)
-def test_tools_and_frames_that_the_program_puts_elsewhere_are_named(line: str, left: bool) -> None:
-    text = f"/PROG A\n/MN\n   1:  {line}    ;\n/POS\n/END\n"
-    read = FANUC_LS.read([Source(Path("a.ls"), text)])
-    assert [one.line for one in read.skipped] == [3] * left
-    assert all("is set here, so where its targets are is not known" in one.reason for one in read.skipped)
+def test_tools_and_frames_that_the_program_puts_elsewhere_are_named() -> None:
+    read = FANUC_LS.read([program(["UTOOL[1]=PR[7]", "PR[7]=UTOOL[1]", "UFRAME[2] = PR[1]"], "")])
+    said = "is set here, so where its targets are is not known"
+    assert reasons(read) == [(4, f"UTOOL[1] {said}"), (6, f"UFRAME[2] {said}")]

@@ -43,10 +43,19 @@ def test_a_frame_in_the_world_is_seen_from_the_base(tmp_path: Path) -> None:
     np.testing.assert_allclose(placed.identified.rotation @ [0, 1, 0], [1, 0, 0], atol=1e-15)
 
 
-def test_own_base_and_flange_are_the_frames_without_a_name(tmp_path: Path) -> None:
-    cell = read(tmp_path, "tools:\n  flange: {of: flange}\nframes:\n  Base: {of: base, translation: [1, 2, 3]}\n")
+def test_names_of_tools_and_frames(tmp_path: Path) -> None:
+    """Own base and flange have none, and a number is one."""
+    cell = read(
+        tmp_path,
+        "tools:\n  flange: {of: flange}\n  3: {of: flange}\n"
+        '  tProbe: {of: flange, target: "1", controller: {translation: [0, 0, 125]}}\n'
+        "frames:\n  Base: {of: base, translation: [1, 2, 3]}\n  2: {of: base}\n",
+    )
+    assert (list(cell.tools), list(cell.frames)) == (["", "3", "tprobe"], ["", "2"])
     assert cell.tools[""].identified == Transform()
     assert cell.frames[""].identified == Transform((0.001, 0.002, 0.003))
+    assert cell.tools["tprobe"].identified == Transform((0.01, 0.02, 0.125))
+    assert cell.tools["tprobe"].controller == Transform((0.0, 0.0, 0.125))
 
 
 #: What each language calls the flange and the base, besides `flange` and `base`; from its maker's manuals.
@@ -99,18 +108,6 @@ def test_a_target_that_is_a_point_may_be_given_an_orientation(tmp_path: Path) ->
     np.testing.assert_allclose(placed.rotation @ [0, 0, 1], [1, 0, 0], atol=1e-12)
     (known,) = read_known_places(robot(), tmp_path / "cell.yaml")[0].values()
     assert (known.place, known.turned) == (placed, True)
-
-
-def test_a_number_is_a_name(tmp_path: Path) -> None:
-    cell = read(tmp_path, "tools:\n  3: {of: flange}\nframes:\n  2: {of: base}\n")
-    assert list(cell.tools) == ["3"]
-    assert list(cell.frames) == ["2"]
-
-
-def test_a_tool_may_be_a_target_of_the_calibration(tmp_path: Path) -> None:
-    cell = read(tmp_path, 'tools:\n  tProbe: {of: flange, target: "1", controller: {translation: [0, 0, 125]}}\n')
-    assert cell.tools["tprobe"].identified == Transform((0.01, 0.02, 0.125))
-    assert cell.tools["tprobe"].controller == Transform((0.0, 0.0, 0.125))
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,6 @@ from truearm.engine.programs.corrected_targets import LEDGER
 from truearm.engine.programs.program import MARK
 from truearm.engine.robot.robot_file.writing import robot_text
 
-
 FAR = ("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]")
 
 

@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.answered import compensate
-from tests.plate import PLATE
+from tests.compensation.workplace import cell, codes, plate
 from tests.simulated import campaign
 
 import truearm
 from truearm import InputError, Robot
 from truearm.compensation.report import program_html
-from truearm.compensation.result import ProgramCorrection
 from truearm.engine.base.errors import Notice
 from truearm.engine.robot.robot_file.seal import sealed
 from truearm.engine.robot.robot_file.writing import robot_text
@@ -33,9 +32,7 @@ def robot() -> Robot:
 
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
-    path = tmp_path / "plate.mod"
-    path.write_text(PLATE)
-    return path
+    return plate(tmp_path)
 
 
 def ended(robot: Robot, status: str = "converged", *errors: Notice) -> Robot:
@@ -43,20 +40,21 @@ def ended(robot: Robot, status: str = "converged", *errors: Notice) -> Robot:
     return sealed(robot, replace(robot.proof, status=status, errors=errors))
 
 
-def codes(correction: ProgramCorrection) -> dict[str, str]:
-    return {notice.code: notice.level for notice in correction.warnings}
-
-
-@pytest.mark.parametrize("status", ["rank-loss", "not-converged", "implausible"])
-def test_an_unsound_fit_corrects_no_program_unless_accepted(robot: Robot, program: Path, status: str) -> None:
-    unsound = ended(robot, status)
-    with pytest.raises(InputError, match=f"got '{status}'.*give `accept={status}`") as refusal:
-        compensate(unsound, [program])
-    assert refusal.value.parameter == "robot"
-    done = compensate(unsound, [program], accept=[status])
-    assert codes(done)[status] == "warning"
-    assert f"accept=['{status}']" in done.command
-    assert done.applied()["proof"]["status"] == status
+def test_an_unsound_fit_corrects_no_program_unless_accepted(robot: Robot, program: Path) -> None:
+    for status in ("rank-loss", "not-converged", "implausible"):
+        unsound = ended(robot, status)
+        with pytest.raises(InputError, match=f"got '{status}'.*give `accept={status}`") as refusal:
+            compensate(unsound, [program])
+        assert refusal.value.parameter == "robot"
+        done = compensate(unsound, [program], accept=[status])
+        assert codes(done)[status] == "warning"
+        assert f"accept=['{status}']" in done.command
+        assert done.applied()["proof"]["status"] == status
+    # Nor does the robot of a wrong name.
+    wrong = ended(robot, "converged", WRONG)
+    with pytest.raises(InputError, match=r"got 'wrong-robot'.*not of irb120.*give `accept=wrong-robot`"):
+        compensate(wrong, [program])
+    assert codes(compensate(wrong, [program], accept=["wrong-robot"]))["wrong-robot"] == "warning"
 
 
 def test_an_error_of_the_calibration_is_told_with_its_words(robot: Robot, program: Path) -> None:
@@ -70,13 +68,10 @@ def test_an_error_of_the_calibration_is_told_with_its_words(robot: Robot, progra
     assert {"rank-loss", "joint-sign"} <= set(codes(compensate(unsound, [program], accept=["rank-loss", "joint-sign"])))
 
 
-def test_a_warning_that_concerns_programs_is_repeated_and_refuses_nothing(
-    robot: Robot, program: Path, tmp_path: Path
-) -> None:
+def test_a_warning_that_concerns_programs_is_repeated_and_refuses_nothing(robot: Robot, program: Path) -> None:
     assert robot.proof is not None
-    doubted = sealed(robot, replace(robot.proof, warnings=(FAR,)))
-    path = tmp_path / "calibrated.yaml"
-    path.write_text(robot_text(doubted), encoding="utf-8")
+    path = program.parent / "calibrated.yaml"
+    path.write_text(robot_text(sealed(robot, replace(robot.proof, warnings=(FAR,)))), encoding="utf-8")
     correction = compensate(path, [program])
     assert FAR in correction.warnings
     assert "edited-by-hand" not in codes(correction)
@@ -90,13 +85,6 @@ def test_a_calibration_keeps_the_doubt_about_its_nominal_values(program: Path) -
     assert codes(compensate(found, [program]))["far-from-nominal"] == "note"
     again = truearm.calibrate(found, off, model="frames").robot
     assert codes(compensate(again, [program]))["far-from-nominal"] == "note"
-
-
-def test_a_wrong_robot_corrects_no_program_unless_accepted(robot: Robot, program: Path) -> None:
-    wrong = ended(robot, "converged", WRONG)
-    with pytest.raises(InputError, match=r"got 'wrong-robot'.*not of irb120.*give `accept=wrong-robot`"):
-        compensate(wrong, [program])
-    assert codes(compensate(wrong, [program], accept=["wrong-robot"]))["wrong-robot"] == "warning"
 
 
 def test_a_program_of_another_maker_is_not_corrected_unless_accepted(robot: Robot, program: Path) -> None:
@@ -135,11 +123,10 @@ def test_an_unproven_robot_is_corrected_with_a_note(robot: Robot, program: Path)
     assert done.summary()["programs"][0]["expected_mm"] is None
     assert done.applied()["proof"] is None
     assert done.lines()[1] == "plate.mod  RAPID: the error to expect is not known"
-    with pytest.raises(InputError, match="not calibrated"):
+    with pytest.raises(InputError, match="not calibrated") as refusal:
         compensate("irb120", [program])
-
-
-def test_a_payload_leaves_the_proof(robot: Robot, program: Path) -> None:
+    assert refusal.value.parameter == "robot"
+    # A payload leaves the proof.
     done = compensate(robot, [program], payload="1kg,0mm,0mm,50mm")
     assert "edited-by-hand" not in codes(done)
     assert done.summary()["programs"][0]["expected_mm"] is not None
@@ -228,12 +215,8 @@ def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
 
 
 def test_errors_in_measured_frames_are_not_called_relative(robot: Robot, program: Path, tmp_path: Path) -> None:
-    cell = tmp_path / "cell.yaml"
-    cell.write_text(
-        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
-        "frames:\n  wobjPlate: {of: base, translation: [310, -110, 60]}\n"
-    )
-    assert any("RAPID: error to expect" in line for line in compensate(robot, [program], frames=cell).lines())
+    frames = cell(tmp_path, "frames:\n  wobjPlate: {of: base, translation: [310, -110, 60]}\n")
+    assert any("RAPID: error to expect" in line for line in compensate(robot, [program], frames=frames).lines())
 
 
 def test_nothing_is_promised_that_no_robot_repeats(robot: Robot, program: Path) -> None:

@@ -35,6 +35,7 @@ def pose(x: float, y: float, z: float = 300, turned: str = "[0,0,1,0],[0,0,0,0]"
 
 
 def cell(folder: Path, entries: str, name: str = "cell.yaml") -> Path:
+    folder.mkdir(exist_ok=True)
     path = folder / name
     path.write_text(HEAD + entries)
     return path

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -47,19 +46,6 @@ def test_one_line_a_reading_then_what_came_of_it(truearm: Truearm, plan: Path, t
     other = truearm(*words)
     assert other.code == 2
     assert "limit of what is kept" in other.err
-
-
-def test_a_port_in_use_ends_with_two_and_a_free_one(truearm: Truearm, plan: Path, tmp_path: Path) -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen(1)
-        port = taken.getsockname()[1]
-        run = truearm("measure", plan, "irb120", "--listen", port, "--target", "a", "--out", tmp_path / "out")
-    assert run.code == 2
-    assert "--listen" in run.err
-    assert "another program listens on this port" in run.err
-    assert "which is free" in run.err
-    assert not (tmp_path / "out").exists() or not (tmp_path / "out" / "readings.csv").exists()
 
 
 def test_the_token_that_is_given_stands_in_no_file_and_no_line(truearm: Truearm, plan: Path, tmp_path: Path) -> None:

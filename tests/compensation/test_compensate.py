@@ -68,7 +68,7 @@ def test_the_contract(truearm: Truearm, place: Path) -> None:
     assert (program["targets"], program["corrected"], program["kept"]) == (44, 43, {"given by joints": 1})
     assert 0.05 < program["shift_mm"]["mean"] < program["shift_mm"]["max"] < 3.0
     assumed = {"unproven", "frames-assumed", "tools-assumed", "joint-targets-kept", "loads-taken"}
-    assert {warning["code"] for warning in found["warnings"]} == assumed  # type: ignore[attr-defined]
+    assert {warning["code"] for warning in found["warnings"]} == assumed
     files = ["compensation.html", "plate.mod", "plate.mod.truearm.json", "truearm.manifest.json"]
     assert sorted(p.name for p in (place / "out").iterdir()) == files
     record = json.loads((place / "out" / "plate.mod.truearm.json").read_text())
@@ -82,7 +82,7 @@ def test_with_tool_and_frame_nothing_is_assumed_and_the_payload_matters(truearm:
         places = ("--tools", place / "cell.yaml", "--frames", place / "cell.yaml")
         found = told(truearm, place, *places, *words, out=f"out{number}")
         shifts.append(found["programs"][0]["shift_mm"]["mean"])
-        codes = [warning["code"] for warning in found["warnings"]]  # type: ignore[attr-defined]
+        codes = [warning["code"] for warning in found["warnings"]]
         assert not {"frames-assumed", "tools-assumed"} & {*codes}
         assert ("no-payload" in codes) == (number == 1)
     # The frame is half a millimetre beside what the controller has.
@@ -95,7 +95,7 @@ def test_a_robot_without_a_payload_is_asked_for_one_if_it_bends(truearm: Truearm
     for robot, asked in ((worn().with_payload(Payload()), True), (stiff(), False)):
         (place / "calibrated.yaml").write_text(robot_text(robot))
         found = told(truearm, place, out=f"out{asked}")
-        assert ("no-payload" in {warning["code"] for warning in found["warnings"]}) == asked  # type: ignore[attr-defined]
+        assert ("no-payload" in {warning["code"] for warning in found["warnings"]}) == asked
 
 
 def test_the_report_says_how_to_do_it_again_and_moves_are_split(truearm: Truearm, place: Path) -> None:
@@ -177,13 +177,13 @@ def test_a_tool_or_frame_that_nobody_defines_is_refused(truearm: Truearm, place:
     # A frame may come from the file.
     cell(place, "frames:\n  WOBJPLATE: {of: controller, translation: [310, -110, 60]}\n")
     found = told(truearm, place, "--frames", place / "cell.yaml")
-    assert "frames-assumed" in {warning["code"] for warning in found["warnings"]}  # type: ignore[attr-defined]
+    assert "frames-assumed" in {warning["code"] for warning in found["warnings"]}
 
 
 def test_a_program_without_targets_says_so(truearm: Truearm, place: Path) -> None:
     (place / "plate.mod").write_text('MODULE m\n  PROC main()\n    TPWrite "nothing";\n  ENDPROC\nENDMODULE\n')
     found = told(truearm, place)
-    assert [warning["code"] for warning in found["warnings"]] == ["no-targets", "unproven"]  # type: ignore[attr-defined]
+    assert [warning["code"] for warning in found["warnings"]] == ["no-targets", "unproven"]
     shift = found["programs"][0]["shift_mm"]
     assert shift == {"mean": 0.0, "max": 0.0, "common": None, "remainder": None}
     assert (place / "out" / "plate.mod").read_bytes() == (place / "plate.mod").read_bytes()

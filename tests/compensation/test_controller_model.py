@@ -185,8 +185,8 @@ def test_saying_what_the_controller_has_does_not_change_what_is_known_of_a_calib
 
 def test_the_command_names_its_option(truearm: Truearm, tmp_path: Path) -> None:
     (tmp_path / "worn.yaml").write_text(robot_text(worn("ur10")))
-    given = ("compensate", tmp_path / "worn.yaml", program(tmp_path, POSES), "--taught", "none")
-    given += ("--out", tmp_path / "out")
+    answers = ("--taught", "none", "--out", tmp_path / "out")
+    given = ("compensate", tmp_path / "worn.yaml", program(tmp_path, POSES), *answers)
     refused = truearm(*given)
     assert refused.code == 2
     assert "--controller-kinematics nominal" in " ".join(refused.err.split())

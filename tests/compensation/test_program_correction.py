@@ -39,7 +39,7 @@ from truearm.engine.robot.transform import Transform
 
 JOINTS = "MoveAbsJ [[{},20,-10,0,45,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;"
 POSE = "MoveL [[{},0,400],[0.70710678,0,0.70710678,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0{};"
-POSITION = "P[{}]{{\n  GP1:\n  UF : F, UT : F,\n  {}\n}};\n"
+POSITION = "P[{}]{{\n  GP1:\n  UF : 0, UT : 0,\n  {}\n}};\n"
 FLANGE = Cell({"": Placed(None, Transform())}, {})
 FLANGE_AND_BASE = Cell({"": Placed(None, Transform())}, {"": Placed(None, Transform())})
 
@@ -251,18 +251,14 @@ def test_a_move_that_its_language_leaves_whole_is_listed_and_not_counted() -> No
         "  W = 180.000 deg, P = -60.000 deg, R = 180.000 deg"
         for y, z in (("20.000", "20.000"), ("220.000", "0.000"))
     )
-    positions = "".join(POSITION.format(i, one) for i, one in enumerate(poses, 1)).replace(
-        "UF : F, UT : F", "UF : 0, UT : 0"
-    )
-    for speed, moves, left in (("100mm/sec", 2, ()), ("2sec", 1, (5,))):
-        lines = "".join(
-            f"{i:4}:L P[{p}] {v} FINE ;\n" for i, p, v in ((1, 1, "9mm/sec"), (2, 2, speed), (3, 1, "9mm/sec"))
-        )
-        text = f"/PROG  A\n/ATTR\n/MN\n{lines.replace('L P[1] 9mm/sec', 'J P[1] 20%', 1)}/POS\n{positions}/END\n"
+    positions = "".join(POSITION.format(i, one) for i, one in enumerate(poses, 1))
+    for speed, count, left in (("100mm/sec", 2, ()), ("2sec", 1, (5,))):
+        moves = f"   1:J P[1] 20% FINE ;\n   2:L P[2] {speed} FINE ;\n   3:L P[1] 9mm/sec FINE ;\n"
+        text = f"/PROG  A\n/ATTR\n/MN\n{moves}/POS\n{positions}/END\n"
         read = FANUC_LS.read([Source(Path("a.ls"), text)])
         done = corrected_programs(worn(load_robot("lrmate200ic"), 2.0), [read], Cell({}, {}))
         assert done.corrections[0].corrected.all()
         cut = split_program(FANUC_LS, done.corrections[0], done.between[0], FARTHEST)
-        assert (cut.moves, cut.unsplit) == (moves, left)
+        assert (cut.moves, cut.unsplit) == (count, left)
         again = FANUC_LS.read([Source(Path("a.ls"), edited(read.sources[0].text, cut.edits))])
         assert len(again.moves) == len(read.moves) + cut.added

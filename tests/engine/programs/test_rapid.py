@@ -173,8 +173,7 @@ def test_several_modules_are_one_program() -> None:
 
 def test_a_file_alone_does_not_know_the_names_of_the_other() -> None:
     program = sample(RAPID, "cell/MainModule.mod")
-    assert [t.name for t in program.targets] == ["pUp"]
-    assert program.targets[0].tool == "tTorch"
+    assert [(t.name, t.tool) for t in program.targets] == [("pUp", "tTorch")]
     assert not program.tools
     assert [skip.line for skip in program.skipped] == [6, 7, 8, 8]
 
@@ -192,7 +191,6 @@ def test_names_do_not_depend_on_their_case_and_those_of_elsewhere_stay() -> None
 @pytest.mark.parametrize(
     ("instruction", "kind"),
     [
-        ("MoveJ {},v100,fine,tPen;", "joint"),
         ('MoveJSync {},v100,z5,tPen,"act";', "joint"),
         ("MoveLDO {},v100,z5,tPen\\WObj:=wTable,do1,1;", "linear"),
         ("TriggJ {},v100,tr1\\T2:=tr2,z5,tPen;", "joint"),
@@ -200,12 +198,9 @@ def test_names_do_not_depend_on_their_case_and_those_of_elsewhere_stay() -> None
         ("TriggC {},{},v100,tr1,z5,tPen;", "circular"),
         ("SearchL \\Stop,di1\\Flanks,pHit,{},v100,tPen;", "linear"),
         ("SearchC di1,pHit,{},{},v100,tPen;", "circular"),
-        ("ArcL {},v100,sm1,wd1,wv1,z1,tPen;", "linear"),
         ("ArcC1 {},{},v100,sm1,wd1\\Weave:=wv1,z1,tPen\\Track:=tr1;", "circular"),
         ("SpotL {},vmax,gun1,spot10,tPen;", "linear"),
-        ("PaintL {},v800,z50,tPen;", "linear"),
         ("DispL \\On,{},v250,bead1,z30,tPen;", "linear"),
-        ("CapL {},v100,cd1,ws1,wv1,z1,tPen;", "linear"),
     ],
 )
 def test_each_instruction_has_its_arguments_in_its_own_places(instruction: str, kind: str) -> None:
@@ -239,9 +234,7 @@ HELD = 'PERS wobjdata wHeld:=[TRUE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0
         (TO_P1, f"{P1} CONST robtarget P1:={pose()};", 4, "more than once"),
         (TO_P1, "CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0]];", 4, "missing or computed"),
         (TO_P1, f"CONST robtarget p1:={pose(rest='[-q,0,0,0],[0,0,0,0],x')};", 4, "has q in place"),
-        ("MoveL p1{1},v1,fine,tPen;", ROW.replace("p1{1}", "p1{3}"), 4, "missing or computed"),
         (f"p1.trans.x:=3; {TO_P1}", PERS_P1, 4, "program runs, in line 6"),
-        (f"IF a p1:=b; {TO_P1}", PERS_P1, 4, "program runs, in line 6"),
         (f"Incr p1.trans.x; {TO_P1}", PERS_P1, 4, "while the program runs"),
         ("SearchL d,p1,p1,v1,tPen;", PERS_P1, 4, "while the program runs"),
         (f"{TO},tools{{i}};", "", 6, "a tool that is computed"),
@@ -316,16 +309,12 @@ MOVED = "MoveL p1,v1,fine,tPen\\WObj:=wTable;"
 @pytest.mark.parametrize(
     ("text", "line", "part"),
     [
-        ("", 1, "there is no MODULE"),
         ("PROC main()\nENDPROC\n", 1, "there is no MODULE"),
-        ("MODULE A\nPROC main()\nENDPROC\n", 1, "a MODULE has no ENDMODULE"),
         ("MODULE A\nENDMODULE\nMODULE B\nMODULE C\nENDMODULE\n", 3, "a MODULE has no ENDMODULE"),
         ("MODULE A\nENDMODULE\nENDMODULE\n", 3, "an ENDMODULE closes no MODULE"),
-        ("MODULE A\nPROC main()\nENDMODULE\n", 2, "a routine has no ENDPROC"),
         ("MODULE A\nPROC main()\nPROC b()\nENDPROC\nENDMODULE\n", 2, "a routine has no ENDPROC"),
         ("MODULE A\nPROC main()\nENDFUNC\nENDMODULE\n", 3, "an ENDFUNC closes nothing"),
         ("MODULE A\nPROC\n", 2, "the head of a PROC is incomplete"),
-        ("MODULE A\nVAR num x:=(1;\nENDMODULE\n", 2, "a bracket is not"),
         ("MODULE A\nVAR num x;\nVAR num y:=1];\nENDMODULE\n", 3, "a bracket is not"),
         ("MODULE A\nVAR num y{3}:=[1,(2],3);\nENDMODULE\n", 2, "a bracket is not"),
         ('MODULE A\nVAR string s:="ab"";\nVAR string t:=";\nENDMODULE\n', 2, "a string is not closed"),
@@ -337,20 +326,21 @@ def test_malformed_text_is_refused(text: str, line: int, part: str) -> None:
     assert refused.value.where == f"bad.mod, line {line}"
 
 
-@pytest.mark.parametrize(
-    ("data", "part"),
-    [
-        (f"CONST robtarget p1:={pose(rest=f'[0,0.7,0.7,0],[0,0,0,0],{NO_AXES}')};", "quaternion"),
-        (f"CONST robtarget p1:={pose(rest=f'[0,0,0,0],[0,0,0,0],{NO_AXES}')};", "quaternion"),
+def test_numbers_that_cannot_be_are_refused() -> None:
+    turned = "[{}],[0,0,0,0]," + NO_AXES
+    far = f"CONST jointtarget j1:=[[0,0,0,0,0,-2E6],{NO_AXES}];"
+    for data, part in (
+        (f"CONST robtarget p1:={pose(rest=turned.format('0,0.7,0.7,0'))};", "quaternion"),
+        (f"CONST robtarget p1:={pose(rest=turned.format('0,0,0,0'))};", "quaternion"),
         (f"CONST robtarget p1:={pose(1.1e6)};", "out of all proportion"),
         (f"CONST robtarget p1:={pose(z=-1e400)};".replace("-inf", "-1e400"), "out of all proportion"),
-        (f"CONST robtarget p1:={pose()}; CONST jointtarget j1:=[[0,0,0,0,0,-2E6],{NO_AXES}];", "out of all proportion"),
-    ],
-)
-def test_numbers_that_cannot_be_are_refused(data: str, part: str) -> None:
-    with pytest.raises(InputError, match=part) as refused:
-        read(MOVED, data)
-    assert refused.value.where == "one.mod, line 4"
+        (f"{P1} {far}", "out of all proportion"),
+    ):
+        with pytest.raises(InputError, match=part) as refused:
+            read(MOVED, data)
+        assert refused.value.where == "one.mod, line 4"
+    # A quaternion may be a thousandth off.
+    assert len(read(MOVED, f"CONST robtarget p1:={pose(rest=turned.format('0,1.0009,0,0'))};").targets) == 1
 
 
 @pytest.mark.parametrize(("old", "new"), [("[[0,0,100],[1,0,", "[[0,0,100],[1,0.1,"), ("[[300,0,50]", "[[3E7,0,50]")])
@@ -364,10 +354,6 @@ def test_tools_and_frames_that_cannot_be_are_refused_if_they_are_used(old: str, 
     assert refused.value.where in ("a.mod, line 2", "a.mod, line 3")
     unused = RAPID.read(module("tool0"))
     assert len(unused.tools) + len(unused.frames) == 1
-
-
-def test_a_quaternion_may_be_a_thousandth_off() -> None:
-    assert len(read(MOVED, f"CONST robtarget p1:={pose(rest=f'[0,1.0009,0,0],[0,0,0,0],{NO_AXES}')};").targets) == 1
 
 
 def test_elbow_words_agree_with_the_arm() -> None:
@@ -437,7 +423,6 @@ def test_offsets_stay_offsets(polish: Program) -> None:
         f"MoveL \\Conc,{pose()},v1,fine,tPen;",
         f"MoveLDO {pose()},v1,fine,tPen,do1,1;",
         f"TriggL {pose()},v1,t1,fine,tPen;",
-        f"SearchL di1,pHit,{pose()},v1,tPen;",
         f"ArcLStart {pose()},v1,s1,w1,fine,tPen;",
         f"IF a MoveL {pose()},v1,fine,tPen;",
         f"MoveL Offs({pose()},1,2,3),v1,fine,tPen;",

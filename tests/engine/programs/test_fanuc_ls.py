@@ -51,18 +51,10 @@ def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
     found = sample(FANUC_LS, "bracket.ls")
     text = found.sources[0].text
     assert [(t.line, t.name, t.frame, t.tool) for t in found.targets] == [
-        (61, "P[1:home]", "2", "3"),
-        (67, "P[2:approach]", "2", "3"),
-        (73, "P[3]", "2", "3"),
-        (79, "P[4]", "2", "3"),
-        (85, "P[5]", "2", "3"),
-        (91, "P[6]", "2", "3"),
-        (97, "P[7]", "2", "3"),
-        (109, "P[9]", "2", "3"),
-        (115, "P[10]", "", "3"),
-        (121, "P[11]", "2", ""),
-        (133, "P[13]", "2", "3"),
-    ]
+        (61, "P[1:home]", "2", "3"), (67, "P[2:approach]", "2", "3"), (73, "P[3]", "2", "3"), (79, "P[4]", "2", "3"),
+        (85, "P[5]", "2", "3"), (91, "P[6]", "2", "3"), (97, "P[7]", "2", "3"), (109, "P[9]", "2", "3"),
+        (115, "P[10]", "", "3"), (121, "P[11]", "2", ""), (133, "P[13]", "2", "3"),
+    ]  # fmt: skip
     home, approach, *_ = found.targets
     assert (home.form.kind, home.form.angle, home.values) == ("joints", radians(1), (0.0, -20.0, 15.5, 0.0, -75.5, 0.0))
     assert (approach.form.kind, approach.values) == ("pose", (374.0, -12.25, 80.0, 180.0, -0.003, 30.0))
@@ -74,19 +66,11 @@ def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
         ["430.5", "40", "+120.00000", "-179.500", "90.000", "-170.000"],
     ]
     assert moves(found) == [
-        (30, "joint", "P[1:home]", None),
-        (33, "linear", "P[2:approach]", None),
-        (34, "linear", "P[3]", None),
-        (36, "linear", "P[4]", None),
-        (37, "circular", "P[6]", "P[5]"),
-        (39, "linear", "P[7]", None),
-        (41, "linear", "P[3]", None),
-        (48, "circular", "P[9]", None),
-        (49, "circular", "P[10]", None),
-        (50, "circular", "P[11]", None),
-        (55, "linear", "P[13]", None),
-        (59, "joint", "P[1:home]", None),
-    ]
+        (30, "joint", "P[1:home]", None), (33, "linear", "P[2:approach]", None), (34, "linear", "P[3]", None),
+        (36, "linear", "P[4]", None), (37, "circular", "P[6]", "P[5]"), (39, "linear", "P[7]", None),
+        (41, "linear", "P[3]", None), (48, "circular", "P[9]", None), (49, "circular", "P[10]", None),
+        (50, "circular", "P[11]", None), (55, "linear", "P[13]", None), (59, "joint", "P[1:home]", None),
+    ]  # fmt: skip
     circle = found.moves[4]
     assert text[slice(*circle.statement)] == "C P[5]    \r\n    :  P[6] 80mm/sec CNT100    ;"
     assert circle.via_text is not None
@@ -113,15 +97,10 @@ def test_a_file_with_motion_groups_carried_instructions_and_weaving() -> None:
         "P[20:unused]": ("1", "1"),
     }
     assert moves(found) == [
-        (20, "linear", "P[1]", None),
-        (23, "joint", "P[3]", None),
-        (28, "linear", "P[4]", None),
-        (31, "circular", "P[6]", "P[5]"),
-        (33, "circular", "P[8]", "P[7]"),
-        (38, "circular", "P[11]", None),
-        (39, "circular", "P[3]", None),
-        (41, "circular", "P[8]", None),
-    ]
+        (20, "linear", "P[1]", None), (23, "joint", "P[3]", None), (28, "linear", "P[4]", None),
+        (31, "circular", "P[6]", "P[5]"), (33, "circular", "P[8]", "P[7]"), (38, "circular", "P[11]", None),
+        (39, "circular", "P[3]", None), (41, "circular", "P[8]", None),
+    ]  # fmt: skip
     assert reasons(found) == [
         (41, "PR[4] is a position register, set elsewhere"),
         (43, "the circle has one position only"),

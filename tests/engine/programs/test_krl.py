@@ -44,26 +44,13 @@ def cell() -> Program:
 def test_targets_of_the_cell(cell: Program) -> None:
     found = [(t.source, t.line, t.name, t.tool, t.frame, t.parent) for t in cell.targets]
     assert found == [
-        (0, 48, "", "2", "", 18),
-        (0, 50, "", "2", "", None),
-        (0, 53, "", "2", "", None),
-        (0, 55, "", "2", "", None),
-        (0, 57, "", "2", "", None),
-        (0, 60, "", "2", "", None),
-        (0, 61, "", "2", "", None),
-        (0, 62, "", "2", "", None),
-        (0, 62, "", "2", "", None),
-        (0, 63, "", "2", "", None),
-        (1, 7, "XP1", "1", "2", None),
-        (1, 10, "XP2", "1", "2", None),
-        (1, 12, "XP3", "1", "2", None),
-        (1, 14, "XP4", "1", "2", None),
-        (1, 15, "XP5", "1", "2", None),
-        (1, 16, "XP6", "2", "", None),
-        (1, 19, "XP8", "2", "2", None),
-        (1, 23, "P[1]", "2", "", None),
-        (1, 24, "P[2]", "2", "", None),
-    ]
+        (0, 48, "", "2", "", 18), (0, 50, "", "2", "", None), (0, 53, "", "2", "", None), (0, 55, "", "2", "", None),
+        (0, 57, "", "2", "", None), (0, 60, "", "2", "", None), (0, 61, "", "2", "", None),
+        (0, 62, "", "2", "", None), (0, 62, "", "2", "", None), (0, 63, "", "2", "", None),
+        (1, 7, "XP1", "1", "2", None), (1, 10, "XP2", "1", "2", None), (1, 12, "XP3", "1", "2", None),
+        (1, 14, "XP4", "1", "2", None), (1, 15, "XP5", "1", "2", None), (1, 16, "XP6", "2", "", None),
+        (1, 19, "XP8", "2", "2", None), (1, 23, "P[1]", "2", "", None), (1, 24, "P[2]", "2", "", None),
+    ]  # fmt: skip
     assert cell.targets[10].values == (850.125, -20.5, 1200.0, 180.0, 30.25, 179.5)
     assert cell.targets[11].values == (900.0, 0.0, 1000.0, 0.0, 0.0, 180.0)  # written in another order
     assert cell.targets[1].values == (700.0, -150.0, 600.25, 10.0, 0.0, 180.0)
@@ -79,13 +66,9 @@ def test_moves_of_the_cell(cell: Program) -> None:
     text = cell.sources[0].text
     found = [(m.kind, m.line, m.routine, cell.targets[m.target].name, text[slice(*m.target_text)]) for m in cell.moves]
     assert found[:6] == [
-        ("joint", 28, 0, "XP1", "XP1"),
-        ("linear", 33, 0, "XP2", "XP2"),
-        ("circular", 36, 0, "XP4", "XP4"),
-        ("circular", 37, 0, "XP5", ""),
-        ("linear", 39, 0, "XP6", ""),
-        ("joint", 47, 1, "P[1]", "P[1]"),
-    ]
+        ("joint", 28, 0, "XP1", "XP1"), ("linear", 33, 0, "XP2", "XP2"), ("circular", 36, 0, "XP4", "XP4"),
+        ("circular", 37, 0, "XP5", ""), ("linear", 39, 0, "XP6", ""), ("joint", 47, 1, "P[1]", "P[1]"),
+    ]  # fmt: skip
     assert [m.line for m in cell.moves[6:]] == [48, 49, 50, 53, 55, 57, 60, 61, 62, 63]
     whole = [m.line for m in cell.moves if m.target_text == (0, 0)]
     assert whole == [37, 39, 48, 53, 55, 57, 60]

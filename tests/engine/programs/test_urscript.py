@@ -53,14 +53,9 @@ def test_waypoints_of_an_export() -> None:
     turned = Rotation.from_rotvec(first.values[3:]).as_matrix()
     assert poses_of(program)[1, :3, :3] == pytest.approx(turned, abs=1e-12)
     assert [(m.kind, m.target, m.via, m.line) for m in program.moves] == [
-        ("joint", 0, None, 28),
-        ("joint", 1, None, 30),
-        ("linear", 2, None, 33),
-        ("linear", 1, None, 36),
-        ("linear", 3, None, 41),
-        ("linear", 6, None, 43),
-        ("circular", 5, 4, 44),
-    ]
+        ("joint", 0, None, 28), ("joint", 1, None, 30), ("linear", 2, None, 33), ("linear", 1, None, 36),
+        ("linear", 3, None, 41), ("linear", 6, None, 43), ("circular", 5, 4, 44),
+    ]  # fmt: skip
     assert program.tools["Gripper"].translation == (0.0, 0.0, 0.17425)
     assert program.frames["Pallet"].translation == (0.4123, -0.3551, 0.021)
     assert program.frames["Pallet"].quaternion == pytest.approx((np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)))

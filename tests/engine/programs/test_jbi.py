@@ -60,17 +60,10 @@ def test_lines_that_begin_with_slashes_hold_for_what_follows() -> None:
 def test_moves_and_what_is_left() -> None:
     program = sample(JBI, "weld.jbi")
     assert way(program) == [
-        ("joint", "C00000", None),
-        ("joint", "C00001", None),
-        ("linear", "C00002", None),
-        ("linear", "C00003", None),
-        ("circular", "C00005", "C00004"),
-        ("linear", "C00006", None),
-        ("joint", "C00007", None),
-        ("linear", "P00001", None),
-        ("joint", "C00008", None),
-        ("joint", "C00009", None),
-    ]
+        ("joint", "C00000", None), ("joint", "C00001", None), ("linear", "C00002", None), ("linear", "C00003", None),
+        ("circular", "C00005", "C00004"), ("linear", "C00006", None), ("joint", "C00007", None),
+        ("linear", "P00001", None), ("joint", "C00008", None), ("joint", "C00009", None),
+    ]  # fmt: skip
     text = program.sources[0].text
     circle = program.moves[4]
     assert text[slice(*circle.statement)] == "MOVC C00004 V=46.0\r\nMOVC C00005 V=46.0 FPT"
@@ -99,11 +92,9 @@ def test_base_axes_carry_the_robot() -> None:
     ]
     # Moves of several groups of axes go ways that the robot's positions alone do not tell.
     assert way(program) == [
-        ("joint", "C0001", None),
-        ("linear", "C0002", None),
-        ("circular", "C0004", "C0003"),
+        ("joint", "C0001", None), ("linear", "C0002", None), ("circular", "C0004", "C0003"),
         ("joint", "C0005", None),
-    ]
+    ]  # fmt: skip
     assert program.targets[4].values == (120.0, -340.0, 560.0, -78.0, 90.0, 1200.0)
 
 
@@ -280,11 +271,9 @@ def test_a_circle_is_split() -> None:
     whole = sample(JBI, "cell/main.jbi", "cell/track.jbi")
     after = split(JBI, whole, Split(2, ((numbers["p"], numbers["v"]),), numbers["w"]))
     assert way(after)[1:5] == [
-        ("linear", "C0002", None),
-        ("circular", "C0007", "C0006"),
-        ("linear", "C0008", None),
+        ("linear", "C0002", None), ("circular", "C0007", "C0006"), ("linear", "C0008", None),
         ("linear", "C0009", None),
-    ]
+    ]  # fmt: skip
     assert way(after)[5] == ("circular", "C0004", "C0003")
     targets = {t.name: t for t in after.targets}
     assert targets["C0006"].values == numbers["v"]

@@ -30,14 +30,11 @@ def read(text: str) -> Program:
 def test_waypoints_of_an_export() -> None:
     program = sample(URSCRIPT, "palletizing.script")
     assert [(t.line, t.name, t.form.kind, t.tool, t.frame) for t in program.targets] == [
-        (17, "Home_q", "joints", "Gripper", ""),
-        (18, "Waypoint_1_p", "pose", "Gripper", ""),
-        (20, "Waypoint_2_p", "pose", "Gripper", ""),
-        (22, "Corner_p", "pose", "Gripper", "Pallet"),
-        (23, "Arc_via_p", "pose", "Gripper", ""),
-        (24, "Arc_end_p", "pose", "Gripper", ""),
+        (17, "Home_q", "joints", "Gripper", ""), (18, "Waypoint_1_p", "pose", "Gripper", ""),
+        (20, "Waypoint_2_p", "pose", "Gripper", ""), (22, "Corner_p", "pose", "Gripper", "Pallet"),
+        (23, "Arc_via_p", "pose", "Gripper", ""), (24, "Arc_end_p", "pose", "Gripper", ""),
         (43, "", "pose", "Gripper", ""),
-    ]
+    ]  # fmt: skip
     home, first, second = program.targets[:3]
     assert home.values == (-1.5708, -1.6, -1.9, -1.2, 1.5708, 0.0)
     assert second.values == (0.433025361705, -0.267959205379, 0.202310714714, 3.12145, 0.021427297251, 0.030987104689)

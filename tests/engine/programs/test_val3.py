@@ -132,7 +132,7 @@ def test_moves_and_what_is_left(cell: Program) -> None:
 
 
 def test_frames_and_tools_are_chains(cell: Program) -> None:
-    # fMoving is set by the cell, fShared stands on a frame of a library.
+    # fMoving is set by the program, fShared stands on a frame of a library.
     assert set(cell.frames) == {"fTable", "fTable[1]"}
     assert set(cell.tools) == {"tGrip", "tTip"}
     table, tilted = cell.frames["fTable"], cell.frames["fTable[1]"]
@@ -158,22 +158,17 @@ def test_postures(cell: Program) -> None:
 def test_the_old_format() -> None:
     program = sample(VAL3, *OLD)
     assert [(t.name, t.line, t.tool, t.frame, t.parent) for t in program.targets] == [
-        ("jStart", 20, "", "", None),
-        ("pRow", 33, "tPen", "fPart", None),
-        ("pRow[1]", 37, "tPen", "fPart", None),
+        ("jStart", 20, "", "", None), ("pRow", 33, "tPen", "fPart", None), ("pRow[1]", 37, "tPen", "fPart", None),
         ("", 14, "tPen", "fPart", 2),
-    ]
+    ]  # fmt: skip
     assert written(program, 1) == ["366.58", "-390.36", "-359.79", "-179.84", "4.22", "29.87"]
     assert program.targets[0].values == (0.0, -10.5, 100.0, 0.0, 45.25, 0.0)
     first = Configuration(shoulder="front", ranges=((3, 0.0, math.inf), (5, -math.inf, 0.0)))
     assert program.targets[1].configuration == first
     assert program.targets[2].configuration == Configuration()
     assert way(program) == [
-        ("joint", "jStart", None),
-        ("linear", "", None),
-        ("linear", "pRow[1]", None),
-        ("linear", "pRow", None),
-    ]
+        ("joint", "jStart", None), ("linear", "", None), ("linear", "pRow[1]", None), ("linear", "pRow", None),
+    ]  # fmt: skip
     assert set(program.frames) == {"fPart"}
     assert program.tools["tPen"].translation == pytest.approx((0.0, 0.0, 0.17))
     assert program.skipped == ()

@@ -189,12 +189,11 @@ def test_a_program_without_targets_says_so(truearm: Truearm, place: Path) -> Non
     assert (place / "out" / "plate.mod").read_bytes() == (place / "plate.mod").read_bytes()
 
 
-@pytest.mark.parametrize("words", [(), ("--revert",)])
-def test_a_folder_is_no_program(truearm: Truearm, place: Path, words: tuple[str, ...]) -> None:
-    for folder in (".", place):
-        done = truearm("compensate", place / "calibrated.yaml", folder, "--out", place / "out", *words)
-        assert done.code == 2
-        assert "this is a folder, a program is needed" in done.err
+def test_a_folder_is_no_program(truearm: Truearm, place: Path) -> None:
+    for words in ((), ("--revert",)):
+        code, said = run(truearm, place, *words, program=".")
+        assert code == 2
+        assert "this is a folder, a program is needed" in said
 
 
 def test_what_was_left_or_is_on_an_edge_is_said_with_its_file(truearm: Truearm, place: Path) -> None:
@@ -207,17 +206,6 @@ def test_what_was_left_or_is_on_an_edge_is_said_with_its_file(truearm: Truearm, 
     assert "Warning (targets-skipped): 1 target was left unchanged, as listed with the reason." in said
     assert "1 target was moved across the edge of a quadrant or turn of the configuration" in said
     assert f"as at 0: plate.mod line {number}. Controllers" in said
-
-
-def test_two_programs_of_one_name_keep_their_folders(truearm: Truearm, place: Path) -> None:
-    paths = [place / folder / "plate.mod" for folder in ("one", "two")]
-    for path in paths:
-        path.parent.mkdir()
-        shutil.copy(place / "plate.mod", path)
-    done = truearm("compensate", place / "calibrated.yaml", *paths, *ANSWERS, "--out", place / "out", "--json")
-    assert done.code == 0
-    assert [file["file"] for file in json.loads(done.out)["programs"]] == ["one/plate.mod", "two/plate.mod"]
-    assert (place / "out" / "two" / "plate.mod.truearm.json").exists()
 
 
 def test_the_demo_ends_with_a_corrected_program(demonstrated: Demonstration, tmp_path: Path) -> None:

@@ -47,18 +47,14 @@ def saved(folder: Path, name: str = "robot") -> Path:
 def test_nothing_is_written_without_a_folder(program: Path) -> None:
     before = program.read_bytes()
     correction = compensate(calibrated(), [program])
-    assert program.read_bytes() == before
-    assert [path.name for path in program.parent.iterdir()] == ["plate.mod"]
+    assert [path.read_bytes() for path in program.parent.iterdir()] == [before]
     (file,) = correction.files
     assert (file.name, file.language, file.targets, file.corrected) == ("plate.mod", "RAPID", 44, 43)
     assert file.text != before
     assert 0.0 < file.mean_shift < file.largest_shift < 3e-3
     assert file.summary()["shift_mm"]["max"] == pytest.approx(1e3 * file.largest_shift)
-    assert [path.name for path in correction.save(program.parent / "out")] == [
-        "plate.mod",
-        "plate.mod.truearm.json",
-        "compensation.html",
-    ]
+    names = ["plate.mod", "plate.mod.truearm.json", "compensation.html"]
+    assert [path.name for path in correction.save(program.parent / "out")] == names
     assert (program.parent / "out" / "plate.mod").read_bytes() == file.text
 
 
@@ -87,18 +83,21 @@ def test_what_a_simulated_robot_does_is_said_first(program: Path) -> None:
 
 
 def test_originals_are_restored(program: Path) -> None:
-    out = program.parent / "out"
-    compensate(calibrated(), [program], out=out)
-    restored = truearm.revert([out / "plate.mod"])
+    """Of two programs of one name each from its folder."""
+    other, out, back = plate(program.parent / "two"), program.parent / "out", program.parent / "back"
+    made = compensate(calibrated(), [program, other], out=out)
+    names = [file.name for file in made.files]
+    assert names == [f"{program.parent.name}/plate.mod", "two/plate.mod"]
+    corrected = [out / name for name in names]
+    restored = truearm.revert(corrected[:1])
     assert restored.files[0].original == program.read_bytes()
     assert restored.folder is None
     assert repr(restored) == "plate.mod: as it was before the correction"
-    back = program.parent / "back"
-    restored = truearm.revert([out / "plate.mod"], out=back)
-    assert restored.paths == (back / "plate.mod",)
-    assert (back / "plate.mod").read_bytes() == program.read_bytes()
+    restored = truearm.revert(corrected, out=back)
+    assert restored.paths == tuple(back / name for name in names)
+    assert [path.read_bytes() for path in restored.paths] == [program.read_bytes(), other.read_bytes()]
     with pytest.raises(InputError, match="would be overwritten") as refusal:
-        truearm.revert([out / "plate.mod"], out=out)
+        truearm.revert(corrected, out=out)
     assert refusal.value.parameter == "out"
     with pytest.raises(InputError, match="no record beside this program") as refusal:
         truearm.revert([program], out=back)
@@ -178,18 +177,6 @@ def test_the_comment_says_by_what_and_when(program: Path) -> None:
             "  ! for irb120",
         ]
         assert json.loads((out / "plate.mod.truearm.json").read_text())["date"] == day
-
-
-def test_a_program_in_which_nothing_moves_stays_as_it_is_and_is_none_that_was_corrected(program: Path) -> None:
-    text = program.read_text()
-    moves = "".join(f"    MoveL pHole{k},v20,fine,tProbe\\WObj:=wobjPlate;\n" for k in range(1, 5))
-    program.write_text(text[: text.index("  PROC main()")] + f"  PROC main()\n{moves}  ENDPROC\nENDMODULE\n")
-    out = program.parent / "out"
-    compensate(calibrated(), [program], out=out, keep=["p*"])
-    assert (out / "plate.mod").read_bytes() == program.read_bytes()
-    copy = out / "copy.mod"
-    copy.write_bytes((out / "plate.mod").read_bytes())
-    assert compensate(calibrated(), [copy]).files[0].corrected == 17
 
 
 def test_a_ledger_that_cannot_be_written_is_said(program: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ NO_AXES: Final = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 
 def plate(folder: Path, *changes: tuple[str, str]) -> Path:
     """Write the program of the plate, with some changes."""
+    folder.mkdir(exist_ok=True)
     text, path = PLATE, folder / "plate.mod"
     for old, new in changes:
         assert old in text

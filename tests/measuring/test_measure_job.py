@@ -44,9 +44,19 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def seen_by(device: str, poses: int, folder: Path) -> Path:
     """Write a plan of configurations that a device can measure."""
     data = truearm.simulate("irb120", truth="nominal", poses=poses, device=device).data
-    rows = (",".join(map(repr, row)) for row in np.degrees(data.joints).tolist())
-    path = folder / "plan.csv"
-    path.write_text(MEASURED_PLAN.splitlines()[0] + "\n" + "".join(f"{k},{row}\n" for k, row in enumerate(rows, 1)))
+    return plan_of(folder, *(",".join(map(repr, row)) for row in np.degrees(data.joints).tolist()))
+
+
+def plan_of(folder: Path, *rows: str) -> Path:
+    path = folder / "few.csv"
+    path.write_text("\n".join([MEASURED_PLAN.splitlines()[0], *(f"{k},{row}" for k, row in enumerate(rows, 1))]) + "\n")
+    return path
+
+
+def with_reads(planned: Path, path: Path, reads: list[str]) -> Path:
+    """Write a plan that says what is read at each configuration."""
+    head, *rows = planned.read_text().splitlines()
+    path.write_text("\n".join([f"{head},reads", *map(",".join, zip(rows, reads, strict=True))]) + "\n")
     return path
 
 
@@ -239,23 +249,25 @@ def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_p
         assert sight(campaign) is None
 
 
+MORE_ROWS = "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9))
+
+
 def test_what_an_instrument_that_drifts_does_to_the_nests_is_said(plan: Path, tmp_path: Path) -> None:
-    plan.write_text(MEASURED_PLAN + "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9)))
-    found = arm(plan, tmp_path / "out", nests=["n1", "n2", "n3"], noise=1e-5, drift=3e-4)
+    plan.write_text(MEASURED_PLAN + MORE_ROWS)
+    given: dict[str, Any] = {"nests": ["n1", "n2", "n3"], "noise": 1e-5}
+    found = arm(plan, tmp_path / "out", drift=3e-4, **given)
     (notice,) = [n for n in found.warnings if n.code == "nests-moved"]
     assert notice.level == "warning"
     drift = found.drift
     assert drift is not None
     assert drift.largest == pytest.approx(3e-4, rel=0.2)
     assert np.isfinite(drift.moved).all()
-    calm = arm(plan, tmp_path / "calm", nests=["n1", "n2", "n3"], noise=1e-5)
-    assert "nests-moved" not in {n.code for n in calm.warnings}
-    summary = json.loads(json.dumps(found.summary()))
-    assert summary["nests"]["rounds"] == len(drift.rounds)
+    assert json.loads(json.dumps(found.summary()))["nests"]["rounds"] == len(drift.rounds)
+    assert "nests-moved" not in {n.code for n in arm(plan, tmp_path / "calm", **given).warnings}
 
 
 def test_a_drift_of_one_nest_is_told_where_nothing_states_a_deviation(plan: Path, tmp_path: Path) -> None:
-    plan.write_text(MEASURED_PLAN + "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9)))
+    plan.write_text(MEASURED_PLAN + MORE_ROWS)
     rng = np.random.default_rng(0)
     codes = []
     for number, drift in enumerate((0.0, 0.5)):
@@ -307,12 +319,6 @@ SEEN_AND_BLIND: dict[str, tuple[str, str, str]] = {
 }
 
 
-def plan_of(folder: Path, *rows: str) -> Path:
-    path = folder / "few.csv"
-    path.write_text("\n".join([MEASURED_PLAN.splitlines()[0], *(f"{k},{row}" for k, row in enumerate(rows, 1))]) + "\n")
-    return path
-
-
 def test_a_plan_of_which_an_instrument_sees_nothing_is_refused_before_anything_is_logged(tmp_path: Path) -> None:
     tracker = ("", "180,0,0,0,0,0", "a reflector must look at the tracker within 30 deg")
     for device, (_, blind, why) in {"tracker": tracker, **SEEN_AND_BLIND}.items():
@@ -354,10 +360,7 @@ def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is
         seen = [names[campaign.source.visible(k)] for k in range(24)]
     assert notice.level == "note"
     assert f"{sum(map(len, seen))} of 72 pairs of configuration and target can be read, some at every" in notice.message
-    head, *rows = planned.read_text().splitlines()
-    reads = (f"{row},{'; '.join(at)}" for row, at in zip(rows, seen, strict=True))
-    path = tmp_path / "reads.csv"
-    path.write_text("\n".join([f"{head},reads", *reads]) + "\n")
+    path = with_reads(planned, tmp_path / "reads.csv", ["; ".join(at) for at in seen])
     with open_campaign(path, "irb120", tmp_path / "reads", **given) as campaign:
         assert "not-seen" not in {one.code for one in campaign.notices}
     few = plan_of(tmp_path, "180,0,0,0,0,0")
@@ -366,23 +369,13 @@ def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is
 
 
 def test_the_column_reads_of_a_plan_says_what_is_asked_for(planned: Path, tmp_path: Path) -> None:
-    head, *rows = planned.read_text().splitlines()
-    path = tmp_path / "reads.csv"
-    path.write_text(
-        "\n".join([f"{head},reads", *(f"{row},{'1; 3' if k else '2'}" for k, row in enumerate(rows))]) + "\n"
-    )
-    with open_campaign(path, "irb120", tmp_path / "all", listen=0, targets=["1", "2", "3"]) as campaign:
-        assert campaign.session.outstanding == 1 + 2 * 23
-    with open_campaign(path, "irb120", tmp_path / "other", listen=0, targets=["smr"]) as campaign:
-        assert campaign.session.outstanding == 24
-    with open_campaign(path, "irb120", tmp_path / "beside", listen=0, targets=["2", "smr"]) as campaign:
-        assert campaign.session.outstanding == 25
-    truearm.measure(path, "irb120", out=tmp_path / "virtual", device="tracker", targets=["1", "2", "3"])
-    head, *lines = (tmp_path / "virtual/measurements.csv").read_text().splitlines()
-    at = head.split(",").index("target")
-    read = {(line.split(",")[0], line.split(",")[at]) for line in lines}
-    first = rows[0].split(",")[0]
-    assert not any(target == "2" and label != first for label, target in read)  # nobody asked for it
+    path = with_reads(planned, tmp_path / "reads.csv", ["2", *["1; 3"] * 23])
+    for targets, count in ((["1", "2", "3"], 1 + 2 * 23), (["smr"], 24), (["2", "smr"], 25)):
+        with open_campaign(path, "irb120", tmp_path / targets[0] / str(count), listen=0, targets=targets) as campaign:
+            assert campaign.session.outstanding == count
+    found = truearm.measure(path, "irb120", out=tmp_path / "virtual", device="tracker", targets=["1", "2", "3"])
+    first = found.session.labels[0]
+    assert not [e for e in found.session.kept if e.name == "2" and e.label != first]  # nobody asked for it
 
 
 def test_lengths_that_cannot_be_meant_are_told(plan: Path, tmp_path: Path) -> None:

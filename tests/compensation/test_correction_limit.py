@@ -59,34 +59,24 @@ def test_it_is_that_of_the_targets_where_there_are_some() -> None:
     assert limit.turned == pytest.approx(0.02, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("moved", "turned", "accepted", "refused"),
-    [
-        (0.9e-3, 0.9e-3, None, False),
-        (1.1e-3, 0.0, None, True),
-        (0.0, 1.1e-3, None, True),
-        (95e-3, 0.05, "95mm,3deg", False),
-        (95.1e-3, 0.05, "95mm,3deg", True),
-        (95e-3, 0.053, "95mm,3deg", True),
-        (0.9e-3, 0.9e-3, "0.5mm,3deg", True),
-    ],
-)
-def test_position_and_orientation_count_each_for_itself(
-    moved: float, turned: float, accepted: str | None, refused: bool
-) -> None:
-    limit = CorrectionLimit(1e-3, 1e-3)
-    given = None if accepted is None else CorrectionLimit.of(accepted, "accept_correction")
-
-    def checked() -> list[str]:
-        sizes = np.array([0.0, moved]), np.array([0.0, turned])
-        found = check_size(*sizes, limit, given, where=lambda row: f"line {row}", check="Look.", parameter="frames")
+def test_position_and_orientation_count_each_for_itself() -> None:
+    def checked(moved: float, turned: float, accepted: CorrectionLimit | None) -> list[str]:
+        sizes, limit = (np.array([0.0, moved]), np.array([0.0, turned])), CorrectionLimit(1e-3, 1e-3)
+        found = check_size(*sizes, limit, accepted, where=lambda row: f"line {row}", check="Look.", parameter="frames")
         return [notice.code for notice in found]
 
-    if refused:
+    large, small = (CorrectionLimit.of(text, "accept_correction") for text in ("95mm,3deg", "0.5mm,3deg"))
+    assert checked(0.9e-3, 0.9e-3, None) == []
+    assert checked(95e-3, 0.05, large) == ["corrections-large"]
+    for moved, turned, accepted in (
+        (1.1e-3, 0.0, None),
+        (0.0, 1.1e-3, None),
+        (95.1e-3, 0.05, large),
+        (95e-3, 0.053, large),
+        (0.9e-3, 0.9e-3, small),
+    ):
         with pytest.raises(InputError, match=r"^line 1: the correction is larger"):
-            checked()
-    else:
-        assert checked() == ([] if accepted is None else ["corrections-large"])
+            checked(moved, turned, accepted)
 
 
 def test_what_is_accepted_is_a_length_and_an_angle() -> None:

@@ -10,6 +10,8 @@ import numpy as np
 
 from truearm.engine.programs.program import Edit, Language, Program, ProgramTarget, Source, Split
 from truearm.engine.programs.program_files import edited
+from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
+from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import QUATERNION
 
 SAMPLES = Path(__file__).parent / "samples"
@@ -72,3 +74,18 @@ def written(program: Program, row: int) -> list[str | None]:
     target = program.targets[row]
     text = program.sources[target.source].text
     return [None if place is None else text[slice(*place)] for place in target.places]
+
+
+def said(program: Program, row: int) -> tuple[str, str, str]:
+    """Return the statement of a move, its target and the point on its way as they stand in the text."""
+    move = program.moves[row]
+    text = program.sources[move.source].text
+    parts = [text[slice(*part)] for part in (move.statement, move.target_text, move.via_text or (0, 0))]
+    return parts[0], parts[1], parts[2]
+
+
+def branches(robot: Robot, joints: np.ndarray) -> list[str]:
+    """Return the names of the postures that joints make."""
+    rule = branch_rule(robot)
+    assert rule is not None
+    return [BRANCHES[number] for number in rule.numbers(robot.forward_kinematics(joints)).tolist()]

@@ -14,13 +14,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.programs.reading import reasons, sample, split, way, written
+from tests.engine.programs.reading import branches, reasons, said, sample, split, way, written
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.fanuc_ls import FANUC_LS
 from truearm.engine.programs.fanuc_ls.text import configuration
 from truearm.engine.programs.program import Configuration, Program, Skipped, Source, Split
-from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
 from truearm.engine.robot.library import load_robot
 
 HALF = (-pi, pi)
@@ -49,7 +48,6 @@ def moves(found: Program) -> list[tuple[int, str, str, str | None]]:
 
 def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
     found = sample(FANUC_LS, "bracket.ls")
-    text = found.sources[0].text
     assert [(t.line, t.name, t.frame, t.tool) for t in found.targets] == [
         (61, "P[1:home]", "2", "3"), (67, "P[2:approach]", "2", "3"), (73, "P[3]", "2", "3"), (79, "P[4]", "2", "3"),
         (85, "P[5]", "2", "3"), (91, "P[6]", "2", "3"), (97, "P[7]", "2", "3"), (109, "P[9]", "2", "3"),
@@ -71,10 +69,7 @@ def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
         (41, "linear", "P[3]", None), (48, "circular", "P[9]", None), (49, "circular", "P[10]", None),
         (50, "circular", "P[11]", None), (55, "linear", "P[13]", None), (59, "joint", "P[1:home]", None),
     ]  # fmt: skip
-    circle = found.moves[4]
-    assert text[slice(*circle.statement)] == "C P[5]    \r\n    :  P[6] 80mm/sec CNT100    ;"
-    assert circle.via_text is not None
-    assert (text[slice(*circle.via_text)], text[slice(*circle.target_text)]) == ("P[5]", "P[6]")
+    assert said(found, 4) == ("C P[5]    \r\n    :  P[6] 80mm/sec CNT100    ;", "P[6]", "P[5]")
     assert found.skipped == (
         Skipped(0, 28, "UFRAME[2] is set here, so where its targets are is not known"),
         Skipped(0, 46, "which position P[R[5]] is, is known only when the program runs"),
@@ -297,14 +292,11 @@ def test_configurations_that_controllers_show(text: str, joints: tuple[float, ..
 
 def test_up_stays_up_when_the_arm_leans_back_over_its_first_axis() -> None:
     robot = load_robot("lrmate200ic")
-    rule = branch_rule(robot)
-    assert rule is not None
     # Joint 3 is the angle between upper arm and forearm, which bends forward from 0 to 142 deg and a little before.
     leaning = np.deg2rad([[0, 30, 0, 0, 40, 0], [0, -55, -40, 0, 40, 0]])
     straight = np.deg2rad([[0, 30, -100, 0, 40, 0], [0, -55, -130, 0, 40, 0]])
     for postures, side in ((leaning, "U"), (straight, "D")):
-        names = [BRANCHES[number] for number in rule.numbers(robot.forward_kinematics(postures))]
-        for name, place in zip(names, "TB", strict=True):
+        for name, place in zip(branches(robot, postures), "TB", strict=True):
             found = configuration(f"N {side} {place}, 0, 0, 0")
             assert found is not None
             assert name.startswith(f"{found.shoulder}-{found.elbow}-")

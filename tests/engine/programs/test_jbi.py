@@ -13,7 +13,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from tests.engine.programs.reading import reasons, sample, split, way
+from tests.engine.programs.reading import reasons, said, sample, split, way
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.jbi import JBI
@@ -64,13 +64,8 @@ def test_moves_and_what_is_left() -> None:
         ("circular", "C00005", "C00004"), ("linear", "C00006", None), ("joint", "C00007", None),
         ("linear", "P00001", None), ("joint", "C00008", None), ("joint", "C00009", None),
     ]  # fmt: skip
-    text = program.sources[0].text
-    circle = program.moves[4]
-    assert text[slice(*circle.statement)] == "MOVC C00004 V=46.0\r\nMOVC C00005 V=46.0 FPT"
-    assert text[slice(*circle.target_text)] == "C00005"
-    assert circle.via_text is not None
-    assert text[slice(*circle.via_text)] == "C00004"
-    assert text[slice(*program.moves[5].statement)] == "MOVL C00006 V=93.5 UNTIL IN#(7)=ON"
+    assert said(program, 4) == ("MOVC C00004 V=46.0\r\nMOVC C00005 V=46.0 FPT", "C00005", "C00004")
+    assert said(program, 5)[0] == "MOVL C00006 V=93.5 UNTIL IN#(7)=ON"
     assert reasons(program) == [
         (35, "C00011 is shifted by SFTON when the program runs"),
         (37, "P00002 is the increment of IMOV, not a place"),

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.programs.reading import reasons, sample, split
+from tests.engine.programs.reading import reasons, said, sample, split
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.krl import KRL
@@ -72,12 +72,8 @@ def test_moves_of_the_cell(cell: Program) -> None:
     assert [m.line for m in cell.moves[6:]] == [48, 49, 50, 53, 55, 57, 60, 61, 62, 63]
     whole = [m.line for m in cell.moves if m.target_text == (0, 0)]
     assert whole == [37, 39, 48, 53, 55, 57, 60]
-    circle = cell.moves[2]
-    assert circle.via is not None
-    assert circle.via_text is not None
-    assert cell.targets[circle.via].name == "XP3"
-    assert text[slice(*circle.via_text)] == "XP3"
-    assert text[slice(*circle.statement)] == "circ XP3, XP4 C_DIS"
+    assert cell.targets[cell.moves[2].via or 0].name == "XP3"
+    assert said(cell, 2) == ("circ XP3, XP4 C_DIS", "XP4", "XP3")
 
 
 def test_what_the_cell_leaves_alone(cell: Program) -> None:

@@ -15,13 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.engine.programs.reading import sample, split
+from tests.engine.programs.reading import branches, said, sample, split
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.program import ANY_POSTURE, Program, Source, Split
 from truearm.engine.programs.rapid import RAPID
 from truearm.engine.programs.rapid.data import configuration
-from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.transform import Transform
 
@@ -114,11 +113,10 @@ def test_every_move_is_found(polish: Program) -> None:
         ("joint", 81, 1, None, 9, ""),
         ("linear", 87, 14, None, 10, ""),
     ]
-    circle = polish.moves[3]
-    assert circle.via_text is not None
-    assert text[slice(*circle.via_text)].startswith("[[62,10,12],")
-    assert text[slice(*circle.statement)].startswith("MoveC [[62,10,12],")
-    assert text[slice(*circle.statement)].endswith("\\WObj:=wCover;")
+    statement, _, via = said(polish, 3)
+    assert via.startswith("[[62,10,12],")
+    assert statement.startswith(f"MoveC {via}")
+    assert statement.endswith("\\WObj:=wCover;")
 
 
 def test_tools_and_frames_of_the_program_are_known(polish: Program) -> None:
@@ -359,10 +357,8 @@ def test_tools_and_frames_that_cannot_be_are_refused_if_they_are_used(old: str, 
 def test_elbow_words_agree_with_the_arm() -> None:
     """The manual's table, worked out with the drawing of the IRB 120 for random joint positions."""
     robot = load_robot("irb120").rigid
-    rule = branch_rule(robot)
-    assert rule is not None
     q = robot.random_configurations(2000, np.random.default_rng(3))
-    words = [BRANCHES[number].split("-") for number in rule.numbers(robot.forward_kinematics(q))]
+    words = [name.split("-") for name in branches(robot, q)]
     tilt, bend = q[:, 1], q[:, 2]
     behind_axis_1 = 270 * np.sin(tilt) + 302 * np.cos(tilt + bend) + 70 * np.sin(tilt + bend) < 0
     behind_arm = 302 * np.cos(bend) + 70 * np.sin(bend) < 0

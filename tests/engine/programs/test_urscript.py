@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.engine.programs.reading import reasons, sample, split, written
+from tests.engine.programs.reading import reasons, said, sample, split, written
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.program import Program, Source, Split
@@ -70,11 +70,10 @@ def test_frames_and_tcps_of_routines_with_dos_line_ends() -> None:
         Rotation.from_rotvec([0, 0, 0.785398]).as_matrix(), abs=1e-12
     )
     assert program.unknown == {"SpindleOff": 1}
-    move = program.moves[1]
-    text = program.sources[0].text
-    assert text[slice(*move.statement)].startswith("movel(pose_trans(ref_frame,p[0.010000,")
-    assert text[slice(*move.statement)].endswith("accel_mss,speed_ms,0,0.000)")
-    assert text[slice(*move.target_text)] == "p[0.010000, 0.182525, 0.121866, 3.141593, 0.000000, 0.000000]"
+    statement, target, _ = said(program, 1)
+    assert statement.startswith("movel(pose_trans(ref_frame,p[0.010000,")
+    assert statement.endswith("accel_mss,speed_ms,0,0.000)")
+    assert target == "p[0.010000, 0.182525, 0.121866, 3.141593, 0.000000, 0.000000]"
 
 
 def test_an_orientation_that_a_circle_does_not_need_is_that_of_its_end_and_not_written() -> None:

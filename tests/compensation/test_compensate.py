@@ -198,12 +198,13 @@ def test_a_folder_is_no_program(truearm: Truearm, place: Path) -> None:
 
 def test_what_was_left_or_is_on_an_edge_is_said_with_its_file(truearm: Truearm, place: Path) -> None:
     on_edge = pose(374, 0, 500, "[0,0,1,0],[-1,-1,-1,0]")
-    lines = [f"MoveL {on_edge},v100,fine,tool0;", "MoveL pNowhere,v100,fine,tool0;"]
+    lines = [f"MoveL {on_edge},v100,fine,tool0;", "MoveL pNowhere,v100,fine,tool0;", "GlueOn 5;"]
     text = plate(place, ("ENDMODULE", "\n".join(["PROC edge()", *lines, "ENDPROC", "ENDMODULE"]))).read_text()
     code, said = run(truearm, place, "--accept", "skipped", "--details")
     assert code == 0
     number = next(i for i, line in enumerate(text.splitlines(), 1) if "[374,0,500]" in line)
     assert "Warning (targets-skipped): 1 target was left unchanged, as listed with the reason." in said
+    assert "(instructions-unknown): 1 unknown instruction was left alone: GlueOn (1)" in said
     assert "1 target was moved across the edge of a quadrant or turn of the configuration" in said
     assert f"as at 0: plate.mod line {number}. Controllers" in said
 

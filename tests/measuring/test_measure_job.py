@@ -144,8 +144,11 @@ def test_a_folder_that_began_otherwise_is_refused(plan: Path, tmp_path: Path) ->
     about.write_text(said % "B")
     with pytest.raises(InputError, match="another instrument or robot"):
         arm(plan, out, about=about)
-    with pytest.raises(InputError, match="another robot"):
-        truearm.measure(plan, "irb1600", out=out, device="measurement-arm", nests=["n"], every=2)
+    changed = truearm.load_robot("irb120").with_values({"a_3": 0.271})
+    for robot, got in (("irb1600", "'irb1600'; allowed: irb120."), (changed, "with other values'; allowed: irb120 as")):
+        with pytest.raises(InputError, match="began with another robot") as refusal:
+            truearm.measure(plan, robot, out=out, device="measurement-arm", nests=["n"], every=2)
+        assert got in str(refusal.value)
     plan.write_text(MEASURED_PLAN.replace("P2,20", "P2,21"))
     with pytest.raises(InputError, match="another plan"):
         arm(plan, out)

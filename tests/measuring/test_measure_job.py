@@ -1,4 +1,7 @@
-"""A plan measured from the first reading to a calibration, stopped and gone on with, by every source."""
+"""A plan measured from the first reading to a calibration, stopped and gone on with, by every source.
+
+And the command that measures: what it prints, its JSON, its exit codes, and what a kill leaves.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,16 @@ import json
 import os
 import signal
 import socket
+import subprocess
+import sys
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.commanding import Truearm
 from tests.house.examples import MEASURED_PLAN
 
 import truearm
@@ -499,3 +506,63 @@ def test_a_virtual_robot_comes_from_the_stops_of_the_plan(plan: Path, tmp_path: 
     np.testing.assert_allclose(places[0], places[1], atol=1e-12)
     assert came.data is not None
     assert came.data.number.tolist() == list(range(1, 2 * len(table), 2))
+
+
+@pytest.fixture
+def command(truearm: Truearm) -> Truearm:
+    return truearm
+
+
+def test_one_line_a_reading_then_what_came_of_it(command: Truearm, plan: Path, tmp_path: Path) -> None:
+    words = ("measure", plan, "irb120", "--device", "measurement-arm", "--out", tmp_path / "out")
+    run = command(*words, "--most-deviation", "0.5")
+    assert run.code == 0
+    first, *_, last = run.out.splitlines()
+    assert first.startswith("   1  P1 nest  ")
+    assert " mm  deviation 0.0" in first
+    assert last == f"Written to {tmp_path / 'out'}: measurements.csv, measure.html, and the log readings.csv"
+    again = command(*words, "--most-deviation", "0.5", "--json")
+    summary = json.loads(again.out)
+    assert list(summary)[2:6] == ["finished", "configurations", "targets", "kept"]
+    assert (summary["finished"], summary["kept"]) == (True, {"targets": 3, "nests": 0})
+    assert "Going on after 3 entries" in again.err
+    other = command(*words)
+    assert other.code == 2
+    assert "limit of what is kept" in other.err
+
+
+def test_the_token_that_is_given_stands_in_no_file_and_no_line(command: Truearm, plan: Path, tmp_path: Path) -> None:
+    token = "this-is-the-secret-of-the-test"
+    given = ("--listen", 0, "--token", token, "--target", "a", "--timeout", 0)
+    run = command("measure", plan, "irb120", *given, "--out", tmp_path / "out")
+    assert run.code == 0
+    assert "Listening on 127.0.0.1 port" in run.out
+    assert token not in run.out + run.err
+    assert all(token.encode() not in path.read_bytes() for path in (tmp_path / "out").iterdir())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="another kind of signals")
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
+def test_a_process_that_is_stopped_leaves_its_log_and_goes_on(
+    command: Truearm, plan: Path, watching: dict[str, Any], stop: signal.Signals
+) -> None:
+    inside, out = watching["watch"], watching["out"]
+    (inside / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\nP2,a,1,2,4\n")
+    words = ["measure", plan, "irb120", "--watch", inside, "--map", watching["mapping"], "--out", out, "--target", "a"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "truearm", *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    log, until = out / LOG, time.monotonic() + 60.0
+    while time.monotonic() < until and not (log.exists() and log.read_text().count("\n") == 3):
+        time.sleep(0.05)
+    os.kill(process.pid, stop)
+    printed, _ = process.communicate(timeout=60.0)
+    assert log.read_text().count("\n") == 3
+    if stop == signal.SIGINT:
+        assert process.returncode == 0
+        assert "Warning (unfinished)" in printed
+        assert (out / DATA).exists()
+    (inside / "q.csv").write_text("Pose,Point,X,Y,Z\nP3,a,1,2,5\n")
+    run = command(*words)
+    assert run.code == 0
+    assert "3 of 3 configurations measured" in run.out
